@@ -1,0 +1,51 @@
+#pragma once
+// Partial: everything that one work unit contributes to the image, as sums and counts. Summed in double, in a fixed order
+// (pixel by pixel in iteration order; splats in path order), so it is the same bytes on any worker and thread count.
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/film/frame.h"
+
+namespace lightloom {
+
+/// Sum of the splats of a unit in one pixel. Values are in "pixel area 1" units: the image is the sum over all units
+/// divided by the total number of light paths.
+struct SplatSum {
+    uint32_t pixel = 0;  ///< Row-major in FrameLayout::crop.
+    std::array<double, 3> rgb{};
+    friend bool operator==(const SplatSum&, const SplatSum&) = default;
+};
+
+/// One sample that came out NaN or infinite. It was dropped before it was summed; this is enough to replay it.
+struct DroppedSample {
+    uint64_t iteration = 0;
+    uint32_t pixel = 0;  ///< Row-major in FrameLayout::crop: where it was traced from (camera) or would have landed (splat).
+    bool splat = false;
+    friend bool operator==(const DroppedSample&, const DroppedSample&) = default;
+};
+
+struct UnitCounters {
+    uint64_t camera_samples = 0;
+    uint64_t light_paths = 0;
+    uint64_t rays = 0;      ///< Closest-hit and shadow rays together.
+    uint64_t vertices = 0;  ///< Surface vertices created by both kinds of walk.
+    uint64_t connections = 0;  ///< Connections (next event included) whose visibility was tested.
+};
+
+struct Partial {
+    Rect tile;                        ///< Pixels that `camera` covers, full-frame coordinates.
+    uint32_t samples_per_pixel = 0;   ///< Camera samples in each pixel of the tile (= iterations of the unit).
+    std::vector<double> camera;       ///< 3 * tile.area(), row-major, RGB interleaved: sums of camera samples.
+    uint64_t light_paths = 0;         ///< Light paths whose splats are in `splats` (also those that hit nothing).
+    std::vector<SplatSum> splats;     ///< Ascending by pixel, no pixel twice.
+    uint64_t dropped_count = 0;       ///< Non-finite samples dropped.
+    std::vector<DroppedSample> dropped;  ///< The first of them, at most kMaxDroppedRecords.
+    UnitCounters counters;
+
+    static constexpr size_t kMaxDroppedRecords = 16;
+};
+
+}  // namespace lightloom

@@ -1,0 +1,174 @@
+#pragma once
+// SceneDescription: what an importer produces and Scene::build() consumes. Plain data, in world space, in the units of the
+// scene file. Every reference is an index into one of the vectors; an importer guarantees that indices are in range, that
+// all numbers are finite, and that matrices are invertible (Scene::build() checks again and reports, it never crashes).
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/core/transform.h"
+#include "common/core/vec.h"
+#include "common/scene/image.h"
+
+namespace lightloom {
+
+/// Index of a TextureNode. Every material parameter is one; constants are nodes of kind kConstant.
+using TextureId = int32_t;
+using MaterialId = int32_t;
+inline constexpr int32_t kNone = -1;
+
+enum class TextureKind : uint8_t { kConstant, kScale, kMix, kCheckerboard, kImage };
+enum class WrapMode : uint8_t { kRepeat, kClamp, kBlack };
+
+struct TextureNode {
+    TextureKind kind = TextureKind::kConstant;
+    Rgb value{0.0f};                   ///< kConstant. A float texture has three equal components.
+    TextureId a = kNone, b = kNone;    ///< kScale: a * b. kMix: (1-amount) a + amount b. kCheckerboard: the two colours.
+    TextureId amount = kNone;          ///< kMix only.
+    int32_t image = kNone;             ///< kImage: index into SceneDescription::images.
+    WrapMode wrap = WrapMode::kRepeat;
+    bool nearest = false;              ///< kImage: point lookup; bilinear otherwise.
+    bool invert = false;               ///< kImage: 1 - value, before `scale`.
+    float scale = 1;                   ///< kImage: multiplies the looked-up value.
+    // (u, v) mapping: s = su * u + du, t = sv * v + dv.
+    float su = 1, sv = 1, du = 0, dv = 0;
+};
+
+enum class MaterialKind : uint8_t {
+    kDiffuse,
+    kDiffuseTransmission,
+    kConductor,
+    kDielectric,
+    kThinDielectric,
+    kCoatedDiffuse,
+    kCoatedConductor,
+    kMix,
+};
+
+/// A material before texture evaluation. Unused slots stay kNone.
+struct Material {
+    MaterialKind kind = MaterialKind::kDiffuse;
+    std::string name;                         ///< As in the scene file; empty for anonymous ones.
+    TextureId reflectance = kNone;            ///< kDiffuse, kDiffuseTransmission, kCoatedDiffuse (base), or a conductor's F0.
+    TextureId transmittance = kNone;          ///< kDiffuseTransmission.
+    TextureId eta = kNone, k = kNone;         ///< kConductor (used when reflectance is kNone); base of kCoatedConductor.
+    TextureId roughness_u = kNone, roughness_v = kNone;  ///< GGX roughness (of the coat for coated kinds).
+    TextureId base_roughness_u = kNone, base_roughness_v = kNone;  ///< kCoatedConductor's conductor.
+    bool remap_roughness = true;              ///< pbrt: alpha = sqrt(roughness) if true, alpha = roughness otherwise.
+    float ior = 1.5f;                         ///< Relative index of (thin) dielectric or of the coat.
+    MaterialId mix_a = kNone, mix_b = kNone;  ///< kMix: a with probability 1 - amount, b with probability amount.
+    TextureId mix_amount = kNone;
+};
+
+/// Emission of an area light, attached to shapes. Radiance, W / (m^2 sr) per colour channel, scene units.
+struct AreaEmission {
+    Rgb radiance;
+    bool two_sided = false;
+};
+
+/// What all shapes share.
+struct ShapeAttributes {
+    MaterialId material = kNone;
+    int32_t emission = kNone;     ///< Index into SceneDescription::emissions.
+    TextureId alpha = kNone;      ///< Cut-out opacity in [0, 1]; kNone is opaque.
+    bool flip_normal = false;     ///< Reverses the geometric normal cross(p1 - p0, p2 - p0) (pbrt: ReverseOrientation xor
+                                  ///< a handedness-swapping transformation).
+    std::string source;           ///< "file:line" of the shape, for messages.
+};
+
+struct TriangleMesh {
+    std::vector<Vec3> positions;
+    std::vector<Vec3> normals;      ///< Empty, or one per position; unit length, world space. As in pbrt, the geometric
+                                    ///< normal of a triangle is flipped into the hemisphere of its shading normals.
+    std::vector<Vec2> uvs;          ///< Empty, or one per position; empty means (0,0) (1,0) (1,1) at the three corners.
+    std::vector<uint32_t> indices;  ///< Three per triangle.
+    ShapeAttributes attributes;
+};
+
+struct Sphere {
+    Vec3 centre;
+    float radius = 1;
+    /// Rotation from the sphere's own axes to the world, for its (u, v) parametrisation (pbrt: u about z, v along z).
+    Frame orientation{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
+    ShapeAttributes attributes;
+};
+
+/// A named group of shapes in its own space, placed by Instance. Shapes inside may not emit.
+struct ObjectDefinition {
+    std::string name;
+    std::vector<TriangleMesh> meshes;
+    std::vector<Sphere> spheres;
+};
+
+struct Instance {
+    int32_t object = kNone;
+    Mat4 object_to_world;
+    std::string source;
+};
+
+struct PointLight {
+    Vec3 position;
+    Rgb intensity;  ///< W / sr.
+};
+
+struct SpotLight {
+    Vec3 position;
+    Frame axes;            ///< axes.n is the direction of the axis, away from the light.
+    Rgb intensity;         ///< On the axis, W / sr.
+    float cos_total = 0;   ///< Cosine beyond which the light is dark.
+    float cos_falloff = 0; ///< Cosine within which it has full intensity; smoothstep between.
+};
+
+struct DistantLight {
+    Vec3 direction;  ///< Unit vector in which the light travels.
+    Rgb irradiance;  ///< On a surface facing it, W / m^2.
+};
+
+struct InfiniteLight {
+    Mat4 light_to_world;   ///< Rotation (and reflection) part is used.
+    Rgb radiance{1.0f};    ///< Multiplies the image, or is the constant radiance when there is none.
+    int32_t image = kNone; ///< Equal-area octahedral square map, index into images.
+};
+
+struct PerspectiveCamera {
+    Mat4 camera_to_world;            ///< Camera looks along +z, +y up, +x right; may mirror.
+    float fov_degrees = 90;          ///< Of the shorter image side.
+    /// pbrt's screen window; when unset (`has_screen_window` false) it follows the film's aspect ratio.
+    bool has_screen_window = false;
+    float screen_window[4] = {-1, 1, -1, 1};  ///< x0, x1, y0, y1.
+    float frame_aspect_ratio = 0;    ///< 0: width / height.
+    float lens_radius = 0;           ///< 0 is a pinhole.
+    float focal_distance = 1e6f;
+};
+
+struct FilmDescription {
+    int width = 1280, height = 720;
+    /// Crop window in pixels, half open: x0, x1, y0, y1; all -1 means the whole frame.
+    int crop[4] = {-1, -1, -1, -1};
+    float exposure_scale = 1;          ///< iso * exposure time / 100: multiplies the image.
+    float max_component_value = 0;     ///< 0: no clamp. Otherwise a named option that changes the mean.
+    std::string file_name;
+};
+
+struct SceneDescription {
+    std::vector<TriangleMesh> meshes;
+    std::vector<Sphere> spheres;
+    std::vector<ObjectDefinition> objects;
+    std::vector<Instance> instances;
+    std::vector<Material> materials;
+    std::vector<TextureNode> textures;
+    std::vector<Image> images;
+    std::vector<AreaEmission> emissions;
+    std::vector<PointLight> point_lights;
+    std::vector<SpotLight> spot_lights;
+    std::vector<DistantLight> distant_lights;
+    std::vector<InfiniteLight> infinite_lights;
+    PerspectiveCamera camera;
+    FilmDescription film;
+    int max_depth = 5;                  ///< Bounces, as in pbrt: paths have up to max_depth + 1 edges.
+    int samples_per_pixel = 16;         ///< What the file asks for; the command line may override.
+    std::vector<std::string> warnings;  ///< Named warnings: "file:line: what was ignored and why that matters".
+};
+
+}  // namespace lightloom

@@ -1,0 +1,26 @@
+#pragma once
+// Texture evaluation and the resolution of a Material into a Bsdf at a surface point.
+
+#include <span>
+
+#include "common/scene/bsdf.h"
+#include "common/scene/description.h"
+
+namespace lightloom {
+
+/// The tables that texture evaluation reads; views into a Scene or SceneDescription.
+struct TextureTables {
+    std::span<const TextureNode> nodes;
+    std::span<const Image> images;
+    std::span<const Material> materials;
+};
+
+/// Value of a texture at (u, v). Nesting is bounded at import (at most 32 levels). For a pbrt v coordinate, image row 0 is
+/// at v = 1. Never reads out of range.
+Rgb evaluate_texture(const TextureTables& tables, TextureId id, Vec2 uv);
+
+/// Resolve `material` at (u, v). A kMix material is decided stochastically but reproducibly from `choice` in [0, 1): the
+/// decision is part of the vertex, so every technique that produces the same vertex sees the same surface.
+Bsdf resolve_material(const TextureTables& tables, MaterialId material, Vec2 uv, float choice);
+
+}  // namespace lightloom

@@ -1,0 +1,1 @@
+lightloom_test(core_test LINK lt_core)
