@@ -1,0 +1,26 @@
+#pragma once
+// The commands of the `lightloom` program, one file each. A command adds itself to the application; its callback stores the
+// process's exit code.
+
+#include <CLI/CLI.hpp>
+
+namespace lightloom::client {
+
+/// Documented in the README and in `lightloom --help`.
+enum ExitCode : int {
+    kSuccess = 0,
+    kFailure = 1,         ///< The job or the comparison failed.
+    kUsage = 2,           ///< Bad command line or bad input file.
+    kDroppedSamples = 3,  ///< --strict, and non-finite samples were dropped.
+    kUnavailable = 4,     ///< The service could not be reached.
+    kCancelled = 130,
+};
+
+void add_render_command(CLI::App& app, int* exit_code);      // render, embedded
+void add_service_commands(CLI::App& app, int* exit_code);    // submit, watch, fetch, cancel, list
+void add_inspect_command(CLI::App& app, int* exit_code);
+void add_compare_command(CLI::App& app, int* exit_code);
+void add_algorithms_command(CLI::App& app, int* exit_code);
+void add_replay_command(CLI::App& app, int* exit_code);
+
+}  // namespace lightloom::client

@@ -1,0 +1,70 @@
+#pragma once
+// Accumulation: the exact sum of the partials of complete full-frame groups, and what develops from it.
+//
+// Addition is in 128-bit integers with step 2^-44 (range about 1e25 radiance units), so the order of arrival does not matter
+// and merging is exact. Nothing is divided before develop(). One Accumulation holds one (epoch, algorithm, N1).
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "common/core/result.h"
+#include "common/film/partial.h"
+
+namespace lightloom {
+
+/// Linear RGB float image, row-major, interleaved, of the crop window.
+struct RgbImage {
+    int width = 0, height = 0;
+    std::vector<float> pixels;  ///< 3 * width * height
+};
+
+using Int128 = __int128;
+
+/// The sums of one group that is not complete yet. Partials may be added in any order.
+class GroupSum {
+  public:
+    explicit GroupSum(const FrameLayout& frame);
+    /// kDataLoss if the partial does not fit the frame, holds a non-finite value, or exceeds the range; then nothing was
+    /// added. Exactly-once is the caller's duty (by unit key).
+    Status add(const Partial& partial);
+
+  private:
+    friend class Accumulation;
+    FrameLayout frame_;
+    std::vector<Int128> camera_, splat_;   // 3 per pixel of the crop
+    std::vector<uint64_t> camera_count_;   // samples per pixel
+    uint64_t light_paths_ = 0;
+    uint64_t dropped_ = 0;
+};
+
+class Accumulation {
+  public:
+    explicit Accumulation(const FrameLayout& frame);
+
+    /// Folds a complete group of `iterations` iterations in. Groups are folded in ascending order of their index (the
+    /// caller holds later ones back), because the second moments are kept in double.
+    Status fold(const GroupSum& group, uint32_t iterations);
+
+    uint32_t group_count() const { return group_count_; }
+    uint64_t iterations() const { return iterations_; }
+    uint64_t dropped() const { return dropped_; }
+
+    /// camera sum / camera count + splat sum / light paths, per pixel, times `scale` (the film's exposure).
+    RgbImage develop(float scale = 1) const;
+    /// Variance of each developed pixel and channel, from the second moments of whole group images (never of single
+    /// samples, which share light paths): sum_g n_g (X_g - mean)^2 / ((G - 1) sum n_g). Zero for fewer than two groups.
+    RgbImage variance(float scale = 1) const;
+
+  private:
+    FrameLayout frame_;
+    std::vector<Int128> camera_, splat_;
+    std::vector<uint64_t> camera_count_;
+    uint64_t light_paths_ = 0;
+    uint64_t dropped_ = 0;
+    uint64_t iterations_ = 0;
+    uint32_t group_count_ = 0;
+    std::vector<double> moment_;  // sum_g n_g X_g^2
+};
+
+}  // namespace lightloom
