@@ -12,11 +12,13 @@ namespace {
 constexpr double kStepsPerUnit = 0x1p44;
 /// |sum| stays below 2^127 steps.
 constexpr double kRange = 0x1p83;
+/// Values below this make steps that fit 62 bits.
+constexpr double kFastLimit = 0x1p18;
 
 /// `value` in steps of 2^-44, rounded to nearest even. `value` is finite and |value| < kRange.
 inline Int128 to_fixed(double value) {
     const double steps = value * kStepsPerUnit;  // Exact: a power of two, and no overflow below kRange.
-    if (std::fabs(steps) < 0x1p62) return std::llrint(steps);
+    if (std::fabs(value) < kFastLimit) return std::llrint(steps);
     // Beyond 2^53 every double is an integer: its mantissa, shifted.
     const uint64_t bits = std::bit_cast<uint64_t>(steps);
     const int shift = int((bits >> 52) & 0x7ff) - 1075;
@@ -31,23 +33,17 @@ inline bool addition_overflows(Int128 sum, double value) {
     return __builtin_add_overflow(sum, to_fixed(value), &result);
 }
 
-/// Largest magnitude, rounded up a little so that sums of these bounds stay bounds.
-double largest_magnitude(const double* values, size_t count) {
-    double largest = 0;
-    for (size_t i = 0; i < count; ++i) {
-        const double magnitude = std::fabs(values[i]);
-        largest = magnitude > largest ? magnitude : largest;
+/// `sum += steps` for a run of values, none of them larger than `largest`.
+void add_run(Int128* sums, const double* values, size_t count, double largest) {
+    if (largest < kFastLimit) {  // Nearly always: one multiplication, one conversion and an addition with carry each.
+        for (size_t i = 0; i < count; ++i) sums[i] += std::llrint(values[i] * kStepsPerUnit);
+    } else {
+        for (size_t i = 0; i < count; ++i) sums[i] += to_fixed(values[i]);
     }
-    return largest * (1 + 0x1p-40) + 1 / kStepsPerUnit;
 }
 
-double largest_splat(const std::vector<SplatSum>& splats) {
-    double largest = 0;
-    for (const SplatSum& splat : splats) {
-        for (double value : splat.rgb) largest = std::fabs(value) > largest ? std::fabs(value) : largest;
-    }
-    return largest * (1 + 0x1p-40) + 1 / kStepsPerUnit;
-}
+/// Rounded up a little, so that sums of bounds stay bounds.
+double loosened(double bound) { return bound * (1 + 0x1p-40) + 1 / kStepsPerUnit; }
 
 Status out_of_range() {
     return data_loss("accumulation: a sum would exceed the range of about 1e25 radiance units; the partial was not added");
@@ -70,11 +66,11 @@ GroupSum::GroupSum(const FrameLayout& frame)
       camera_count_(size_t(frame.crop.area())) {}
 
 Status GroupSum::add(const Partial& partial) {
-    LL_RETURN_IF_ERROR(check_partial(partial, frame_));
+    const Result<PartialBounds> bounds = check_partial(partial, frame_);
+    if (!bounds.ok()) return bounds.status();
 
     const Rect& tile = partial.tile;
-    const double camera_largest = largest_magnitude(partial.camera.data(), partial.camera.size());
-    const double splat_largest = largest_splat(partial.splats);
+    const double camera_largest = loosened(bounds->camera), splat_largest = loosened(bounds->splat);
     if (camera_largest >= kRange || splat_largest >= kRange) return out_of_range();
     const size_t row_values = size_t(tile.width()) * 3;
     const auto row_of = [&](int y) { return size_t(frame_.crop.index(tile.x0, y)); };
@@ -100,13 +96,12 @@ Status GroupSum::add(const Partial& partial) {
     const double* source = partial.camera.data();
     for (int y = tile.y0; y < tile.y1; ++y, source += row_values) {
         Int128* sums = camera_.data() + row_of(y) * 3;
-        for (size_t i = 0; i < row_values; ++i) sums[i] += to_fixed(source[i]);
+        add_run(sums, source, row_values, bounds->camera);
         uint64_t* counts = camera_count_.data() + row_of(y);
         for (int x = 0; x < tile.width(); ++x) counts[x] += partial.samples_per_pixel;
     }
     for (const SplatSum& splat : partial.splats) {
-        Int128* sums = splat_.data() + size_t(splat.pixel) * 3;
-        for (size_t c = 0; c < 3; ++c) sums[c] += to_fixed(splat.rgb[c]);
+        add_run(splat_.data() + size_t(splat.pixel) * 3, splat.rgb.data(), 3, bounds->splat);
     }
     camera_bound_ += camera_largest;
     splat_bound_ += splat_largest;
