@@ -1,0 +1,1 @@
+lightloom_test(film_test LINK lt_film)
