@@ -1,0 +1,1 @@
+lightloom_test(transport_test LINK lt_transport)
