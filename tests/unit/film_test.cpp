@@ -203,6 +203,37 @@ TEST(Accumulation, FoldsOnlyCompleteGroups) {
     EXPECT_EQ(total.dropped(), 80u);
 }
 
+TEST(FixedSums, EqualPlain128BitSums) {
+    Rng rng({99});
+    FixedSums sums(3), all(3);
+    __int128 plain[3] = {};
+    for (int round = 0; round < 100000; ++round) {
+        // All magnitudes from below a step to far beyond 64 bits, both signs, so that borrows and carries occur.
+        double values[3], largest = 0;
+        const int top = int(rng.below(130)) - 50;
+        for (double& v : values) {
+            v = std::ldexp(rng.uniform_double() - 0.5, top - int(rng.below(30)));
+            largest = std::max(largest, std::fabs(v));
+        }
+        if (round % 1000 == 0) values[0] = 0.5 * 0x1p-44, values[1] = 1.5 * 0x1p-44, values[2] = -2.5 * 0x1p-44;
+        sums.add(0, values, 3, std::max(largest, 1e-12));
+        for (int i = 0; i < 3; ++i) {
+            // Rounding to nearest even by the remainder, in wide arithmetic of its own.
+            const double steps = std::ldexp(values[i], 44), whole = std::floor(steps), rest = steps - whole;
+            __int128 rounded = __int128(whole);
+            if (rest > 0.5 || (rest == 0.5 && (rounded & 1))) rounded += 1;
+            plain[i] += rounded;
+            ASSERT_TRUE(sums.steps(size_t(i)) == plain[i]) << round;
+        }
+    }
+    all.add(sums);
+    all.add(sums);
+    for (size_t i = 0; i < 3; ++i) {
+        EXPECT_TRUE(all.steps(i) == 2 * plain[i]);
+        EXPECT_EQ(all.value(i), double(2 * plain[i]) * 0x1p-44);
+    }
+}
+
 // ---------------------------------------------------------------------------------------------------- partial codec
 
 TEST(PartialExr, RoundTripsBitForBit) {
