@@ -124,7 +124,8 @@ Status Accumulation::fold(const GroupSum& group, uint32_t iterations) {
 RgbImage Accumulation::develop(float scale) const {
     RgbImage image{frame_.crop.width(), frame_.crop.height(), std::vector<float>(camera_.size())};
     for (size_t i = 0; i < camera_.size(); ++i) {
-        image.pixels[i] = float(double(scale) * pixel_value(camera_.value(i), camera_count_[i / 3], splat_.value(i), light_paths_));
+        const double value = pixel_value(camera_.value(i), camera_count_[i / 3], splat_.value(i), light_paths_);
+        image.pixels[i] = float(double(scale) * value);
     }
     return image;
 }

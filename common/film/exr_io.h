@@ -1,6 +1,6 @@
 #pragma once
-// The final image as EXR: written with fixed settings, so that the same image gives the same bytes wherever and with however
-// many threads it is written; and read back, from our own or any other scanline or tiled EXR.
+// The final image as EXR: written with fixed settings, so that the same image gives the same bytes wherever and with
+// however many threads it is written; and read back, from our own or any other scanline or tiled EXR.
 
 #include <string>
 #include <string_view>

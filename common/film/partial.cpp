@@ -52,7 +52,7 @@ Result<PartialBounds> check_partial(const Partial& partial, const FrameLayout& f
                              " is out of order or outside the crop of " + std::to_string(crop_area) + " pixels");
         }
         next = uint64_t(splat.pixel) + 1;
-        const int64_t bits = std::max({magnitude_bits(splat.rgb[0]), magnitude_bits(splat.rgb[1]), magnitude_bits(splat.rgb[2])});
+        const int64_t bits = largest_magnitude_bits(splat.rgb.data(), 3);
         if (bits >= kInfinity) {
             return data_loss("partial: the splat sum of pixel " + std::to_string(splat.pixel) +
                              " is NaN or infinite; the partial is corrupt");
