@@ -36,14 +36,18 @@ class GroupSum {
     std::vector<uint64_t> camera_count_;   // samples per pixel
     uint64_t light_paths_ = 0;
     uint64_t dropped_ = 0;
+    double camera_bound_ = 0, splat_bound_ = 0;  // No sum can be larger: sums of the partials' largest magnitudes.
 };
 
+/// The exact sums of the complete groups of one (epoch, algorithm, N1).
 class Accumulation {
   public:
     explicit Accumulation(const FrameLayout& frame);
 
     /// Folds a complete group of `iterations` iterations in. Groups are folded in ascending order of their index (the
-    /// caller holds later ones back), because the second moments are kept in double.
+    /// caller holds later ones back), because the second moments are kept in double. kFailedPrecondition, and nothing is
+    /// folded, if the group is of another frame or does not hold `iterations` camera samples in every pixel (or none in
+    /// any, for a group that only splats); kDataLoss if a sum would leave the range.
     Status fold(const GroupSum& group, uint32_t iterations);
 
     uint32_t group_count() const { return group_count_; }
@@ -64,7 +68,9 @@ class Accumulation {
     uint64_t dropped_ = 0;
     uint64_t iterations_ = 0;
     uint32_t group_count_ = 0;
-    std::vector<double> moment_;  // sum_g n_g X_g^2
+    double camera_bound_ = 0, splat_bound_ = 0;
+    std::vector<double> mean_;    // Mean of the X_g with weights n_g, 3 per pixel.
+    std::vector<double> moment_;  // sum_g n_g (X_g - mean_)^2, updated as groups come [West 1979].
 };
 
 }  // namespace lightloom

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/core/result.h"
 #include "common/film/frame.h"
 
 namespace lightloom {
@@ -47,5 +48,9 @@ struct Partial {
 
     static constexpr size_t kMaxDroppedRecords = 16;
 };
+
+/// Checks everything that a Partial promises: a tile inside the crop, one sum per pixel and channel, splats inside the crop
+/// in ascending order, no more dropped records than allowed, and only finite sums. kDataLoss names the first violation.
+Status check_partial(const Partial& partial, const FrameLayout& frame);
 
 }  // namespace lightloom

@@ -1,0 +1,60 @@
+#pragma once
+// The final image as EXR: written with fixed settings, so that the same image gives the same bytes wherever and with however
+// many threads it is written; and read back, from our own or any other scanline or tiled EXR.
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/core/result.h"
+#include "common/film/accumulation.h"
+#include "common/film/frame.h"
+
+namespace lightloom {
+
+/// A named set of 32-bit float planes that lies beside the colour: "variance", "albedo", "normal", "depth".
+struct ImageLayer {
+    std::string name;
+    std::string channels;       ///< One letter each, for example "RGB", "XYZ" or "Z"; the EXR channel is name.letter.
+    std::vector<float> pixels;  ///< channels.size() * width * height of the data window, row-major, interleaved.
+};
+
+/// Names of the attributes that our images carry, so that writers and readers agree.
+namespace exr_attribute {
+inline constexpr const char* kAlgorithm = "lightloom.algorithm";
+inline constexpr const char* kParameters = "lightloom.parameters";
+inline constexpr const char* kSeed = "lightloom.seed";
+inline constexpr const char* kSamples = "lightloom.samplesPerPixel";
+inline constexpr const char* kMaxDepth = "lightloom.maxDepth";
+inline constexpr const char* kScene = "lightloom.sceneDigest";
+}  // namespace exr_attribute
+
+struct ExrImage {
+    FrameLayout frame;  ///< Display window = full frame from (0, 0), data window = crop.
+    RgbImage color;     ///< Linear radiance, Rec.709 primaries: channels R, G, B.
+    std::vector<ImageLayer> layers;
+    std::vector<std::pair<std::string, std::string>> attributes;  ///< String attributes: name, value.
+
+    /// Value of the attribute, or empty.
+    std::string attribute(std::string_view name) const;
+    const ImageLayer* layer(std::string_view name) const;
+};
+
+/// Storage of the colour channels. Layers are always float: half has no room for a variance or a depth.
+enum class ExrPixelType { kFloat, kHalf };
+
+/// The file's bytes: scanlines, ZIP compression of fixed level. Refused with one line: a size that does not fit the frame, a
+/// NaN or infinite value, a value beyond half's 65504 where half was asked for (never clamped: that would change the
+/// mean), an attribute name that EXR uses itself.
+Result<std::string> encode_exr(const ExrImage& image, ExrPixelType type = ExrPixelType::kFloat);
+/// encode_exr to a file that appears whole or not at all.
+Status write_exr(const std::string& path, const ExrImage& image, ExrPixelType type = ExrPixelType::kFloat);
+
+/// Reads a flat scanline or tiled EXR (its first part) with channels R, G, B of half, float or uint, or with Y alone, which
+/// is repeated. Other channels become layers: the part of the name before the last dot is the layer, a channel without a
+/// dot becomes a layer of its own name. NaN and infinities are passed on. `name` is for messages.
+Result<ExrImage> decode_exr(std::string_view bytes, const std::string& name);
+Result<ExrImage> read_exr(const std::string& path);
+
+}  // namespace lightloom
