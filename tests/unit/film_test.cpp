@@ -6,8 +6,12 @@
 #include <ImfIO.h>
 #include <ImfInputPart.h>
 #include <ImfMultiPartInputFile.h>
+#include <ImfOutputFile.h>
 #include <ImfThreading.h>
+#include <ImfTiledOutputFile.h>
 #include <gtest/gtest.h>
+#include <half.h>
+#include <png.h>
 
 #include <algorithm>
 #include <bit>
@@ -199,6 +203,37 @@ TEST(Accumulation, FoldsOnlyCompleteGroups) {
     EXPECT_EQ(total.dropped(), 80u);
 }
 
+TEST(FixedSums, EqualPlain128BitSums) {
+    Rng rng({99});
+    FixedSums sums(3), all(3);
+    __int128 plain[3] = {};
+    for (int round = 0; round < 100000; ++round) {
+        // All magnitudes from below a step to far beyond 64 bits, both signs, so that borrows and carries occur.
+        double values[3], largest = 0;
+        const int top = int(rng.below(130)) - 50;
+        for (double& v : values) {
+            v = std::ldexp(rng.uniform_double() - 0.5, top - int(rng.below(30)));
+            largest = std::max(largest, std::fabs(v));
+        }
+        if (round % 1000 == 0) values[0] = 0.5 * 0x1p-44, values[1] = 1.5 * 0x1p-44, values[2] = -2.5 * 0x1p-44;
+        sums.add(0, values, 3, std::max(largest, 1e-12));
+        for (int i = 0; i < 3; ++i) {
+            // Rounding to nearest even by the remainder, in wide arithmetic of its own.
+            const double steps = std::ldexp(values[i], 44), whole = std::floor(steps), rest = steps - whole;
+            __int128 rounded = __int128(whole);
+            if (rest > 0.5 || (rest == 0.5 && (rounded & 1))) rounded += 1;
+            plain[i] += rounded;
+            ASSERT_TRUE(sums.steps(size_t(i)) == plain[i]) << round;
+        }
+    }
+    all.add(sums);
+    all.add(sums);
+    for (size_t i = 0; i < 3; ++i) {
+        EXPECT_TRUE(all.steps(i) == 2 * plain[i]);
+        EXPECT_EQ(all.value(i), double(2 * plain[i]) * 0x1p-44);
+    }
+}
+
 // ---------------------------------------------------------------------------------------------------- partial codec
 
 TEST(PartialExr, RoundTripsBitForBit) {
@@ -316,7 +351,8 @@ TEST(PartialExr, RefusesEveryFlippedByte) {
 
 TEST(PartialExr, NeverCrashesOnRandomMutations) {
     const FrameLayout frame{9, 7, {1, 1, 8, 6}};
-    Rng rng({42});
+    // Another seed with --gtest_shuffle, for longer runs with --gtest_repeat.
+    Rng rng({42 + uint64_t(testing::UnitTest::GetInstance()->random_seed())});
     for (const uint32_t splats : {0u, 5u, 35u}) {
         const Partial p = random_partial(frame, {2, 1, 6, 5}, 3, splats);
         const EncodedPartial encoded = *encode_partial(p, frame);
@@ -426,6 +462,51 @@ TEST(Exr, HalfRefusesOverflow) {
     EXPECT_FALSE(encode_exr(image).ok());
 }
 
+TEST(Exr, ReadsForeignFiles) {
+    namespace fs = std::filesystem;
+    const fs::path folder = fs::path(testing::TempDir()) / "lightloom-film-foreign";
+    fs::create_directories(folder);
+    const int width = 50, height = 37;
+    const std::string tiled = (folder / "tiled.exr").string(), grey = (folder / "grey.exr").string();
+    std::vector<half> rgb(size_t(width) * height * 3);
+    for (size_t i = 0; i < rgb.size(); ++i) rgb[i] = half(float(i % 777) / 16);
+    {
+        Imf::Header header(width, height);
+        header.setTileDescription(Imf::TileDescription(16, 16, Imf::ONE_LEVEL));
+        Imf::FrameBuffer buffer;
+        for (const auto& [name, c] : {std::pair<const char*, size_t>{"R", 0}, {"G", 1}, {"B", 2}}) {
+            header.channels().insert(name, Imf::Channel(Imf::HALF));
+            buffer.insert(name, Imf::Slice(Imf::HALF, reinterpret_cast<char*>(rgb.data() + c), 6, 6 * width));
+        }
+        Imf::TiledOutputFile file(tiled.c_str(), header);
+        file.setFrameBuffer(buffer);
+        file.writeTiles(0, file.numXTiles() - 1, 0, file.numYTiles() - 1);
+    }
+    const Result<ExrImage> image = read_exr(tiled);
+    ASSERT_TRUE(image.ok()) << image.status().message();
+    for (size_t i = 0; i < rgb.size(); ++i) ASSERT_EQ(image->color.pixels[i], float(rgb[i]));
+    {
+        // A display window that does not begin at zero: coordinates are relative to its corner.
+        Imf::Header header(Imath::Box2i({-10, 5}, {89, 104}), Imath::Box2i({0, 15}, {width - 1, 15 + height - 1}));
+        header.channels().insert("Y", Imf::Channel(Imf::HALF));
+        Imf::FrameBuffer buffer;
+        buffer.insert("Y", Imf::Slice(Imf::HALF, reinterpret_cast<char*>(rgb.data() - 15 * width), 2, 2 * width));
+        Imf::OutputFile file(grey.c_str(), header);
+        file.setFrameBuffer(buffer);
+        file.writePixels(height);
+    }
+    const Result<ExrImage> luminance = read_exr(grey);
+    ASSERT_TRUE(luminance.ok()) << luminance.status().message();
+    EXPECT_EQ(luminance->frame, (FrameLayout{100, 100, {10, 10, 10 + width, 10 + height}}));
+    for (size_t i = 0; i < size_t(width) * height * 3; ++i) ASSERT_EQ(luminance->color.pixels[i], float(rgb[i / 3]));
+
+    // A partial is a fine EXR, but not a picture.
+    const EncodedPartial partial = *encode_partial(random_partial(kFrame, kFrame.crop, 1, 5), kFrame);
+    const Status status = decode_exr(partial.payload, "partial.exr").status();
+    EXPECT_EQ(status.message(), "partial.exr: the EXR file has neither channels R, G and B nor Y");
+    fs::remove_all(folder);
+}
+
 TEST(Exr, RefusesBadInput) {
     ExrImage image = random_image(4);
     image.attributes = {{"dataWindow", "x"}};
@@ -456,6 +537,23 @@ TEST(Exr, FilesAppearWholeOrNotAtAll) {
     EXPECT_EQ(read_exr((folder / "b.exr").string()).status().code(), StatusCode::kNotFound);
     EXPECT_FALSE(read_exr(folder.string()).ok());
     fs::remove_all(folder);
+}
+
+TEST(Png, HoldsTheExposedImage) {
+    RgbImage image{3, 2, std::vector<float>(18, 0.25f)};
+    image.pixels[1] = 100;
+    const std::string bytes = *encode_png(image, 1);
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    ASSERT_TRUE(png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()));
+    EXPECT_EQ(png.width, 3u);
+    EXPECT_EQ(png.height, 2u);
+    png.format = PNG_FORMAT_RGB;
+    std::vector<uint8_t> codes(18);
+    ASSERT_TRUE(png_image_finish_read(&png, nullptr, codes.data(), 0, nullptr));
+    for (size_t i = 0; i < codes.size(); ++i) EXPECT_EQ(codes[i], i == 1 ? 255 : 188);
+    EXPECT_FALSE(encode_png(image, kNan).ok());
+    EXPECT_FALSE(encode_png(RgbImage{}).ok());
 }
 
 TEST(Png, SrgbCodes) {
