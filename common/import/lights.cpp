@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "common/core/math.h"
-#include "common/core/octahedral.h"
 #include "common/import/context.h"
 #include "common/import/tessellate.h"
+#include "common/scene/sampling.h"
 
 namespace lightloom::import {
 namespace {
@@ -109,7 +109,7 @@ double illuminance_of(const Image& image) {
     double sum = 0;
     for (int y = 0; y < image.height; ++y)
         for (int x = 0; x < image.width; ++x) {
-            const Vec3 w = octahedral_direction((x + 0.5) / image.width, (y + 0.5) / image.height);
+            const Vec3 w = equal_area_square_to_sphere({(float(x) + 0.5f) / float(image.width), (float(y) + 0.5f) / float(image.height)});
             if (w.z > 0) sum += double(image.texel(x, y).luminance()) * w.z;
         }
     return sum * 4 * kPiD / (double(image.width) * image.height);
