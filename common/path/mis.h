@@ -69,7 +69,8 @@ struct RatioSum {
 
 }  // namespace detail
 
-/// w of technique `own` for the path in `view`, in [0, 1]. `own` must be able to produce the path.
+/// w of technique `own` for the path in `view`, in [0, 1]; zero when the selection has switched it off. `own` must be able to
+/// produce the path.
 template <class Selection>
 double mis_weight(const PathView& view, Technique own, const Selection& selection, Heuristic heuristic = Heuristic::kBalance) {
     const int k = view.k, s_min = selection.s_min(k), s_max = selection.s_max(k);
@@ -86,6 +87,7 @@ double mis_weight(const PathView& view, Technique own, const Selection& selectio
     if constexpr (Selection::kMerges) {
         if (own.kind == TechniqueKind::kMerge) own_factor = selection.merge_factor(view, base) * view.fwd[base];
     }
+    if (!(own_factor > 0)) return 0;
     const double inv_own = 1 / own_factor;
     detail::RatioSum ratios{heuristic};
     const auto merge = [&](int i, const WideProduct& chain, bool earlier) {

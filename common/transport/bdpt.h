@@ -28,8 +28,10 @@ struct BdptSelection {
     }
 };
 
+/// A selection with fewer techniques than BdptSelection (connect_factor 0) makes an algorithm of the techniques that remain.
+template <class Selection = BdptSelection>
 struct BdptAlgorithm {
-    BdptSelection selection;
+    Selection selection;
     Heuristic heuristic = Heuristic::kBalance;
 
     Rgb sample(SampleContext& context) const {

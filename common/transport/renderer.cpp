@@ -46,7 +46,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(std::shared_ptr<const Scene> 
     };
     if (settings.algorithm == "path") return make(PathAlgorithm{Heuristic(int(value("heuristic")))});
     if (settings.algorithm == "light") return make(LightAlgorithm{});
-    BdptAlgorithm bdpt;
+    BdptAlgorithm<> bdpt;
     bdpt.heuristic = Heuristic(int(value("heuristic")));
     bdpt.selection.light_paths_per_iteration = double(scene->frame().crop.area());
     return make(bdpt);

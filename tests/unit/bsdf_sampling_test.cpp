@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/unit/bsdf_cases.h"
-#include "tests/unit/chi_square.h"
+#include "tests/support/statistics.h"
 
 namespace lightloom::testing {
 namespace {

@@ -9,13 +9,12 @@
 #include "common/transport/light.h"
 #include "common/transport/path.h"
 #include "tests/support/path_generator.h"
-#include "tests/support/small_scenes.h"
+#include "tests/support/test_scenes.h"
 
 namespace lightloom {
 namespace {
 
 using testing::FullPath;
-using testing::SceneBuilder;
 
 /// Vertex merging with a fixed radius on top of classic connections [Georgiev et al. 2012]: a stub that shows that the
 /// evaluator needs no change for merges.
@@ -63,110 +62,7 @@ double weight_sum(const Scene& scene, const FullPath& path, const Selection& sel
     return sum;
 }
 
-struct NamedScene {
-    const char* name;
-    std::shared_ptr<const Scene> (*make)();
-};
-
-std::shared_ptr<const Scene> diffuse_box() { return testing::cornell_builder().build(); }
-
-std::shared_ptr<const Scene> glass_and_mirror() {
-    SceneBuilder b = testing::cornell_builder();
-    Material glass;
-    glass.kind = MaterialKind::kDielectric;
-    glass.ior = 1.5f;
-    Material mirror;
-    mirror.kind = MaterialKind::kConductor;
-    mirror.reflectance = b.constant({0.9f, 0.8f, 0.7f});
-    b.sphere({-0.4f, 0.35f, 0}, 0.35f, b.add(glass));
-    b.quad({-0.9f, 0.3f, 0.95f}, {0, 1, 0}, {1.4f, 0, 0}, b.add(mirror));
-    return b.build();
-}
-
-std::shared_ptr<const Scene> rough_and_coated() {
-    SceneBuilder b = testing::cornell_builder();
-    const TextureId rough = b.constant(Rgb(0.3f)), fine = b.constant(Rgb(0.05f));
-    Material coat;
-    coat.kind = MaterialKind::kCoatedDiffuse;
-    coat.reflectance = b.constant({0.5f, 0.4f, 0.3f});
-    coat.roughness_u = coat.roughness_v = rough;
-    coat.remap_roughness = false;
-    Material smooth_coat = coat;
-    smooth_coat.roughness_u = smooth_coat.roughness_v = b.constant(Rgb(0.0f));
-    Material metal;
-    metal.kind = MaterialKind::kConductor;
-    metal.reflectance = b.constant({0.9f, 0.8f, 0.7f});
-    metal.roughness_u = metal.roughness_v = fine;
-    Material frosted;
-    frosted.kind = MaterialKind::kDielectric;
-    frosted.ior = 1.5f;
-    frosted.roughness_u = frosted.roughness_v = rough;
-    frosted.remap_roughness = false;
-    b.sphere({-0.4f, 0.35f, 0}, 0.35f, b.add(metal));
-    b.sphere({-0.2f, 1.3f, 0.3f}, 0.3f, b.add(frosted));
-    b.description().meshes[0].attributes.material = b.add(coat);
-    b.description().meshes[5].attributes.material = b.add(smooth_coat);
-    return b.build();
-}
-
-std::shared_ptr<const Scene> delta_lights() {
-    SceneBuilder b = testing::cornell_builder();
-    b.description().meshes.erase(b.description().meshes.begin() + 1);  // open the ceiling to the distant light
-    b.description().point_lights.push_back({{0.5f, 1.5f, -0.5f}, {1, 2, 3}});
-    SpotLight spot;
-    spot.position = {-0.5f, 1.8f, 0};
-    spot.axes = Frame(normalize(Vec3{0.3f, -1, 0.2f}));
-    spot.intensity = {5, 4, 3};
-    spot.cos_total = 0.7f, spot.cos_falloff = 0.9f;
-    b.description().spot_lights.push_back(spot);
-    b.description().distant_lights.push_back({normalize(Vec3{0.2f, -1, 0.1f}), {2, 2, 2}});
-    return b.build();
-}
-
-std::shared_ptr<const Scene> environment_lit() {
-    SceneBuilder b;
-    const MaterialId white = b.diffuse(Rgb(0.6f));
-    b.quad({-2, 0, -2}, {0, 0, 4}, {4, 0, 0}, white);
-    b.sphere({0, 0.5f, 0}, 0.5f, white);
-    Image map;
-    map.width = map.height = 8;
-    for (int i = 0; i < 64; ++i) map.floats.insert(map.floats.end(), {0.1f * float(i % 7), 0.3f, float(i == 20) * 30});
-    b.description().images.push_back(map);
-    InfiniteLight image_light, constant_light;
-    image_light.image = 0;
-    image_light.light_to_world = rotation(40, 1, 1, 0);
-    constant_light.radiance = {0.2f, 0.3f, 0.1f};
-    b.description().infinite_lights = {image_light, constant_light};
-    b.quad({-1, 1.5f, 0}, {0.5f, 0, 0}, {0, 0, 0.5f}, white, b.emission({4, 4, 4}, true));
-    b.look({0, 1.5f, -3}, {0, 0.4f, 0}, 50);
-    return b.build();
-}
-
-std::shared_ptr<const Scene> smooth_normals_and_lens() {
-    SceneBuilder b = testing::cornell_builder();
-    // A coarse pyramid with normals far from the geometric ones, one side of it emitting.
-    TriangleMesh mesh;
-    mesh.positions = {{-0.3f, 0.01f, -0.3f}, {0.3f, 0.01f, -0.3f}, {0.3f, 0.01f, 0.3f}, {-0.3f, 0.01f, 0.3f}, {0, 0.6f, 0}};
-    for (const Vec3& p : mesh.positions) mesh.normals.push_back(normalize(p - Vec3{0, -0.1f, 0}));
-    mesh.indices = {1, 0, 4, 2, 1, 4, 3, 2, 4, 0, 3, 4};
-    mesh.attributes = {b.diffuse({0.4f, 0.6f, 0.8f}), kNone, kNone, false, "pyramid"};
-    TriangleMesh lamp = mesh;
-    for (Vec3& p : lamp.positions) p = p * 0.4f + Vec3{0.5f, 1.2f, -0.2f};
-    lamp.attributes.emission = b.emission({6, 5, 4});
-    b.description().meshes.push_back(mesh);
-    b.description().meshes.push_back(lamp);
-    b.sphere({-0.6f, 0.2f, 0.4f}, 0.2f, b.diffuse({0.3f, 0.3f, 0.3f}), b.emission({2, 2, 3}));
-    b.description().camera.lens_radius = 0.03f;
-    b.description().camera.focal_distance = 1.2f;
-    return b.build();
-}
-
-constexpr NamedScene kScenes[] = {
-    {"diffuse_box", diffuse_box},         {"glass_and_mirror", glass_and_mirror}, {"rough_and_coated", rough_and_coated},
-    {"delta_lights", delta_lights},       {"environment_lit", environment_lit},   {"smooth_normals_and_lens", smooth_normals_and_lens},
-};
-
-class Weights : public ::testing::TestWithParam<NamedScene> {};
+class Weights : public ::testing::TestWithParam<testing::NamedScene> {};
 
 /// Weights come from float densities, recomputed along directions that differ in the last bits; grazing events and
 /// refraction near the critical angle amplify that. 1e-4 must hold for nearly all paths, one per cent for all but those.
@@ -240,8 +136,8 @@ TEST_P(Weights, EveryTechniqueSeesTheSamePath) {
     contributions.check("path integrand");
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, Weights, ::testing::ValuesIn(kScenes),
-                         [](const ::testing::TestParamInfo<NamedScene>& param) { return param.param.name; });
+INSTANTIATE_TEST_SUITE_P(Scenes, Weights, ::testing::ValuesIn(testing::kScenes),
+                         [](const ::testing::TestParamInfo<testing::NamedScene>& param) { return param.param.name; });
 
 // Synthetic views: no geometry, exact double densities.
 

@@ -1,0 +1,63 @@
+// `path`, `light` and `bdpt` agree on every scene, for every path length and in every region. An image of max_depth d has
+// all paths of up to d + 1 edges, and the same seed makes the same shorter ones, so the difference of two depths is the
+// image of one length.
+
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "tests/support/estimates.h"
+#include "tests/support/test_scenes.h"
+
+namespace lightloom {
+namespace {
+
+using testing::RegionMeans;
+
+constexpr int kSeeds = 32, kMaxLength = 6;
+constexpr uint32_t kSamplesPerPixel = 8;
+
+/// Estimates of the lengths 1 .. kMaxLength, from independent seeds.
+std::vector<RegionMeans> lengths_of(const std::shared_ptr<const Scene>& scene, const std::string& algorithm, uint64_t first_seed) {
+    std::vector<RegionMeans> lengths(kMaxLength);
+    const Rect& crop = scene->frame().crop;
+    for (int i = 0; i < kSeeds; ++i) {
+        std::vector<double> shorter(size_t(crop.area()), 0);
+        for (int k = 1; k <= kMaxLength; ++k) {
+            const std::vector<double> all =
+                testing::catalog_image(scene, algorithm, k - 1, kSamplesPerPixel)(first_seed + uint64_t(i));
+            std::vector<double> length(all.size());
+            for (size_t p = 0; p < all.size(); ++p) length[p] = all[p] - shorter[p];
+            lengths[size_t(k - 1)].add(length, crop);
+            shorter = all;
+        }
+    }
+    return lengths;
+}
+
+/// One family over all scenes, pairs of algorithms, lengths and regions.
+TEST(Agreement, EveryLengthHasTheSameMeanInEveryAlgorithm) {
+    testing::TestFamily family;
+    for (const testing::NamedScene& named : testing::kScenes) {
+        const auto scene = named.make();
+        std::vector<std::string> algorithms;
+        std::istringstream list(named.complete);
+        for (std::string name; list >> name;) algorithms.push_back(name);
+        std::vector<std::vector<RegionMeans>> estimates;
+        for (size_t a = 0; a < algorithms.size(); ++a) estimates.push_back(lengths_of(scene, algorithms[a], 1000 * (a + 1)));
+        for (size_t a = 0; a < algorithms.size(); ++a)
+            for (size_t b = a + 1; b < algorithms.size(); ++b)
+                for (size_t k = 1; k <= kMaxLength; ++k) {
+                    const std::string what = std::string(named.name) + ", " + algorithms[a] + " and " + algorithms[b] +
+                                             ", k = " + std::to_string(k);
+                    testing::compare(estimates[a][k - 1], estimates[b][k - 1], what, &family);
+                }
+        // The tests above mean something only where the estimates are precise.
+        EXPECT_LT(estimates.back()[1].frame().relative_error(), 0.02) << named.name;
+    }
+    EXPECT_GT(family.size(), 1000);
+    family.check();
+}
+
+}  // namespace
+}  // namespace lightloom

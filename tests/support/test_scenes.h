@@ -1,0 +1,200 @@
+#pragma once
+// The small scenes that the tests of light transport share, each built to exercise one part of it, and which algorithms can
+// sample every path of it (the others are left out by construction, never by tolerance).
+
+#include "tests/support/small_scenes.h"
+
+namespace lightloom::testing {
+
+inline std::shared_ptr<const Scene> diffuse_box() { return cornell_builder().build(); }
+
+inline std::shared_ptr<const Scene> glass_and_mirror() {
+    SceneBuilder b = cornell_builder();
+    Material glass;
+    glass.kind = MaterialKind::kDielectric;
+    glass.ior = 1.5f;
+    Material mirror;
+    mirror.kind = MaterialKind::kConductor;
+    mirror.reflectance = b.constant({0.9f, 0.8f, 0.7f});
+    b.sphere({-0.4f, 0.35f, 0}, 0.35f, b.add(glass));
+    b.quad({-0.9f, 0.3f, 0.95f}, {0, 1, 0}, {1.4f, 0, 0}, b.add(mirror));
+    return b.build();
+}
+
+inline std::shared_ptr<const Scene> rough_and_coated() {
+    SceneBuilder b = cornell_builder();
+    const TextureId rough = b.constant(Rgb(0.3f)), fine = b.constant(Rgb(0.05f));
+    Material coat;
+    coat.kind = MaterialKind::kCoatedDiffuse;
+    coat.reflectance = b.constant({0.5f, 0.4f, 0.3f});
+    coat.roughness_u = coat.roughness_v = rough;
+    coat.remap_roughness = false;
+    Material smooth_coat = coat;
+    smooth_coat.roughness_u = smooth_coat.roughness_v = b.constant(Rgb(0.0f));
+    Material metal;
+    metal.kind = MaterialKind::kConductor;
+    metal.reflectance = b.constant({0.9f, 0.8f, 0.7f});
+    metal.roughness_u = metal.roughness_v = fine;
+    Material frosted;
+    frosted.kind = MaterialKind::kDielectric;
+    frosted.ior = 1.5f;
+    frosted.roughness_u = frosted.roughness_v = rough;
+    frosted.remap_roughness = false;
+    b.sphere({-0.4f, 0.35f, 0}, 0.35f, b.add(metal));
+    b.sphere({-0.2f, 1.3f, 0.3f}, 0.3f, b.add(frosted));
+    b.description().meshes[0].attributes.material = b.add(coat);
+    b.description().meshes[5].attributes.material = b.add(smooth_coat);
+    return b.build();
+}
+
+inline std::shared_ptr<const Scene> delta_lights() {
+    SceneBuilder b = cornell_builder();
+    b.description().meshes.erase(b.description().meshes.begin() + 1);  // open the ceiling to the distant light
+    b.description().point_lights.push_back({{0.5f, 1.5f, -0.5f}, {1, 2, 3}});
+    SpotLight spot;
+    spot.position = {-0.5f, 1.8f, 0};
+    spot.axes = Frame(normalize(Vec3{0.3f, -1, 0.2f}));
+    spot.intensity = {5, 4, 3};
+    spot.cos_total = 0.7f, spot.cos_falloff = 0.9f;
+    b.description().spot_lights.push_back(spot);
+    b.description().distant_lights.push_back({normalize(Vec3{0.2f, -1, 0.1f}), {2, 2, 2}});
+    return b.build();
+}
+
+inline std::shared_ptr<const Scene> environment_lit() {
+    SceneBuilder b;
+    const MaterialId white = b.diffuse(Rgb(0.6f));
+    b.quad({-2, 0, -2}, {0, 0, 4}, {4, 0, 0}, white);
+    b.sphere({0, 0.5f, 0}, 0.5f, white);
+    Image map;
+    map.width = map.height = 8;
+    for (int i = 0; i < 64; ++i) map.floats.insert(map.floats.end(), {0.1f * float(i % 7), 0.3f, float(i == 20) * 30});
+    b.description().images.push_back(map);
+    InfiniteLight image_light, constant_light;
+    image_light.image = 0;
+    image_light.light_to_world = rotation(40, 1, 1, 0);
+    constant_light.radiance = {0.2f, 0.3f, 0.1f};
+    b.description().infinite_lights = {image_light, constant_light};
+    b.quad({-1, 1.5f, 0}, {0.5f, 0, 0}, {0, 0, 0.5f}, white, b.emission({4, 4, 4}, true));
+    b.look({0, 1.5f, -3}, {0, 0.4f, 0}, 50);
+    return b.build();
+}
+
+inline std::shared_ptr<const Scene> smooth_normals_and_lens() {
+    SceneBuilder b = cornell_builder();
+    // A coarse pyramid with normals far from the geometric ones, one side of it emitting.
+    TriangleMesh mesh;
+    mesh.positions = {{-0.3f, 0.01f, -0.3f}, {0.3f, 0.01f, -0.3f}, {0.3f, 0.01f, 0.3f}, {-0.3f, 0.01f, 0.3f}, {0, 0.6f, 0}};
+    for (const Vec3& p : mesh.positions) mesh.normals.push_back(normalize(p - Vec3{0, -0.1f, 0}));
+    mesh.indices = {1, 0, 4, 2, 1, 4, 3, 2, 4, 0, 3, 4};
+    mesh.attributes = {b.diffuse({0.4f, 0.6f, 0.8f}), kNone, kNone, false, "pyramid"};
+    TriangleMesh lamp = mesh;
+    for (Vec3& p : lamp.positions) p = p * 0.4f + Vec3{0.5f, 1.2f, -0.2f};
+    lamp.attributes.emission = b.emission({6, 5, 4});
+    b.description().meshes.push_back(mesh);
+    b.description().meshes.push_back(lamp);
+    b.sphere({-0.6f, 0.2f, 0.4f}, 0.2f, b.diffuse({0.3f, 0.3f, 0.3f}), b.emission({2, 2, 3}));
+    b.description().camera.lens_radius = 0.03f;
+    b.description().camera.focal_distance = 1.2f;
+    return b.build();
+}
+
+/// No Dirac lobe anywhere: every algorithm samples every path.
+inline std::shared_ptr<const Scene> glossy() {
+    SceneBuilder b = cornell_builder();
+    const TextureId rough = b.constant(Rgb(0.3f));
+    Material coat;
+    coat.kind = MaterialKind::kCoatedDiffuse;
+    coat.reflectance = b.constant({0.5f, 0.4f, 0.3f});
+    coat.roughness_u = coat.roughness_v = rough;
+    coat.remap_roughness = false;
+    Material metal;
+    metal.kind = MaterialKind::kConductor;
+    metal.reflectance = b.constant({0.9f, 0.8f, 0.7f});
+    metal.roughness_u = b.constant(Rgb(0.2f));
+    metal.roughness_v = b.constant(Rgb(0.4f));
+    metal.remap_roughness = false;
+    Material frosted;
+    frosted.kind = MaterialKind::kDielectric;
+    frosted.ior = 1.5f;
+    frosted.roughness_u = frosted.roughness_v = rough;
+    frosted.remap_roughness = false;
+    b.sphere({-0.4f, 0.35f, 0}, 0.35f, b.add(metal));
+    b.sphere({-0.2f, 1.3f, 0.3f}, 0.3f, b.add(frosted));
+    b.description().meshes[0].attributes.material = b.add(coat);
+    return b.build();
+}
+
+/// Textures, a lamp that shines to both sides, and sheets that scatter to both sides.
+inline std::shared_ptr<const Scene> textured_and_two_sided() {
+    SceneBuilder b = cornell_builder();
+    TextureNode checks;
+    checks.kind = TextureKind::kCheckerboard;
+    checks.a = b.constant({0.8f, 0.7f, 0.2f}), checks.b = b.constant({0.1f, 0.2f, 0.6f});
+    checks.su = checks.sv = 6;
+    b.description().textures.push_back(checks);
+    Material tiles;
+    tiles.reflectance = TextureId(b.description().textures.size()) - 1;
+    b.description().meshes[0].attributes.material = b.add(tiles);
+    Material paper;
+    paper.kind = MaterialKind::kDiffuseTransmission;
+    paper.reflectance = b.constant({0.3f, 0.4f, 0.3f}), paper.transmittance = b.constant({0.5f, 0.3f, 0.4f});
+    const MaterialId sheet = b.add(paper);
+    b.quad({-0.9f, 0.9f, -0.2f}, {0.7f, 0.3f, 0}, {0, 0, 0.8f}, sheet);
+    b.quad({-0.2f, 1.1f, 0.2f}, {0.5f, 0, 0.1f}, {0.1f, 0.4f, 0}, sheet, b.emission({3, 2, 4}, true));
+    return b.build();
+}
+
+/// Spheres as lights: one seen from outside (next event by its cone), and the room itself, a sphere that shines inwards.
+inline std::shared_ptr<const Scene> spherical_lights() {
+    SceneBuilder b;
+    const MaterialId white = b.diffuse(Rgb(0.6f));
+    b.sphere({0, 1, 0}, 3, white, b.emission({0.2f, 0.3f, 0.4f})).attributes.flip_normal = true;
+    b.sphere({-0.6f, 0.7f, 0.2f}, 0.25f, b.diffuse({0.5f, 0.2f, 0.2f}), b.emission({9, 8, 6}));
+    b.quad({-1.5f, 0, -1.5f}, {0, 0, 3}, {3, 0, 0}, white);
+    b.sphere({0.4f, 0.4f, 0.3f}, 0.4f, white);
+    b.look({0, 1.2f, -2}, {0, 0.6f, 0}, 60);
+    return b.build();
+}
+
+/// A caustic: a point light behind a glass ball and beside a mirror, neither of them seen by the camera. Next event and
+/// hits never find it, light sub-paths do.
+inline std::shared_ptr<const Scene> caustic_of_a_point_light() {
+    SceneBuilder b;
+    const MaterialId white = b.diffuse(Rgb(0.7f));
+    Material glass;
+    glass.kind = MaterialKind::kDielectric;
+    glass.ior = 1.5f;
+    Material mirror;
+    mirror.kind = MaterialKind::kConductor;
+    mirror.reflectance = b.constant({0.9f, 0.8f, 0.7f});
+    b.quad({-1, 0, -1}, {0, 0, 2}, {2, 0, 0}, white);
+    b.quad({-1, 0, 1}, {0, 1, 0}, {2, 0, 0}, white);
+    b.sphere({0.2f, 2.2f, 0}, 0.4f, b.add(glass));
+    b.quad({-1, 2, -1}, {0, 1.5f, 0}, {0, 0, 2}, b.add(mirror));
+    b.description().point_lights.push_back({{0.2f, 3.2f, 0}, {8, 8, 8}});
+    b.look({0, 1.2f, -1.6f}, {0, 0.3f, 0.4f}, 55);
+    return b.build();
+}
+
+struct NamedScene {
+    const char* name;
+    std::shared_ptr<const Scene> (*make)();
+    /// The algorithms that sample every path of the scene, space-separated.
+    const char* complete;
+};
+
+inline constexpr NamedScene kScenes[] = {
+    {"diffuse_box", diffuse_box, "path light bdpt"},
+    {"glossy", glossy, "path light bdpt"},
+    {"textured_and_two_sided", textured_and_two_sided, "path light bdpt"},
+    {"smooth_normals_and_lens", smooth_normals_and_lens, "path light bdpt"},
+    {"spherical_lights", spherical_lights, "path light bdpt"},
+    {"environment_lit", environment_lit, "path light bdpt"},
+    {"delta_lights", delta_lights, "path light bdpt"},
+    {"glass_and_mirror", glass_and_mirror, "path bdpt"},           // light: what is seen through glass is missing
+    {"rough_and_coated", rough_and_coated, "path bdpt"},           // light: and what a smooth coat reflects
+    {"caustic_of_a_point_light", caustic_of_a_point_light, "light bdpt"},  // path: the caustic is missing
+};
+
+}  // namespace lightloom::testing
