@@ -5,16 +5,18 @@
 #include <map>
 
 #include "common/transport/bdpt.h"
+#include "common/transport/light.h"
+#include "common/transport/path.h"
 #include "common/transport/renderer.h"
 #include "common/transport/unit_loop.h"
 #include "tests/support/statistics.h"
 
 namespace lightloom::testing {
 
-/// One number per pixel of the crop: the scalar value of the image that one unit alone would make.
+/// One number per pixel of the crop, the mean of the channels: the image that one unit alone would make.
 inline std::vector<double> develop(const Partial& partial, const Rect& crop) {
     std::vector<double> image(size_t(crop.area()), 0.0);
-    const auto scalar = [](const double* v) { return double(scalar_of(Rgb{float(v[0]), float(v[1]), float(v[2])})); };
+    const auto scalar = [](const double* v) { return (v[0] + v[1] + v[2]) / 3; };
     for (int64_t i = 0; i < partial.tile.area(); ++i) {
         const int x = partial.tile.x0 + int(i % partial.tile.width()), y = partial.tile.y0 + int(i / partial.tile.width());
         image[size_t(crop.index(x, y))] += scalar(&partial.camera[size_t(3 * i)]) / partial.samples_per_pixel;

@@ -1,2 +1,10 @@
+lightloom_test(sampling_test LINK lt_scene)
+lightloom_test(camera_test LINK lt_scene)
+lightloom_test(emitter_test LINK lt_scene)
 lightloom_test(weights_test LINK lt_transport)
 lightloom_test(transport_test LINK lt_transport)
+lightloom_test(allocation_test LINK lt_transport)
+
+add_test(NAME light_math_symbols
+         COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/light_math_symbols.sh $<TARGET_FILE:lt_core> $<TARGET_FILE:lt_scene_base>
+                 $<TARGET_FILE:lt_scene> $<TARGET_FILE:lt_import> $<TARGET_FILE:lt_transport>)

@@ -1,32 +1,253 @@
+// The production loop around the algorithms: the same bytes however a unit is run, samples that belong to pixels and not to
+// tiles, and non-finite samples that are dropped, counted and recorded.
+
 #include <gtest/gtest.h>
-#include <chrono>
-#include <cstdio>
-#include "common/transport/renderer.h"
-#include "tests/support/small_scenes.h"
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <cstring>
+#include <limits>
+
+#include "tests/support/estimates.h"
+#include "tests/support/test_scenes.h"
 
 namespace lightloom {
 namespace {
 
-TEST(Quick, MeansAgree) {
-    auto b = testing::cornell_builder(64);
-    b.description().max_depth = 5;
-    auto scene = b.build();
-    for (const char* algorithm : {"path", "light", "bdpt"}) {
-        RenderSettings settings;
-        settings.algorithm = algorithm;
-        settings.max_depth = 5;
-        auto r = Renderer::create(scene, settings);
-        ASSERT_TRUE(r.ok());
-        const int n = 64;
-        const auto t0 = std::chrono::steady_clock::now();
-        auto p = (*r)->render({0, uint32_t(n), 0, {0, 0, 64, 64}, 0, uint64_t(n) * 4096}, {});
-        const double dt = std::chrono::duration<double>(std::chrono::steady_clock::now() - t0).count();
-        ASSERT_TRUE(p.ok());
-        double sum[3] = {};
-        for (size_t i = 0; i < p->camera.size(); ++i) sum[i % 3] += p->camera[i] / n / 4096;
-        for (const auto& s : p->splats) for (int c = 0; c < 3; ++c) sum[c] += s.rgb[c] / p->light_paths / 4096;
-        std::printf("%s %.5f %.5f %.5f  %.0f samples/s %.2f Mrays/s dropped %lu\n", algorithm, sum[0], sum[1], sum[2], n * 4096 / dt, p->counters.rays/dt*1e-6, p->dropped_count);
+using testing::SceneBuilder;
+using testing::whole_frame;
+
+const char* const kAlgorithms[] = {"path", "light", "bdpt"};
+
+Partial render(const std::shared_ptr<const Scene>& scene, const std::string& algorithm, const UnitWork& work, uint64_t seed = 5) {
+    RenderSettings settings{algorithm, {}, seed, 5};
+    Result<std::unique_ptr<Renderer>> renderer = Renderer::create(scene, settings);
+    if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
+    Result<Partial> partial = (*renderer)->render(work, {});
+    if (!partial.ok()) throw std::runtime_error(partial.status().message());
+    return std::move(partial).value();
+}
+
+/// Bit for bit, counters included.
+void expect_identical(const Partial& a, const Partial& b, const std::string& what) {
+    ASSERT_EQ(a.camera.size(), b.camera.size()) << what;
+    EXPECT_EQ(std::memcmp(a.camera.data(), b.camera.data(), a.camera.size() * sizeof(double)), 0) << what;
+    ASSERT_EQ(a.splats.size(), b.splats.size()) << what;
+    for (size_t i = 0; i < a.splats.size(); ++i) {
+        EXPECT_EQ(a.splats[i].pixel, b.splats[i].pixel) << what;
+        EXPECT_EQ(std::memcmp(a.splats[i].rgb.data(), b.splats[i].rgb.data(), sizeof(a.splats[i].rgb)), 0) << what;
     }
+    EXPECT_EQ(a.counters.rays, b.counters.rays) << what;
+    EXPECT_EQ(a.counters.vertices, b.counters.vertices) << what;
+    EXPECT_EQ(a.counters.connections, b.counters.connections) << what;
+    EXPECT_EQ(a.dropped, b.dropped) << what;
+}
+
+/// Pairs of triangles in the very same place with different materials: which one a ray reports must not depend on anything.
+std::shared_ptr<const Scene> coplanar_duplicates() {
+    SceneBuilder b = testing::cornell_builder();
+    const MaterialId blue = b.diffuse({0.1f, 0.2f, 0.8f}), yellow = b.diffuse({0.8f, 0.7f, 0.1f});
+    b.quad({-1, 0, -1}, {0, 0, 2}, {2, 0, 0}, blue);
+    b.quad({-1, 0, -1}, {0, 0, 2}, {2, 0, 0}, yellow);
+    b.quad({-0.7f, 0.6f, 0.1f}, {0, 0, 0.5f}, {0.5f, 0, 0}, yellow);
+    b.quad({-0.3f, 1.99f, -0.3f}, {0.6f, 0, 0}, {0, 0, 0.6f}, blue, b.emission({1, 2, 15}));
+    return b.build();
+}
+
+TEST(Determinism, OneTwoAndEightThreadsMakeTheSameBytes) {
+    for (const auto make : {testing::diffuse_box, testing::environment_lit, coplanar_duplicates}) {
+        const auto scene = make(), again = make();
+        for (const char* algorithm : kAlgorithms) {
+            const UnitWork work = whole_frame(*scene, 4);
+            Partial alone;
+            {
+                tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+                alone = render(scene, algorithm, work);
+            }
+            for (const int threads : {2, 8, 8, 8}) {
+                tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(threads));
+                tbb::task_arena arena(threads);
+                Partial partial;
+                // The second build of the scene as well: its acceleration structure is the same one.
+                arena.execute([&] { partial = render(threads == 2 ? again : scene, algorithm, work); });
+                expect_identical(alone, partial, std::string(algorithm) + " on " + std::to_string(threads) + " threads");
+            }
+        }
+    }
+}
+
+TEST(Determinism, SeedsAndIterationsMakeDifferentSamples) {
+    const auto scene = testing::diffuse_box();
+    for (const char* algorithm : {"path", "bdpt"}) {
+        const Partial a = render(scene, algorithm, whole_frame(*scene, 1));
+        const Partial b = render(scene, algorithm, whole_frame(*scene, 1), 6);
+        UnitWork later = whole_frame(*scene, 1);
+        later.first_iteration = 1;
+        const Partial c = render(scene, algorithm, later);
+        EXPECT_NE(a.camera, b.camera) << algorithm;
+        EXPECT_NE(a.camera, c.camera) << algorithm;
+    }
+}
+
+/// A camera sample is keyed by its pixel, not by its tile; with rows as tiles and one iteration, so is its light sub-path.
+TEST(Tiles, HoldExactlyTheSamplesOfTheFrame) {
+    const auto scene = testing::diffuse_box();
+    const Rect crop = scene->frame().crop;
+    for (const char* algorithm : kAlgorithms) {
+        const Partial whole = render(scene, algorithm, whole_frame(*scene, 1));
+        std::vector<double> splats(size_t(crop.area()) * 3, 0);
+        for (int y0 = 0; y0 < crop.height(); y0 += 5) {
+            const Rect rows{0, y0, crop.width(), std::min(y0 + 5, crop.height())};
+            const uint64_t first = uint64_t(y0) * uint64_t(crop.width());
+            const Partial part = render(scene, algorithm, {0, 1, 0, rows, first, uint64_t(rows.area())});
+            EXPECT_EQ(std::memcmp(part.camera.data(), &whole.camera[3 * first], part.camera.size() * sizeof(double)), 0) << algorithm;
+            for (const SplatSum& s : part.splats)
+                for (size_t c = 0; c < 3; ++c) splats[3 * s.pixel + c] += s.rgb[c];
+        }
+        // Splats of different tiles meet in a pixel, so their sum is the same up to the order of additions.
+        for (const SplatSum& s : whole.splats)
+            for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(splats[3 * s.pixel + c], s.rgb[c], 1e-12 * s.rgb[c]) << algorithm;
+    }
+    // No sub-path of its own: any tiling, any number of iterations.
+    const Partial whole = render(scene, "path", whole_frame(*scene, 3));
+    for (int y0 = 0; y0 < crop.height(); y0 += 5)
+        for (int x0 = 0; x0 < crop.width(); x0 += 7) {
+            const Rect tile{x0, y0, std::min(x0 + 7, crop.width()), std::min(y0 + 5, crop.height())};
+            const Partial part = render(scene, "path", {0, 3, 0, tile, 0, 0});
+            for (int64_t i = 0; i < tile.area(); ++i) {
+                const int64_t p = crop.index(tile.x0 + int(i % tile.width()), tile.y0 + int(i / tile.width()));
+                EXPECT_EQ(std::memcmp(&part.camera[size_t(3 * i)], &whole.camera[size_t(3 * p)], 3 * sizeof(double)), 0);
+            }
+        }
+}
+
+/// N1 is a constant of the frame: a frame of 7 x 5 tiles, cut at its edges, has the mean of the undivided one.
+TEST(Tiles, OfAnySizeKeepTheMean) {
+    SceneBuilder b = testing::cornell_builder();
+    b.description().film.width = 30;
+    b.description().film.height = 22;
+    const std::shared_ptr<const Scene> scene = b.build();
+    const Rect crop = scene->frame().crop;
+    testing::TestFamily family;
+    for (const std::string algorithm : {"light", "bdpt"}) {
+        const auto tiled = [&](uint64_t seed) {
+            Partial sum = render(scene, algorithm, whole_frame(*scene, 1), seed);
+            sum.camera.assign(sum.camera.size(), 0);
+            sum.splats.clear();
+            sum.samples_per_pixel = 4;
+            sum.light_paths = 0;
+            for (int y0 = 0; y0 < crop.height(); y0 += 5)
+                for (int x0 = 0; x0 < crop.width(); x0 += 7) {
+                    const Rect tile{x0, y0, std::min(x0 + 7, crop.width()), std::min(y0 + 5, crop.height())};
+                    const uint64_t paths = 4 * uint64_t(tile.area());
+                    const Partial part = render(scene, algorithm, {0, 4, 0, tile, sum.light_paths, paths}, seed);
+                    sum.light_paths += paths;
+                    for (int64_t i = 0; i < tile.area(); ++i) {
+                        const int64_t p = crop.index(tile.x0 + int(i % tile.width()), tile.y0 + int(i / tile.width()));
+                        for (int64_t c = 0; c < 3; ++c) sum.camera[size_t(3 * p + c)] = part.camera[size_t(3 * i + c)];
+                    }
+                    sum.splats.insert(sum.splats.end(), part.splats.begin(), part.splats.end());
+                }
+            return testing::develop(sum, crop);
+        };
+        const auto whole = testing::catalog_image(scene, algorithm, 5, 4);
+        testing::compare(testing::replicate(whole, crop, 32, 100), testing::replicate(tiled, crop, 32, 200), algorithm, &family);
+    }
+    family.check();
+}
+
+/// The crop renders what the frame shows there, camera samples and splats alike.
+TEST(Tiles, ACropHasTheMeanOfItsPartOfTheFrame) {
+    SceneBuilder full = testing::cornell_builder(), cropped = testing::cornell_builder();
+    const int window[4] = {8, 24, 4, 20};
+    std::copy(window, window + 4, cropped.description().film.crop);
+    const std::shared_ptr<const Scene> a = full.build(), b = cropped.build();
+    ASSERT_EQ(b->frame().crop, (Rect{8, 4, 24, 20}));
+    testing::TestFamily family;
+    for (const char* algorithm : kAlgorithms) {
+        const auto frame = testing::catalog_image(a, algorithm, 5, 8);
+        const auto part_of_frame = [&](uint64_t seed) {
+            const std::vector<double> image = frame(seed);
+            std::vector<double> part;
+            for (int y = 4; y < 20; ++y)
+                for (int x = 8; x < 24; ++x) part.push_back(image[size_t(y * 32 + x)]);
+            return part;
+        };
+        const Rect crop = b->frame().crop;
+        testing::compare(testing::replicate(part_of_frame, crop, 32, 100),
+                         testing::replicate(testing::catalog_image(b, algorithm, 5, 8), crop, 32, 200), algorithm, &family);
+    }
+    family.check();
+}
+
+/// Not finite at one pixel of one iteration, and in every splat that pixel makes.
+struct BrokenAlgorithm {
+    uint32_t pixel;
+    uint64_t iteration;
+    Rgb sample(SampleContext& context) const {
+        if (context.pixel == pixel && context.iteration == iteration) {
+            context.splat({float(context.px) + 0.5f, float(context.py) + 0.5f}, Rgb(std::numeric_limits<float>::infinity()));
+            return {1, std::numeric_limits<float>::quiet_NaN(), 1};
+        }
+        context.splat({float(context.px) + 0.5f, float(context.py) + 0.5f}, Rgb(2.0f));
+        return Rgb(1.0f);
+    }
+};
+
+TEST(NonFinite, SamplesAreDroppedCountedAndRecorded) {
+    const auto scene = testing::diffuse_box();
+    RenderSettings settings;
+    const uint32_t pixel = 333;
+    UnitWork work = whole_frame(*scene, 4);
+    work.first_iteration = 10;
+    const Result<Partial> partial = render_unit(BrokenAlgorithm{pixel, 12}, *scene, settings, {}, work, {});
+    ASSERT_TRUE(partial.ok());
+    EXPECT_EQ(partial->dropped_count, 2u);
+    ASSERT_EQ(partial->dropped.size(), 2u);
+    EXPECT_EQ(partial->dropped[0], (DroppedSample{12, pixel, false}));
+    EXPECT_EQ(partial->dropped[1], (DroppedSample{12, pixel, true}));
+    for (uint32_t p = 0; p < uint32_t(scene->frame().crop.area()); ++p) {
+        EXPECT_EQ(partial->camera[3 * p], p == pixel ? 3 : 4);
+        EXPECT_EQ(partial->splats[p].rgb[0], p == pixel ? 6 : 8);
+    }
+    EXPECT_TRUE(check_partial(*partial, scene->frame()).ok());
+}
+
+/// Records are bounded, the count is not.
+struct NeverFinite {
+    Rgb sample(SampleContext&) const { return Rgb(std::numeric_limits<float>::infinity()); }
+};
+
+TEST(NonFinite, RecordsAreBounded) {
+    const auto scene = testing::diffuse_box();
+    const Result<Partial> partial = render_unit(NeverFinite{}, *scene, {}, {}, whole_frame(*scene, 2), {});
+    ASSERT_TRUE(partial.ok());
+    EXPECT_EQ(partial->dropped_count, 2 * uint64_t(scene->frame().crop.area()));
+    EXPECT_EQ(partial->dropped.size(), Partial::kMaxDroppedRecords);
+}
+
+TEST(Units, OutsideTheFrameOrCancelledAreRefused) {
+    const auto scene = testing::diffuse_box();
+    for (const Rect tile : {Rect{0, 0, 33, 4}, Rect{-1, 0, 4, 4}, Rect{4, 4, 4, 8}})
+        EXPECT_FALSE(render_unit(PathAlgorithm{}, *scene, {}, {}, {0, 1, 0, tile, 0, 0}, {}).ok());
+    std::stop_source stop;
+    stop.request_stop();
+    const Result<Partial> partial = render_unit(PathAlgorithm{}, *scene, {}, {}, whole_frame(*scene, 1), stop.get_token());
+    ASSERT_FALSE(partial.ok());
+    EXPECT_EQ(partial.status().code(), StatusCode::kCancelled);
+}
+
+/// The three algorithms in a few seconds; tests/statistical does the same per path length on many scenes.
+TEST(Means, OfTheThreeAlgorithmsAgree) {
+    testing::TestFamily family;
+    const auto scene = testing::diffuse_box();
+    const Rect crop = scene->frame().crop;
+    std::vector<testing::RegionMeans> estimates;
+    for (const char* algorithm : kAlgorithms)
+        estimates.push_back(testing::replicate(testing::catalog_image(scene, algorithm, 5, 8), crop, 32, 1000 * (estimates.size() + 1)));
+    for (size_t i = 0; i < 3; ++i)
+        EXPECT_TRUE(testing::compare(estimates[i], estimates[(i + 1) % 3], std::string(kAlgorithms[i]) + " and the next", &family));
+    family.check();
 }
 
 }  // namespace
