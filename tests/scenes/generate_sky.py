@@ -9,7 +9,7 @@ import struct
 import sys
 import zlib
 
-SIZE = 32
+SIZE = 64
 
 
 def direction(u, v):
