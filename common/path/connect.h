@@ -86,14 +86,12 @@ Rgb environment_hit(const Scene& scene, const PathVertex* z, int t, const WalkRa
     return ray.alpha * radiance;
 }
 
-/// s = 1: next event estimation from z_{t-1}, t >= 2.
+/// s = 1: next event estimation from z_{t-1}, t >= 2, with x_0 = `light` chosen by EmitterSet::sample_next_event().
 template <ViewDetail detail = ViewDetail::kFull>
-Rgb next_event(const Scene& scene, const PathVertex* z, int t, double pick, Vec2 u, PathView* view,
-                      WalkCounters* counters) {
+Rgb next_event(const Scene& scene, const PathVertex* z, int t, const NextEventSample& light, PathView* view,
+               WalkCounters* counters) {
     const PathVertex& v = z[t - 1];
     const EmitterSet& emitters = scene.emitters();
-    NextEventSample light;
-    if (!emitters.sample_next_event(v.p, pick, u, &light)) return {};
     const Scatter s = scatter<TransportMode::kRadiance>(v, light.wi);
     const Rgb contribution = v.alpha * s.value * light.radiance * (light.geometry / light.pdf);
     if (contribution.is_black()) return {};
@@ -148,11 +146,10 @@ inline Rgb connect(const Scene& scene, const PathVertex* y, int s, const PathVer
     return contribution;
 }
 
-/// t = 1: connects y_{s-1}, s >= 2, to a point on the lens. `pixel` receives the film position.
-inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, Vec2 lens, Vec2* film, PathView* view,
+/// t = 1: connects y_{s-1}, s >= 2, to `lens_point` of Camera::sample_lens(). `film` receives the film position.
+inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, const Vec3& lens_point, Vec2* film, PathView* view,
                              WalkCounters* counters) {
     const PathVertex& a = y[s - 1];
-    const Vec3 lens_point = scene.camera().sample_lens(lens);
     const Vec3 d = a.p - lens_point;
     const float d2 = length_squared(d);
     if (!(d2 > 0)) return {};

@@ -44,7 +44,8 @@ struct BdptAlgorithm {
         for (int s = 2; s <= n; ++s) {
             if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
             Vec2 film;
-            const Rgb c = connect_to_camera(scene, y, s, rng.uniform2(), &film, &view, &context.counters);
+            const Vec3 lens = scene.camera().sample_lens(rng.uniform2());
+            const Rgb c = connect_to_camera(scene, y, s, lens, &film, &view, &context.counters);
             if (!c.is_black()) context.splat(film, weighted(c, s));
         }
 
@@ -55,9 +56,10 @@ struct BdptAlgorithm {
             if (v.emitter != kNone)
                 if (const Rgb c = emitter_hit(scene, z, t, &view); !c.is_black()) sum += weighted(c, 0);
             if (t > context.max_edges || !v.bsdf.has_smooth_lobe()) return;
+            NextEventSample light;
             const double pick = sampler.rng().uniform_double();
-            if (const Rgb c = next_event(scene, z, t, pick, sampler.next_event(t), &view, &context.counters); !c.is_black())
-                sum += weighted(c, 1);
+            if (scene.emitters().sample_next_event(v.p, pick, sampler.next_event(t), &light))
+                if (const Rgb c = next_event(scene, z, t, light, &view, &context.counters); !c.is_black()) sum += weighted(c, 1);
             for (int s = 2; s <= n && s + t - 1 <= context.max_edges; ++s) {
                 if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
                 if (const Rgb c = connect(scene, y, s, z, t, &view, &context.counters); !c.is_black()) sum += weighted(c, s);

@@ -29,7 +29,8 @@ struct LightAlgorithm {
         for (int s = 2; s <= n; ++s) {
             if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
             Vec2 film;
-            const Rgb contribution = connect_to_camera(scene, y, s, rng.uniform2(), &film, &view, &context.counters);
+            const Vec3 lens = scene.camera().sample_lens(rng.uniform2());
+            const Rgb contribution = connect_to_camera(scene, y, s, lens, &film, &view, &context.counters);
             if (!contribution.is_black())
                 context.splat(film, contribution * float(mis_weight(view, {TechniqueKind::kConnect, s}, LightSelection{})));
         }

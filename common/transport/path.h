@@ -39,8 +39,10 @@ struct PathAlgorithm {
             const PathVertex& v = z[t - 1];
             if (v.emitter != kNone) add(emitter_hit<kDetail>(scene, z, t, &view), 0);
             if (t > context.max_edges || !v.bsdf.has_smooth_lobe()) return;
+            NextEventSample light;
             const double pick = sampler.rng().uniform_double();
-            add(next_event<kDetail>(scene, z, t, pick, sampler.next_event(t), &view, &context.counters), 1);
+            if (scene.emitters().sample_next_event(v.p, pick, sampler.next_event(t), &light))
+                add(next_event<kDetail>(scene, z, t, light, &view, &context.counters), 1);
         };
         const auto escape = [&](int t, const WalkRay& ray) {
             if (t <= context.max_edges) add(environment_hit<kDetail>(scene, z, t, ray, &view), 0);
