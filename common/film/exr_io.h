@@ -20,6 +20,16 @@ struct ImageLayer {
     std::vector<float> pixels;  ///< channels.size() * width * height of the data window, row-major, interleaved.
 };
 
+/// Names of the attributes that our images carry, so that writers and readers agree.
+namespace exr_attribute {
+inline constexpr const char* kAlgorithm = "lightloom.algorithm";
+inline constexpr const char* kParameters = "lightloom.parameters";
+inline constexpr const char* kSeed = "lightloom.seed";
+inline constexpr const char* kSamples = "lightloom.samplesPerPixel";
+inline constexpr const char* kMaxDepth = "lightloom.maxDepth";
+inline constexpr const char* kScene = "lightloom.sceneDigest";
+}  // namespace exr_attribute
+
 struct ExrImage {
     FrameLayout frame;  ///< Display window = full frame from (0, 0), data window = crop.
     RgbImage color;     ///< Linear radiance, Rec.709 primaries: channels R, G, B.

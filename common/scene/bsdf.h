@@ -4,12 +4,17 @@
 // the one that it continues to; in radiance mode the sub-path started at the camera, in importance mode at a light.
 //
 // Reciprocity: f(wo, wi) == f(wi, wo) for every kind except transmission through a refracting interface, where
-// f_radiance(wo -> wi) = f_importance(wo -> wi) * (eta_wi side / eta_wo side)^-2 as usual [Veach 1997, 5.2]; `mode` selects.
+// f_radiance(wo -> wi) = f_importance(wo -> wi) / (eta_wi side / eta_wo side)^2 as usual [Veach 1997, 5.2]; `mode` selects.
 // The correction for shading normals is NOT in here (common/path applies it): the surface is the shading frame's.
+//
+// Interfaces are GGX with height-correlated Smith masking and the visible-normal density, as in pbrt-v4, so that pictures
+// agree with it; coats are analytic (bsdf_coated.cpp). Every kind but the dielectrics is two-sided: it looks the same from
+// below. Make a Bsdf with one of the functions at the end; its fields are their business and the evaluation's.
 
 #include <cstdint>
 #include <type_traits>
 
+#include "common/core/math.h"
 #include "common/core/vec.h"
 
 namespace lightloom {
@@ -42,15 +47,27 @@ struct BsdfSample {
     bool delta = false;   ///< The lobe chosen is a Dirac distribution: this vertex's event is not connectible.
 };
 
+/// A function of |cos| at one roughness: two neighbouring rows of a table (bsdf_tables.h) and where between them to look.
+/// The rows live as long as the program.
+struct TableRows {
+    const float* rows = nullptr;
+    float fraction = 0;
+};
+
 struct Bsdf {
     BsdfKind kind = BsdfKind::kNull;
-    bool two_lobes_delta = false;  ///< Free for the kind's own use.
-    float eta = 1;                 ///< Relative index: below the surface (z < 0) over above.
-    float alpha_x = 0, alpha_y = 0;            ///< GGX alpha of the interface; 0 means smooth (delta).
-    float base_alpha_x = 0, base_alpha_y = 0;  ///< kCoatedConductor's base.
-    Rgb reflectance;               ///< Albedo, F0, or conductor eta, by kind.
-    Rgb transmittance;             ///< Diffuse transmission albedo, or conductor k, by kind.
-    float table[4] = {0, 0, 0, 0}; ///< Per-point constants that a kind precomputes (for example T_avg of a coat).
+    bool black = true;                 ///< No light leaves: nothing to sample or to connect to.
+    float eta = 1;                     ///< Relative index: below the surface (z < 0) over above; a coat's over outside.
+    float alpha_x = 0, alpha_y = 0;    ///< GGX alpha of the interface (of the coat for coated kinds); 0 is smooth (delta).
+    Rgb reflectance;                   ///< Diffuse albedo; conductor: eta; kCoatedDiffuse: see base_weight.
+    Rgb transmittance;                 ///< Diffuse transmission albedo; conductor: k.
+    float reflect_pmf = 0;             ///< kDiffuseTransmission: probability of the reflected lobe.
+    float base_alpha_x = 0, base_alpha_y = 0;  ///< kCoatedConductor: the base's alpha, widened by a rough coat.
+    TableRows coat_albedo;             ///< Directional albedo of a rough coat.
+    TableRows trapped;                 ///< kCoatedConductor: see bsdf_coated.cpp.
+    float base_weight = 0;             ///< Scalar albedo of what is under the coat, for choosing lobes.
+    Rgb trapped_reflectance;           ///< kCoatedConductor: albedo of the internally scattered light ...
+    float trapped_norm = 0;            ///< ... and the normalisation of its lobe.
 
     /// True if some lobe is not a Dirac delta, so that the vertex can be connected to.
     bool has_smooth_lobe() const;
@@ -62,7 +79,79 @@ struct Bsdf {
     bool sample(const Vec3& wo, float lobe, Vec2 u, TransportMode mode, BsdfSample* out) const;
     /// Hemispherical-directional albedo estimate for reports and feature layers, in [0,1]; no transport reads it.
     Rgb albedo() const;
+
+  private:
+    BsdfEval eval_other(const Vec3& wo, const Vec3& wi, TransportMode mode) const;
+    bool sample_other(const Vec3& wo, float lobe, Vec2 u, TransportMode mode, BsdfSample* out) const;
 };
-static_assert(std::is_trivially_copyable_v<Bsdf>);
+static_assert(std::is_trivially_copyable_v<Bsdf> && sizeof(Bsdf) <= 112);
+
+/// Cosine-distributed unit vector around +z (density cos / pi) from `u` in [0,1)^2.
+inline Vec3 sample_cosine_hemisphere(Vec2 u) {
+    const math::SinCos azimuth = math::sincos_turns(u.x);
+    const float radius = std::sqrt(u.y);
+    return {radius * float(azimuth.cos), radius * float(azimuth.sin), std::sqrt(1 - u.y)};
+}
+
+/// Lambertian, on whichever side wo is. Albedo per channel, clamped to [0, 1] as in pbrt.
+Bsdf make_diffuse(const Rgb& reflectance);
+/// Lambertian on both sides of a thin sheet; albedos clamped to [0, 1] each.
+Bsdf make_diffuse_transmission(const Rgb& reflectance, const Rgb& transmittance);
+/// Conductor with complex index eta + i k against what is above it. Alphas are GGX; both below 1e-3 mean a mirror.
+Bsdf make_conductor(const Rgb& eta, const Rgb& k, float alpha_x, float alpha_y);
+/// The index (eta = 1, k) whose reflectance at normal incidence is `reflectance`, clamped to [0, 0.9999] as in pbrt.
+Rgb conductor_k(const Rgb& reflectance);
+/// Interface between two dielectrics; eta == 1 lets everything pass as a delta event.
+Bsdf make_dielectric(float eta, float alpha_x, float alpha_y);
+/// A thin pane: both interfaces with all their inter-reflections, without refraction.
+Bsdf make_thin_dielectric(float eta);
+/// Dielectric coat of index `eta` over a Lambertian base.
+Bsdf make_coated_diffuse(const Rgb& reflectance, float eta, float alpha_x, float alpha_y);
+/// Dielectric coat over a conductor whose complex index is given against vacuum.
+Bsdf make_coated_conductor(const Rgb& conductor_eta, const Rgb& conductor_k, float base_alpha_x, float base_alpha_y,
+                           float eta, float alpha_x, float alpha_y);
+
+// The Lambertian case inline: in an interior it is most of the work.
+
+inline bool Bsdf::has_smooth_lobe() const {
+    switch (kind) {
+        case BsdfKind::kDiffuse:
+        case BsdfKind::kDiffuseTransmission: return !black;
+        case BsdfKind::kConductor:
+        case BsdfKind::kDielectric: return alpha_x > 0;
+        case BsdfKind::kCoatedDiffuse: return alpha_x > 0 || base_weight > 0;
+        case BsdfKind::kCoatedConductor: return base_alpha_x > 0;
+        default: return false;
+    }
+}
+
+inline bool Bsdf::has_delta_lobe() const {
+    switch (kind) {
+        case BsdfKind::kThinDielectric: return true;
+        case BsdfKind::kConductor:
+        case BsdfKind::kDielectric:
+        case BsdfKind::kCoatedDiffuse:
+        case BsdfKind::kCoatedConductor: return alpha_x == 0;
+        default: return false;
+    }
+}
+
+inline BsdfEval Bsdf::eval(const Vec3& wo, const Vec3& wi, TransportMode mode) const {
+    if (kind != BsdfKind::kDiffuse) return eval_other(wo, wi, mode);
+    if (!(wo.z * wi.z > 0)) return {};
+    return {reflectance * kInvPi, std::fabs(wi.z) * kInvPi, std::fabs(wo.z) * kInvPi};
+}
+
+inline bool Bsdf::sample(const Vec3& wo, float lobe, Vec2 u, TransportMode mode, BsdfSample* out) const {
+    if (kind != BsdfKind::kDiffuse) return sample_other(wo, lobe, u, mode, out);
+    if (black || wo.z == 0) return false;
+    out->wi = sample_cosine_hemisphere(u);
+    out->weight = reflectance;
+    out->pdf_fwd = out->wi.z * kInvPi;
+    out->pdf_rev = std::fabs(wo.z) * kInvPi;
+    out->delta = false;
+    if (wo.z < 0) out->wi.z = -out->wi.z;
+    return true;
+}
 
 }  // namespace lightloom

@@ -7,12 +7,17 @@
 #include <vector>
 
 #include "common/core/result.h"
+#include "common/film/frame.h"
+#include "common/scene/accel.h"
+#include "common/scene/camera.h"
 #include "common/scene/description.h"
+#include "common/scene/emitter.h"
+#include "common/scene/texture.h"
 
 namespace lightloom {
 
 struct SceneOptions {
-    int width = 0, height = 0;  ///< Override of the film's resolution; 0 keeps the scene's.
+    int width = 0, height = 0;  ///< Override of the film's resolution; 0 keeps the scene's. A crop window is scaled along.
 };
 
 /// What `lightloom inspect` prints.
@@ -25,25 +30,64 @@ struct SceneSummary {
     struct Light {
         std::string kind;      ///< area, point, spot, distant, infinite
         std::string where;     ///< file:line where known
-        double power = 0;      ///< Luminance-weighted flux estimate, W; what light selection uses.
+        double power = 0;      ///< Scalar flux estimate, W; what light selection uses.
         uint64_t primitives = 0;
     };
     std::vector<Light> lights;
 };
 
+/// A point on a surface, in world space.
+struct SurfacePoint {
+    Vec3 p;
+    Vec3 ng;             ///< Geometric normal, unit; outside as the scene defines it.
+    Frame shading;       ///< Shading frame, n in the hemisphere of ng.
+    Vec2 uv;
+    MaterialId material = kNone;
+    int32_t emitter = kNone;
+};
+
 class Scene {
   public:
-    ~Scene();
     Scene(const Scene&) = delete;
     Scene& operator=(const Scene&) = delete;
 
     /// Takes the description over. Fails with one clear line (and the shape's source) on anything inconsistent.
     static Result<std::unique_ptr<Scene>> build(SceneDescription description, const SceneOptions& options = {});
 
-    SceneSummary summary() const;
+    const SceneSummary& summary() const { return summary_; }
+    const SceneDescription& description() const { return description_; }
+    const Camera& camera() const { return camera_; }
+    const EmitterSet& emitters() const { return emitters_; }
+    const FrameLayout& frame() const { return frame_; }
+
+    /// Closest surface along the unit direction `d` from `o`; start from offset_origin() when leaving a surface.
+    bool intersect(const Vec3& o, const Vec3& d, SurfacePoint* out) const;
+    /// The material of a point, textures looked up.
+    Bsdf bsdf_at(const SurfacePoint& point) const;
+    /// Whether the open segment between two surface points is blocked; both ends are moved off their surfaces.
+    bool occluded(const Vec3& p, const Vec3& ng_p, const Vec3& q, const Vec3& ng_q) const;
+    /// The same where `q` is not on a surface (a lens, a point light, a point beyond the scene).
+    bool occluded(const Vec3& p, const Vec3& ng_p, const Vec3& q) const;
 
   private:
-    Scene();
+    Scene() = default;
+    Status check() const;
+    void collect_emitters(std::vector<Emitter>* emitters);
+    void summarise();
+    void triangle_point(const TriangleMesh& mesh, const RawHit& hit, SurfacePoint* out) const;
+    static float opacity(const void* user, int32_t object, uint32_t geometry, uint32_t primitive, float u, float v);
+
+    SceneDescription description_;
+    TextureTables tables_;
+    std::unique_ptr<Accel> accel_;
+    std::vector<int32_t> mesh_first_emitter_;    // per world mesh, kNone where it does not emit
+    std::vector<int32_t> sphere_emitter_;        // per world sphere
+    std::vector<Mat4> instance_inverse_;
+    std::vector<std::string> light_sources_;     // where each light group came from
+    EmitterSet emitters_;
+    Camera camera_;
+    FrameLayout frame_;
+    SceneSummary summary_;
 };
 
 }  // namespace lightloom

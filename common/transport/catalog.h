@@ -41,6 +41,8 @@ std::span<const AlgorithmInfo> catalog();
 Result<const AlgorithmInfo*> find_algorithm(std::string_view name);
 /// Unknown key, not a number, or out of range: kInvalidArgument naming the key, the range and the algorithm.
 Result<AlgorithmParameters> parse_parameters(const AlgorithmInfo& algorithm, const std::map<std::string, std::string>& set);
+/// Value of a parameter that the algorithm has.
+double parameter_value(const AlgorithmInfo& algorithm, const AlgorithmParameters& parameters, std::string_view name);
 /// N1: light paths splatted per pixel and iteration, one constant of the frame.
 double light_paths_per_pixel(const AlgorithmInfo& algorithm, const AlgorithmParameters& parameters);
 

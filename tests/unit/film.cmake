@@ -1,1 +1,7 @@
 lightloom_test(film_test LINK lt_film)
+lightloom_test(metrics_test LINK lt_film)
+
+find_package(CLI11 REQUIRED)
+find_package(nlohmann_json REQUIRED)
+lightloom_test(compare_test LINK lt_film CLI11::CLI11 nlohmann_json::nlohmann_json)
+target_sources(compare_test PRIVATE ${CMAKE_SOURCE_DIR}/client/command_compare.cpp)

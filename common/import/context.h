@@ -1,0 +1,135 @@
+#pragma once
+// What the parts of the importer share: the scene under construction, the files, the diagnostics, and the tables that map
+// names to what they stand for.
+
+#include <array>
+#include <map>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "common/import/file_source.h"
+#include "common/import/images.h"
+#include "common/import/import.h"
+#include "common/import/parameters.h"
+#include "common/import/spectra.h"
+
+namespace lightloom::import {
+
+/// A material that absorbs nothing and scatters nothing: the shape does not exist for light ("interface").
+inline constexpr MaterialId kInterfaceMaterial = -2;
+
+/// A material as a shape names it: a named one, or an anonymous one by its index.
+struct MaterialReference {
+    bool named = false;
+    std::string name;   ///< Of a named material.
+    int anonymous = 0;  ///< Index into Context::anonymous_materials; 0 is pbrt's default, diffuse.
+    Location where;
+};
+
+/// A Texture, Material or MakeNamedMaterial directive, interpreted when everything has been read (pbrt allows references
+/// to what comes later).
+struct Definition {
+    std::string kind;  ///< "imagemap", "diffuse", ...
+    ParameterList parameters;
+};
+
+struct AreaLightDefinition {
+    ParameterList parameters;
+};
+
+/// A shape with its references still unresolved.
+struct PendingShape {
+    std::variant<TriangleMesh, Sphere> geometry;
+    int32_t object = kNone;  ///< Index into SceneDescription::objects, or kNone.
+    MaterialReference material;
+    std::shared_ptr<const AreaLightDefinition> area_light;  ///< Null if the shape does not emit.
+    float alpha = 1;
+    std::string alpha_texture;  ///< Empty if the shape has none.
+    Location where;
+};
+
+struct Context {
+    Context(FileSource* source, const ImportOptions& import_options)
+        : files(source), options(import_options), diagnostics(import_options.strict) {}
+
+    FileSource* files;
+    ImportOptions options;
+    Diagnostics diagnostics;
+    SceneDescription scene;
+
+    std::vector<std::unique_ptr<std::string>> file_names;  ///< Storage of Location::file.
+    std::vector<PendingShape> shapes;
+    std::map<std::string, Definition> float_textures, spectrum_textures, named_materials;
+    std::vector<Definition> anonymous_materials;
+
+    // Caches of the resolution.
+    std::map<std::string, TextureId> resolved_float_textures, resolved_spectrum_textures;
+    std::map<std::string, MaterialId> resolved_named_materials;
+    std::map<int, MaterialId> resolved_anonymous_materials;
+    std::map<std::tuple<float, float, float>, TextureId> constants;
+    std::map<std::string, int32_t> image_index;  ///< By file, encoding and channel choice.
+    std::map<std::tuple<float, float, float, bool>, int32_t> emission_index;
+    int texture_depth = 0, material_depth = 0;   ///< Of the definitions being resolved.
+
+    float exposure_time = 1, iso = 100;
+    bool has_pixel_filter = false;
+
+    /// Reads a file that a parameter names. Fails at `where`.
+    std::string read_file(const Location& where, const std::string& reference, std::string* normalised = nullptr);
+    /// Index of the decoded image in the scene; every file is decoded once per way of using it.
+    int32_t load_image(const Location& where, const std::string& reference, const ImageRequest& request);
+    /// The Location::file for a normalised name.
+    const std::string* intern_file_name(const std::string& name);
+};
+
+// textures.cpp
+TextureId constant_texture(Context* context, const Rgb& value);
+TextureId named_float_texture(Context* context, const Location& where, const std::string& name);
+TextureId named_spectrum_texture(Context* context, const Location& where, const std::string& name);
+/// Parameter `name` as "float" or "texture"; kNone if absent.
+TextureId float_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name);
+
+/// How a colour is used decides what its numbers may be (and how a spectrum is reduced, see spectra.h).
+enum class ColourUse { kReflectance, kUnbounded };
+/// Parameter `name` as "rgb", "spectrum" or "texture"; kNone if absent.
+TextureId spectrum_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name, ColourUse use);
+
+/// Parameter `name` of type "spectrum" read from its values or file; nothing if absent.
+std::optional<Spectrum> spectrum_parameter(Context* context, const ParameterList& parameters, std::string_view name);
+
+// materials.cpp
+MaterialId resolve_material_reference(Context* context, const MaterialReference& reference);
+
+// lights.cpp
+/// Transformation in force at a directive.
+void add_light(Context* context, const std::string& kind, const ParameterList& parameters, const Mat4& light_to_world);
+/// Radiance of an area light on a surface of `area` (its "power" parameter is per primitive, as in pbrt).
+AreaEmission area_emission(Context* context, const AreaLightDefinition& definition, double area);
+bool area_light_uses_power(const AreaLightDefinition& definition);
+
+// camera.cpp
+void set_camera(Context* context, const std::string& kind, const ParameterList& parameters, const Mat4& camera_to_world);
+void set_film(Context* context, const std::string& kind, const ParameterList& parameters);
+void set_pixel_filter(Context* context, const std::string& kind, const ParameterList& parameters);
+void set_sampler(Context* context, const std::string& kind, const ParameterList& parameters);
+void set_integrator(Context* context, const std::string& kind, const ParameterList& parameters);
+
+// shapes.cpp
+/// State that a shape takes from the graphics state.
+struct ShapeState {
+    Mat4 object_to_world;
+    bool reverse_orientation = false;
+};
+/// Appends the shape's geometry to `pending` (its references are the caller's).
+std::variant<TriangleMesh, Sphere> make_shape(Context* context, const std::string& kind, const ParameterList& parameters,
+                                              const ShapeState& state);
+
+// resolve.cpp
+/// Resolves all references and moves the shapes into the scene.
+void resolve_shapes(Context* context);
+
+}  // namespace lightloom::import

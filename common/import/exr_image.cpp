@@ -1,0 +1,91 @@
+#include "common/import/exr_image.h"
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfIO.h>
+#include <ImfInputFile.h>
+
+#include <cstring>
+#include <exception>
+
+namespace lightloom::import {
+namespace {
+
+class MemoryStream : public Imf::IStream {
+  public:
+    explicit MemoryStream(const std::string& bytes) : Imf::IStream("image"), bytes_(bytes) {}
+
+    bool read(char out[], int n) override {
+        if (n < 0 || uint64_t(n) > bytes_.size() - pos_) throw std::runtime_error("the file ends early");
+        std::memcpy(out, bytes_.data() + pos_, size_t(n));
+        pos_ += uint64_t(n);
+        return pos_ < bytes_.size();
+    }
+    uint64_t tellg() override { return pos_; }
+    void seekg(uint64_t pos) override {
+        if (pos > bytes_.size()) throw std::runtime_error("the file ends early");
+        pos_ = pos;
+    }
+
+  private:
+    const std::string& bytes_;
+    uint64_t pos_ = 0;
+};
+
+std::string one_line(std::string text) {
+    for (char& c : text)
+        if (c == '\n' || c == '\r') c = ' ';
+    return text;
+}
+
+}  // namespace
+
+Status check_image_size(uint64_t width, uint64_t height, uint64_t channels, uint64_t file_bytes) {
+    constexpr uint64_t kMaxSide = 16384, kMaxExpansion = 4096;
+    const std::string claim = std::to_string(width) + " x " + std::to_string(height);
+    if (width == 0 || height == 0 || width > kMaxSide || height > kMaxSide)
+        return invalid_argument("the image claims " + claim + " pixels; sides from 1 to 16384 are supported");
+    // No supported compression shrinks data further than this.
+    if (width * height * channels > file_bytes * kMaxExpansion)
+        return data_loss("the image claims " + claim + " pixels, which its " + std::to_string(file_bytes) + " bytes cannot hold");
+    return {};
+}
+
+Result<ExrPixels> read_exr(const std::string& bytes) try {
+    MemoryStream stream(bytes);
+    Imf::InputFile file(stream, 1);
+    const Imath::Box2i window = file.header().dataWindow();
+    const int64_t width = int64_t(window.max.x) - window.min.x + 1, height = int64_t(window.max.y) - window.min.y + 1;
+    const Imf::ChannelList& list = file.header().channels();
+    std::vector<std::string> names;
+    if (list.findChannel("R") && list.findChannel("G") && list.findChannel("B")) {
+        names = {"R", "G", "B"};
+        if (list.findChannel("A")) names.push_back("A");
+    } else if (list.findChannel("Y")) {
+        names = {"Y"};
+    } else if (list.begin() != list.end() && ++list.begin() == list.end()) {
+        names = {list.begin().name()};
+    } else {
+        return invalid_argument("the EXR image has no R, G, B or Y channels");
+    }
+    for (const std::string& name : names)
+        if (list[name.c_str()].xSampling != 1 || list[name.c_str()].ySampling != 1)
+            return invalid_argument("the EXR image has sub-sampled channels, which are not supported");
+    LL_RETURN_IF_ERROR(check_image_size(uint64_t(std::max<int64_t>(width, 0)), uint64_t(std::max<int64_t>(height, 0)), names.size(), bytes.size()));
+    ExrPixels out;
+    out.width = int(width);
+    out.height = int(height);
+    out.channels = int(names.size());
+    out.values.resize(size_t(width) * size_t(height) * names.size());
+    const size_t pixel = sizeof(float) * names.size(), row = pixel * size_t(width);
+    Imf::FrameBuffer buffer;
+    for (size_t c = 0; c < names.size(); ++c)
+        buffer.insert(names[c], Imf::Slice::Make(Imf::FLOAT, out.values.data() + c, window, pixel, row));
+    file.setFrameBuffer(buffer);
+    file.readPixels(window.min.y, window.max.y);
+    return out;
+} catch (const std::exception& e) {
+    return data_loss("the EXR image cannot be decoded: " + one_line(e.what()));
+}
+
+}  // namespace lightloom::import

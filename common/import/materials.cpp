@@ -1,0 +1,204 @@
+// Material directives become Materials, with pbrt-v4's defaults.
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/import/context.h"
+#include "common/import/spectra.h"
+
+namespace lightloom::import {
+namespace {
+
+constexpr int kMaxMixDepth = 32;
+
+TextureId spectrum_or(Context* context, const ParameterList& p, std::string_view name, float fallback) {
+    const TextureId id = spectrum_texture_parameter(context, p, name, ColourUse::kReflectance);
+    return id == kNone ? constant_texture(context, Rgb(fallback)) : id;
+}
+
+void check_roughness(Context* context, const ParameterList& p, TextureId id, std::string_view name) {
+    const TextureNode& node = context->scene.textures[size_t(id)];
+    if (node.kind == TextureKind::kConstant && (node.value.r < 0 || node.value.r > 1))
+        fail(p.where(), p.what() + ": " + std::string(name) + " must lie in [0, 1]");
+}
+
+/// `prefix`roughness, `prefix`uroughness and `prefix`vroughness.
+void read_roughness(Context* context, const ParameterList& p, const std::string& prefix, float fallback, TextureId* u, TextureId* v) {
+    TextureId both = float_texture_parameter(context, p, prefix + "roughness");
+    if (both == kNone) both = constant_texture(context, Rgb(fallback));
+    *u = float_texture_parameter(context, p, prefix + "uroughness");
+    *v = float_texture_parameter(context, p, prefix + "vroughness");
+    if (*u == kNone) *u = both;
+    if (*v == kNone) *v = both;
+    check_roughness(context, p, *u, prefix + "roughness");
+    check_roughness(context, p, *v, prefix + "roughness");
+}
+
+/// An index of refraction as float, named glass, or spectrum; positive.
+float read_index(Context* context, const ParameterList& p, std::string_view name) {
+    float index = p.one_float(name, 1.5f);
+    if (const Parameter* s = p.find("spectrum", name)) {
+        std::optional<float> glass;
+        if (s->strings.size() == 1) glass = named_glass(s->strings[0]);
+        index = glass ? *glass : float(evaluate(*spectrum_parameter(context, p, name), 587.6));
+        context->diagnostics.warn(s->where, p.what() + ": the dispersion of " + quoted(s->name) + " is ignored: its index at 587.6 nm is used for all colours");
+    }
+    if (!(index > 0) || !(index < 100)) fail(p.where(), p.what() + ": the index of refraction must lie between 0 and 100");
+    return index;
+}
+
+/// "metal-Cu-eta" split into metal and property; empty if it is not of this form.
+std::string metal_of(const Parameter* p, std::string_view suffix) {
+    if (!p || p->strings.size() != 1 || !has_suffix(p->strings[0], suffix) || p->strings[0].rfind("metal-", 0) != 0) return {};
+    return p->strings[0].substr(0, p->strings[0].size() - suffix.size());
+}
+
+/// The reflectance or eta and k of a conductor; `prefix` is "" or "conductor.".
+void read_conductor(Context* context, const ParameterList& p, const std::string& prefix, Material* m) {
+    m->reflectance = spectrum_texture_parameter(context, p, "reflectance", ColourUse::kReflectance);
+    const std::string eta_name = prefix + "eta", k_name = prefix + "k";
+    if (m->reflectance != kNone) {
+        if (p.find_any(eta_name) || p.find_any(k_name))
+            fail(p.where(), p.what() + ": give either reflectance or " + eta_name + " and " + k_name + ", not both");
+        return;
+    }
+    const Parameter *eta = p.find("spectrum", eta_name), *k = p.find("spectrum", k_name);
+    const std::string eta_metal = eta ? metal_of(eta, "-eta") : "", k_metal = k ? metal_of(k, "-k") : "";
+    // A metal's eta and k are reduced together, see spectra.h. pbrt's default is copper for either.
+    const bool eta_is_default = !p.find_any(eta_name), k_is_default = !p.find_any(k_name);
+    const auto metal = [&](const Parameter* where, const std::string& name) {
+        if (const auto found = named_metal(name)) return *found;
+        fail(where ? where->where : p.where(), p.what() + ": unknown named spectrum " + quoted(name));
+    };
+    if (eta_is_default) m->eta = constant_texture(context, named_metal("metal-Cu")->eta);
+    if (k_is_default) m->k = constant_texture(context, named_metal("metal-Cu")->k);
+    if (!eta_metal.empty()) m->eta = constant_texture(context, metal(eta, eta_metal).eta);
+    if (!k_metal.empty()) m->k = constant_texture(context, metal(k, k_metal).k);
+    if (eta && k && eta_metal.empty() && k_metal.empty()) {
+        const ConductorRgb both = conductor_rgb(*spectrum_parameter(context, p, eta_name), *spectrum_parameter(context, p, k_name));
+        m->eta = constant_texture(context, both.eta);
+        m->k = constant_texture(context, both.k);
+    }
+    if (m->eta == kNone) m->eta = spectrum_texture_parameter(context, p, eta_name, ColourUse::kUnbounded);
+    if (m->k == kNone) m->k = spectrum_texture_parameter(context, p, k_name, ColourUse::kUnbounded);
+    if (m->eta == kNone || m->k == kNone) p.finish();  // A parameter of the wrong type.
+}
+
+void ignore_layer_medium(Context* context, const ParameterList& p) {
+    Diagnostics* d = &context->diagnostics;
+    p.ignore(d, "thickness", "the layers here are joined analytically, without a medium between them");
+    p.ignore(d, "g", "the medium between the layers is not modelled");
+    p.ignore(d, "albedo", "the medium between the layers is not modelled");
+    p.ignore(d, "maxdepth", "the layers here are joined analytically, without a random walk");
+    p.ignore(d, "nsamples", "the layers here are joined analytically, without a random walk");
+}
+
+void read_mix(Context* context, const ParameterList& p, Material* m) {
+    const Parameter* names = p.find("string", "materials");
+    if (!names || names->strings.size() != 2) fail(p.where(), p.what() + " needs \"string materials\" with two names");
+    if (++context->material_depth > kMaxMixDepth) fail(p.where(), p.what() + ": mix materials refer to one another more than 32 levels deep");
+    m->mix_a = resolve_material_reference(context, {true, names->strings[0], 0, names->where});
+    m->mix_b = resolve_material_reference(context, {true, names->strings[1], 0, names->where});
+    --context->material_depth;
+    if (m->mix_a == kInterfaceMaterial || m->mix_b == kInterfaceMaterial)
+        fail(p.where(), p.what() + ": a mix with an \"interface\" material is not supported; use the shape's alpha instead");
+    m->mix_amount = float_texture_parameter(context, p, "amount");
+    if (m->mix_amount == kNone) m->mix_amount = constant_texture(context, Rgb(0.5f));
+}
+
+/// Index of the new material, or kInterfaceMaterial.
+MaterialId make_material(Context* context, const std::string& name, const Definition& definition) {
+    const ParameterList& p = definition.parameters;
+    const std::string& kind = definition.kind;
+    p.accept("type");
+    p.refuse("normalmap", "normal maps change the picture; remove the parameter to render without");
+    p.refuse("displacement", "bump maps change the picture; remove the parameter to render without");
+    Material m;
+    m.name = name;
+    m.remap_roughness = true;
+    if (kind == "interface" || kind == "none" || kind.empty()) {
+        p.finish();
+        return kInterfaceMaterial;
+    }
+    if (kind == "diffuse") {
+        m.kind = MaterialKind::kDiffuse;
+        m.reflectance = spectrum_or(context, p, "reflectance", 0.5f);
+    } else if (kind == "diffusetransmission") {
+        m.kind = MaterialKind::kDiffuseTransmission;
+        m.reflectance = spectrum_or(context, p, "reflectance", 0.25f);
+        m.transmittance = spectrum_or(context, p, "transmittance", 0.25f);
+        const float scale = p.one_float("scale", 1);
+        if (!(scale >= 0)) fail(p.where(), p.what() + ": the scale is negative");
+        if (scale != 1)
+            for (TextureId* id : {&m.reflectance, &m.transmittance}) {
+                TextureNode node;
+                node.kind = TextureKind::kScale;
+                node.a = *id;
+                node.b = constant_texture(context, Rgb(scale));
+                context->scene.textures.push_back(node);
+                *id = TextureId(context->scene.textures.size()) - 1;
+            }
+    } else if (kind == "conductor") {
+        m.kind = MaterialKind::kConductor;
+        read_conductor(context, p, "", &m);
+        read_roughness(context, p, "", 0, &m.roughness_u, &m.roughness_v);
+        m.remap_roughness = p.one_bool("remaproughness", true);
+    } else if (kind == "dielectric") {
+        m.kind = MaterialKind::kDielectric;
+        m.ior = read_index(context, p, "eta");
+        read_roughness(context, p, "", 0, &m.roughness_u, &m.roughness_v);
+        m.remap_roughness = p.one_bool("remaproughness", true);
+    } else if (kind == "thindielectric") {
+        m.kind = MaterialKind::kThinDielectric;
+        m.ior = read_index(context, p, "eta");
+    } else if (kind == "coateddiffuse") {
+        m.kind = MaterialKind::kCoatedDiffuse;
+        m.reflectance = spectrum_or(context, p, "reflectance", 0.5f);
+        m.ior = read_index(context, p, "eta");
+        read_roughness(context, p, "", 0, &m.roughness_u, &m.roughness_v);
+        m.remap_roughness = p.one_bool("remaproughness", true);
+        ignore_layer_medium(context, p);
+    } else if (kind == "coatedconductor") {
+        m.kind = MaterialKind::kCoatedConductor;
+        read_conductor(context, p, "conductor.", &m);
+        m.ior = read_index(context, p, "interface.eta");
+        read_roughness(context, p, "interface.", 0, &m.roughness_u, &m.roughness_v);
+        read_roughness(context, p, "conductor.", 0, &m.base_roughness_u, &m.base_roughness_v);
+        m.remap_roughness = p.one_bool("remaproughness", true);
+        ignore_layer_medium(context, p);
+    } else if (kind == "mix") {
+        m.kind = MaterialKind::kMix;
+        read_mix(context, p, &m);
+    } else {
+        fail(p.where(), p.what() + ": the material " + quoted(kind) +
+                            " is not supported; use diffuse, diffusetransmission, conductor, dielectric, thindielectric, coateddiffuse, coatedconductor, mix or interface");
+    }
+    p.finish();
+    context->scene.materials.push_back(std::move(m));
+    return MaterialId(context->scene.materials.size()) - 1;
+}
+
+}  // namespace
+
+MaterialId resolve_material_reference(Context* context, const MaterialReference& reference) {
+    constexpr MaterialId kInProgress = -3;
+    if (!reference.named) {
+        const auto [it, inserted] = context->resolved_anonymous_materials.try_emplace(reference.anonymous, kNone);
+        if (inserted) it->second = make_material(context, "", context->anonymous_materials[size_t(reference.anonymous)]);
+        return it->second;
+    }
+    const std::string& name = reference.name;
+    if (const auto it = context->resolved_named_materials.find(name); it != context->resolved_named_materials.end()) {
+        if (it->second == kInProgress) fail(reference.where, "the material " + quoted(name) + " refers to itself");
+        return it->second;
+    }
+    const auto it = context->named_materials.find(name);
+    if (it == context->named_materials.end())
+        fail(reference.where, "no material is named " + quoted(name) + "; define it with MakeNamedMaterial");
+    context->resolved_named_materials[name] = kInProgress;
+    const MaterialId id = make_material(context, name, it->second);
+    context->resolved_named_materials[name] = id;
+    return id;
+}
+
+}  // namespace lightloom::import

@@ -1,0 +1,76 @@
+#pragma once
+// Parameter lists: "type name" followed by one or more values. Every parameter must be asked for (or be named as ignored)
+// by whoever interprets the directive; finish() reports the rest, so that nothing is ever silently dropped.
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/core/vec.h"
+#include "common/import/diagnostics.h"
+#include "common/import/tokenizer.h"
+
+namespace lightloom::import {
+
+struct Parameter {
+    std::string type, name;
+    Location where;
+    std::vector<double> numbers;       ///< float, integer, point*, vector*, normal, rgb, blackbody, spectrum values.
+    std::vector<std::string> strings;  ///< string, texture, spectrum names and files.
+    std::vector<bool> bools;
+    bool from_attribute = false;       ///< A default set by an Attribute directive: may stay unused.
+    mutable bool used = false;
+};
+
+class ParameterList {
+  public:
+    /// Reads parameters up to the next directive. `what` names the directive in messages, e.g. `Shape "sphere"`.
+    static ParameterList parse(Tokenizer* tokens, const Location& where, std::string what);
+
+    ParameterList() = default;
+    ParameterList(const Location& where, std::string what) : where_(where), what_(std::move(what)) {}
+
+    const Location& where() const { return where_; }
+    const std::string& what() const { return what_; }
+
+    /// The parameter of exactly this type and name, marked as used; null if there is none.
+    const Parameter* find(std::string_view type, std::string_view name) const;
+    /// The parameter of this name whatever its type, marked as used.
+    const Parameter* find_any(std::string_view name) const;
+
+    float one_float(std::string_view name, float fallback) const;
+    int one_int(std::string_view name, int fallback) const;
+    bool one_bool(std::string_view name, bool fallback) const;
+    std::string one_string(std::string_view name, const std::string& fallback) const;
+    /// The value if it is one of `allowed`, which is listed in the error otherwise.
+    std::string one_choice(std::string_view name, const std::string& fallback,
+                           std::initializer_list<std::string_view> allowed) const;
+    std::optional<Vec3> one_point3(std::string_view name) const;
+    /// Numbers of a list parameter, in tuples of `tuple` (2 for point2, 3 for point3 ...); null if absent.
+    const std::vector<double>* numbers(std::string_view type, std::string_view name, size_t tuple) const;
+
+    /// Names a parameter that may be ignored: a warning with the reason if it is present.
+    void ignore(Diagnostics* diagnostics, std::string_view name, const std::string& reason) const;
+    /// An error with the reason if the parameter is present.
+    void refuse(std::string_view name, const std::string& reason) const;
+    /// Accepts a parameter that cannot change anything here.
+    void accept(std::string_view name) const { find_any(name); }
+
+    /// Fails if a parameter was not used: it is unknown or of the wrong type.
+    void finish() const;
+    /// Adds the defaults of Attribute directives that this list does not set itself.
+    void add_defaults(const ParameterList& defaults);
+    /// For the Attribute directive: later values replace earlier ones.
+    void override_with(const ParameterList& newer);
+
+  private:
+    const Parameter& expect_one(const Parameter& p, size_t count) const;
+
+    Location where_;
+    std::string what_;
+    std::vector<Parameter> parameters_;
+    mutable std::vector<std::string> asked_;  ///< "type name" of every typed question, for the wrong-type hint.
+};
+
+}  // namespace lightloom::import

@@ -1,0 +1,234 @@
+#include "common/import/parser.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lightloom::import {
+namespace {
+
+std::string read_string(Tokenizer* tokens, const Location& where, const std::string& word) {
+    const Token token = tokens->next();
+    if (token.kind != TokenKind::kString) fail(where, word + " needs a quoted string");
+    return std::string(token.text);
+}
+
+double read_number(Tokenizer* tokens, const Location& where, const std::string& word) {
+    const Token token = tokens->next();
+    double value = 0;
+    if (token.kind != TokenKind::kWord || !parse_number(token.text, &value))
+        fail(token.where.line ? token.where : where,
+             word + " needs a finite number" + (token.kind == TokenKind::kEnd ? "" : ", not " + quoted(std::string(token.text))));
+    return value;
+}
+
+/// `count` numbers, with or without brackets.
+std::vector<double> read_numbers(Tokenizer* tokens, const Location& where, const std::string& word, int count) {
+    const bool bracketed = tokens->peek().kind == TokenKind::kOpen;
+    if (bracketed) tokens->next();
+    std::vector<double> values;
+    for (int i = 0; i < count; ++i) values.push_back(read_number(tokens, where, word));
+    if (bracketed && tokens->next().kind != TokenKind::kClose)
+        fail(where, word + " needs exactly " + std::to_string(count) + " numbers");
+    return values;
+}
+
+/// pbrt writes a matrix column by column.
+Mat4 read_matrix(Tokenizer* tokens, const Location& where, const std::string& word) {
+    const std::vector<double> v = read_numbers(tokens, where, word, 16);
+    Mat4 m;
+    for (int column = 0; column < 4; ++column)
+        for (int row = 0; row < 4; ++row) m.m[row][column] = v[size_t(column * 4 + row)];
+    return m;
+}
+
+Vec3 vec3(const std::vector<double>& v, size_t first) {
+    return {float(v[first]), float(v[first + 1]), float(v[first + 2])};
+}
+
+}  // namespace
+
+Parser::Parser(Context* context) : context_(context) {
+    context_->anonymous_materials.push_back({"diffuse", ParameterList({}, "the default material")});
+}
+
+void Parser::parse_main(const std::string& name) {
+    const Location where{context_->intern_file_name(name), 0};
+    parse_file(name, where);
+    if (!scopes_.empty())
+        fail(scopes_.back().where, "this scope is never closed; add the missing AttributeEnd, TransformEnd or ObjectEnd");
+    if (!in_world_) fail(where, "the file has no WorldBegin; a scene needs one before its shapes and lights");
+}
+
+void Parser::parse_file(const std::string& name, const Location& from) {
+    std::string text = context_->read_file(from, name);
+    if (has_suffix(name, ".gz")) {
+        Result<std::string> inflated = inflate_gzip(text, context_->options.max_file_bytes);
+        if (!inflated.ok()) fail(from, quoted(name) + ": " + inflated.status().message());
+        text = std::move(inflated).value();
+    }
+    Tokenizer tokens(text, context_->intern_file_name(name));
+    while (tokens.peek().kind != TokenKind::kEnd) {
+        const Token token = tokens.next();
+        directive(&tokens, token);
+    }
+}
+
+void Parser::directive(Tokenizer* tokens, const Token& token) {
+    if (token.kind != TokenKind::kWord)
+        fail(token.where, "expected a directive such as Shape, not " + quoted(std::string(token.text)));
+    const std::string word(token.text);
+    if (transformation(tokens, word, token.where) || scope(tokens, word, token.where) ||
+        global_option(tokens, word, token.where) || world_item(tokens, word, token.where))
+        return;
+    fail(token.where, "unknown directive " + quoted(word) + "; remove it or correct its name");
+}
+
+bool Parser::transformation(Tokenizer* tokens, const std::string& word, const Location& where) {
+    if (word == "Identity") {
+        transform(where, [](const Mat4&) { return Mat4(); });
+    } else if (word == "Translate") {
+        const auto v = read_numbers(tokens, where, word, 3);
+        transform(where, [&](const Mat4& m) { return m * translation(v[0], v[1], v[2]); });
+    } else if (word == "Scale") {
+        const auto v = read_numbers(tokens, where, word, 3);
+        transform(where, [&](const Mat4& m) { return m * scaling(v[0], v[1], v[2]); });
+    } else if (word == "Rotate") {
+        const auto v = read_numbers(tokens, where, word, 4);
+        if (std::fabs(v[0]) > 1e6) fail(where, "Rotate: the angle is beyond a million degrees");
+        if (v[1] == 0 && v[2] == 0 && v[3] == 0) fail(where, "Rotate: the axis is zero");
+        transform(where, [&](const Mat4& m) { return m * rotation(v[0], v[1], v[2], v[3]); });
+    } else if (word == "LookAt") {
+        const auto v = read_numbers(tokens, where, word, 9);
+        const std::optional<Mat4> look = look_at(vec3(v, 0), vec3(v, 3), vec3(v, 6));
+        if (!look) fail(where, "LookAt: the eye equals the target, or the up vector is parallel to the view direction");
+        transform(where, [&](const Mat4& m) { return m * *look; });
+    } else if (word == "Transform") {
+        const Mat4 matrix = read_matrix(tokens, where, word);
+        transform(where, [&](const Mat4&) { return matrix; });
+    } else if (word == "ConcatTransform") {
+        const Mat4 matrix = read_matrix(tokens, where, word);
+        transform(where, [&](const Mat4& m) { return m * matrix; });
+    } else if (word == "CoordinateSystem") {
+        coordinate_systems_[read_string(tokens, where, word)] = {state_.ctm[0], state_.ctm[1]};
+    } else if (word == "CoordSysTransform") {
+        const std::string name = read_string(tokens, where, word);
+        const auto it = coordinate_systems_.find(name);
+        if (it == coordinate_systems_.end())
+            fail(where, "CoordSysTransform: no coordinate system is named " + quoted(name) + "; define it with CoordinateSystem first");
+        state_.ctm[0] = it->second[0];
+        state_.ctm[1] = it->second[1];
+    } else if (word == "ActiveTransform") {
+        active_transform(tokens, where);
+    } else if (word == "TransformTimes") {
+        read_numbers(tokens, where, word, 2);  // Matters only for moving things, which are refused where they are used.
+    } else if (word == "ReverseOrientation") {
+        state_.reverse_orientation = !state_.reverse_orientation;
+    } else {
+        return false;
+    }
+    return true;
+}
+
+void Parser::active_transform(Tokenizer* tokens, const Location& where) {
+    const Token token = tokens->next();
+    const std::string which(token.text);
+    if (which != "StartTime" && which != "EndTime" && which != "All")
+        fail(where, "ActiveTransform needs StartTime, EndTime or All");
+    state_.active[0] = which != "EndTime";
+    state_.active[1] = which != "StartTime";
+}
+
+void Parser::transform(const Location& where, const std::function<Mat4(const Mat4&)>& f) {
+    for (int i = 0; i < 2; ++i) {
+        if (!state_.active[i]) continue;
+        state_.ctm[i] = f(state_.ctm[i]);
+        if (!inverse(state_.ctm[i])) fail(where, "the transformation becomes singular or infinite here; correct its numbers");
+    }
+}
+
+const Mat4& Parser::static_transform(const Location& where, const std::string& what) const {
+    if (!(state_.ctm[0] == state_.ctm[1]))
+        fail(where, what + " moves while the shutter is open (ActiveTransform); motion is not supported, remove one of the transformations");
+    return state_.ctm[0];
+}
+
+bool Parser::scope(Tokenizer* tokens, const std::string& word, const Location& where) {
+    if (word == "AttributeBegin") {
+        open_scope('a', where);
+    } else if (word == "AttributeEnd") {
+        close_scope('a', word, where);
+    } else if (word == "TransformBegin") {
+        open_scope('t', where);
+    } else if (word == "TransformEnd") {
+        close_scope('t', word, where);
+    } else if (word == "ObjectBegin") {
+        object_begin(tokens, where);
+    } else if (word == "ObjectEnd") {
+        close_scope('o', word, where);
+        current_object_ = kNone;
+    } else if (word == "WorldBegin") {
+        require_world(where, word, false);
+        in_world_ = true;
+        state_.ctm[0] = state_.ctm[1] = Mat4();
+        state_.active[0] = state_.active[1] = true;
+        coordinate_systems_["world"] = {Mat4(), Mat4()};
+    } else if (word == "Include" || word == "Import") {
+        include(tokens, where);
+    } else if (word == "Attribute") {
+        attribute(tokens, where);
+    } else if (word == "Option") {
+        option(tokens, where);
+    } else if (word == "ColorSpace") {
+        const std::string name = read_string(tokens, where, word);
+        if (name != "srgb") fail(where, "ColorSpace " + quoted(name) + " is not supported; convert the colours to \"srgb\"");
+    } else {
+        return false;
+    }
+    return true;
+}
+
+void Parser::open_scope(char kind, const Location& where) {
+    if (scopes_.size() >= kMaxScopeDepth) fail(where, "scopes are nested deeper than " + std::to_string(kMaxScopeDepth));
+    scopes_.push_back({kind, state_, where});
+}
+
+void Parser::close_scope(char kind, const std::string& word, const Location& where) {
+    if (scopes_.empty() || scopes_.back().kind != kind)
+        fail(where, word + " does not match " + (scopes_.empty() ? "any open scope" : "the scope opened at " + scopes_.back().where.text()));
+    state_ = std::move(scopes_.back().state);
+    scopes_.pop_back();
+}
+
+void Parser::include(Tokenizer* tokens, const Location& where) {
+    const std::string reference = read_string(tokens, where, "Include");
+    const Result<std::string> name = normalise_reference(reference);
+    if (!name.ok()) fail(where, name.status().message());
+    if (include_depth_ >= kMaxIncludeDepth)
+        fail(where, "Include is nested deeper than " + std::to_string(kMaxIncludeDepth) + " files; does " + quoted(reference) + " include itself?");
+    ++include_depth_;
+    parse_file(*name, where);
+    --include_depth_;
+}
+
+void Parser::attribute(Tokenizer* tokens, const Location& where) {
+    const std::string target = read_string(tokens, where, "Attribute");
+    if (target != "shape" && target != "light" && target != "material" && target != "medium" && target != "texture")
+        fail(where, "Attribute " + quoted(target) + ": the target must be shape, light, material, medium or texture");
+    const std::string what = "Attribute " + quoted(target);
+    state_.attributes.try_emplace(target, ParameterList(where, what))
+        .first->second.override_with(ParameterList::parse(tokens, where, what));
+}
+
+void Parser::require_world(const Location& where, const std::string& word, bool wanted) const {
+    if (in_world_ == wanted) return;
+    fail(where, word + (wanted ? " must come after WorldBegin" : " must come before WorldBegin"));
+}
+
+ParameterList Parser::parameters(Tokenizer* tokens, const Location& where, const std::string& word,
+                                 const std::string& kind, const std::string& target) {
+    ParameterList list = ParameterList::parse(tokens, where, word + " " + quoted(kind));
+    if (const auto it = state_.attributes.find(target); it != state_.attributes.end()) list.add_defaults(it->second);
+    return list;
+}
+
+}  // namespace lightloom::import

@@ -1,0 +1,107 @@
+// The last pass: materials, textures and area lights of every shape, in file order.
+
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "common/core/math.h"
+#include "common/import/context.h"
+
+namespace lightloom::import {
+namespace {
+
+double triangle_area(const TriangleMesh& mesh, size_t first) {
+    const auto edge = [&](size_t i) {
+        const Vec3 &a = mesh.positions[mesh.indices[first]], &b = mesh.positions[mesh.indices[first + i]];
+        return std::array<double, 3>{double(b.x) - a.x, double(b.y) - a.y, double(b.z) - a.z};
+    };
+    const auto u = edge(1), v = edge(2);
+    const double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
+    return 0.5 * std::sqrt(x * x + y * y + z * z);
+}
+
+/// Index of an equal emission, or of a new one.
+int32_t add_emission(Context* context, const AreaEmission& emission) {
+    const auto key = std::make_tuple(emission.radiance.r, emission.radiance.g, emission.radiance.b, emission.two_sided);
+    const auto [it, inserted] = context->emission_index.try_emplace(key, int32_t(context->scene.emissions.size()));
+    if (inserted) context->scene.emissions.push_back(emission);
+    return it->second;
+}
+
+/// The part of `mesh` with the triangles listed.
+TriangleMesh subset(const TriangleMesh& mesh, const std::vector<size_t>& triangles) {
+    TriangleMesh out;
+    out.attributes = mesh.attributes;
+    std::map<uint32_t, uint32_t> renumbered;
+    for (const size_t first : triangles)
+        for (size_t k = 0; k < 3; ++k) {
+            const uint32_t old = mesh.indices[first + k];
+            const auto [it, inserted] = renumbered.try_emplace(old, uint32_t(out.positions.size()));
+            if (inserted) {
+                out.positions.push_back(mesh.positions[old]);
+                if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[old]);
+                if (!mesh.uvs.empty()) out.uvs.push_back(mesh.uvs[old]);
+            }
+            out.indices.push_back(it->second);
+        }
+    return out;
+}
+
+/// As in pbrt, every triangle of a mesh is a light of its own with the given power; triangles of equal area stay together.
+void add_powered_mesh(Context* context, TriangleMesh mesh, const PendingShape& shape) {
+    std::map<float, std::vector<size_t>> by_area;
+    for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+        const double area = triangle_area(mesh, i);
+        if (area > 0) by_area[float(area)].push_back(i);
+    }
+    const size_t count = mesh.indices.size() / 3;
+    if (count > 1)
+        context->diagnostics.warn(shape.where, "as in pbrt, each of the " + std::to_string(count) + " triangles of this light emits the given power");
+    for (const auto& [area, triangles] : by_area) {
+        TriangleMesh part = subset(mesh, triangles);
+        part.attributes.emission = add_emission(context, area_emission(context, *shape.area_light, double(area)));
+        context->scene.meshes.push_back(std::move(part));
+    }
+}
+
+void add_shape(Context* context, PendingShape shape) {
+    SceneDescription& scene = context->scene;
+    ObjectDefinition* object = shape.object == kNone ? nullptr : &scene.objects[size_t(shape.object)];
+    TriangleMesh* mesh = std::get_if<TriangleMesh>(&shape.geometry);
+    Sphere* sphere = std::get_if<Sphere>(&shape.geometry);
+    ShapeAttributes& attributes = mesh ? mesh->attributes : sphere->attributes;
+    attributes.source = shape.where.text();
+    attributes.material = resolve_material_reference(context, shape.material);
+    if (attributes.material == kInterfaceMaterial) {
+        if (shape.area_light)
+            context->diagnostics.warn(shape.where, "an area light on a shape with the \"interface\" material is ignored, as in pbrt");
+        return;
+    }
+    if (!shape.alpha_texture.empty()) attributes.alpha = named_float_texture(context, shape.where, shape.alpha_texture);
+    else if (shape.alpha != 1) attributes.alpha = constant_texture(context, Rgb(shape.alpha));
+    if (shape.area_light) {
+        const bool powered = area_light_uses_power(*shape.area_light);
+        if (powered && mesh) return add_powered_mesh(context, std::move(*mesh), shape);
+        const double area = sphere ? 4 * kPiD * double(sphere->radius) * sphere->radius : 0;
+        const AreaEmission emission = area_emission(context, *shape.area_light, area);
+        if (!emission.radiance.is_black()) attributes.emission = add_emission(context, emission);
+    }
+    if (mesh) (object ? object->meshes : scene.meshes).push_back(std::move(*mesh));
+    else (object ? object->spheres : scene.spheres).push_back(*sphere);
+}
+
+}  // namespace
+
+void resolve_shapes(Context* context) {
+    for (PendingShape& shape : context->shapes) add_shape(context, std::move(shape));
+    context->shapes.clear();
+    // Definitions that no shape uses are still checked: a typing error in them should not wait for their first use.
+    for (const auto& [name, definition] : context->named_materials)
+        resolve_material_reference(context, {true, name, 0, definition.parameters.where()});
+    for (size_t i = 1; i < context->anonymous_materials.size(); ++i)
+        resolve_material_reference(context, {false, "", int(i), context->anonymous_materials[i].parameters.where()});
+    for (const auto& [name, definition] : context->float_textures) named_float_texture(context, definition.parameters.where(), name);
+    for (const auto& [name, definition] : context->spectrum_textures) named_spectrum_texture(context, definition.parameters.where(), name);
+}
+
+}  // namespace lightloom::import

@@ -1,0 +1,114 @@
+#include "common/import/tessellate.h"
+
+#include <cmath>
+
+#include "common/core/math.h"
+
+namespace lightloom::import {
+
+std::optional<double> similarity_scale(const Mat4& m) {
+    if (m.m[3][0] != 0 || m.m[3][1] != 0 || m.m[3][2] != 0) return std::nullopt;
+    double dots[3][3];
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) dots[i][j] = m.m[0][i] * m.m[0][j] + m.m[1][i] * m.m[1][j] + m.m[2][i] * m.m[2][j];
+    const double mean = (dots[0][0] + dots[1][1] + dots[2][2]) / 3;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+            if (!(std::fabs(dots[i][j] - (i == j ? mean : 0)) <= 1e-5 * mean)) return std::nullopt;
+    return std::sqrt(mean) / std::fabs(m.m[3][3]);
+}
+
+TriangleMesh tessellate_disk(float radius, float inner_radius, float height) {
+    // The polygon of n corners at distance r' has the area n/2 r'^2 sin(2 pi / n); make it pi r^2.
+    const double angle = 2 * kPiD / kDiskSegments;
+    const double grow = std::sqrt(angle / math::sin(angle));
+    TriangleMesh mesh;
+    for (int i = 0; i <= kDiskSegments; ++i) {
+        const math::SinCos d = math::sincos_turns(double(i % kDiskSegments) / kDiskSegments);
+        const float u = float(i) / kDiskSegments;
+        for (const float r : {inner_radius, radius}) {
+            mesh.positions.push_back({float(d.cos * r * grow), float(d.sin * r * grow), height});
+            mesh.uvs.push_back({u, (radius - r) / (radius - inner_radius)});
+        }
+    }
+    for (uint32_t i = 0; i < kDiskSegments; ++i) {
+        const uint32_t a = 2 * i;  // inner, outer, next inner, next outer
+        if (inner_radius > 0) mesh.indices.insert(mesh.indices.end(), {a, a + 1, a + 2});
+        mesh.indices.insert(mesh.indices.end(), {a + 1, a + 3, a + 2});
+    }
+    return mesh;
+}
+
+TriangleMesh tessellate_sphere(float radius) {
+    constexpr int kSectors = 2 * kSphereRings;
+    TriangleMesh mesh;
+    for (int ring = 0; ring <= kSphereRings; ++ring) {
+        const float v = float(ring) / kSphereRings;
+        const math::SinCos theta = math::sincos_turns(0.5 * double(ring) / kSphereRings);
+        const double sine = ring == 0 || ring == kSphereRings ? 0 : theta.sin;
+        for (int sector = 0; sector <= kSectors; ++sector) {
+            const math::SinCos phi = math::sincos_turns(double(sector % kSectors) / kSectors);
+            const Vec3 n{float(sine * phi.cos), float(sine * phi.sin), float(-theta.cos)};
+            mesh.positions.push_back(n * radius);
+            mesh.normals.push_back(n);
+            mesh.uvs.push_back({float(sector) / kSectors, v});
+        }
+    }
+    for (uint32_t ring = 0; ring < kSphereRings; ++ring)
+        for (uint32_t sector = 0; sector < kSectors; ++sector) {
+            const uint32_t a = ring * (kSectors + 1) + sector, b = a + kSectors + 1;
+            if (ring > 0) mesh.indices.insert(mesh.indices.end(), {a, a + 1, b + 1});
+            if (ring + 1 < kSphereRings) mesh.indices.insert(mesh.indices.end(), {a, b + 1, b});
+        }
+    return mesh;
+}
+
+namespace {
+
+bool is_parallelogram(const Vec3* p) {
+    const Vec3 defect = p[0] - p[1] - p[2] + p[3];
+    return length_squared(defect) <= 1e-10f * (length_squared(p[1] - p[0]) + length_squared(p[2] - p[0]));
+}
+
+template <typename T>
+T bilinear(const T* c, float u, float v) {
+    return c[0] * ((1 - u) * (1 - v)) + c[1] * (u * (1 - v)) + c[2] * ((1 - u) * v) + c[3] * (u * v);
+}
+
+}  // namespace
+
+TriangleMesh tessellate_patches(const TriangleMesh& patches, bool* curved) {
+    constexpr Vec2 kCorners[4] = {{0, 0}, {1, 0}, {0, 1}, {1, 1}};
+    TriangleMesh mesh;
+    for (size_t face = 0; face + 3 < patches.indices.size(); face += 4) {
+        Vec3 p[4], n[4];
+        Vec2 uv[4];
+        for (size_t k = 0; k < 4; ++k) {
+            const uint32_t index = patches.indices[face + k];
+            p[k] = patches.positions[index];
+            if (!patches.normals.empty()) n[k] = patches.normals[index];
+            uv[k] = patches.uvs.empty() ? kCorners[k] : patches.uvs[index];
+        }
+        const bool flat = is_parallelogram(p) && patches.normals.empty();
+        *curved = *curved || !flat;
+        const uint32_t steps = flat ? 1 : kPatchSteps;
+        const uint32_t base = uint32_t(mesh.positions.size());
+        for (uint32_t j = 0; j <= steps; ++j)
+            for (uint32_t i = 0; i <= steps; ++i) {
+                const float u = float(i) / float(steps), v = float(j) / float(steps);
+                mesh.positions.push_back(bilinear(p, u, v));
+                if (!patches.normals.empty()) mesh.normals.push_back(bilinear(n, u, v));
+                const Vec3 texture = bilinear(std::array<Vec3, 4>{Vec3{uv[0].x, uv[0].y, 0}, Vec3{uv[1].x, uv[1].y, 0},
+                                                                  Vec3{uv[2].x, uv[2].y, 0}, Vec3{uv[3].x, uv[3].y, 0}}.data(), u, v);
+                mesh.uvs.push_back({texture.x, texture.y});
+            }
+        for (uint32_t j = 0; j < steps; ++j)
+            for (uint32_t i = 0; i < steps; ++i) {
+                const uint32_t a = base + j * (steps + 1) + i, b = a + steps + 1;
+                mesh.indices.insert(mesh.indices.end(), {a, a + 1, b + 1, a, b + 1, b});
+            }
+    }
+    return mesh;
+}
+
+}  // namespace lightloom::import

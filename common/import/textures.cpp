@@ -1,0 +1,210 @@
+// Texture directives and texture-valued parameters become TextureNodes.
+
+#include <charconv>
+#include <cmath>
+
+#include "common/import/context.h"
+#include "common/import/images.h"
+#include "common/import/spectra.h"
+
+namespace lightloom::import {
+namespace {
+
+/// Levels of textures that refer to textures, constants not counted: the evaluation recurses as deep.
+constexpr int kMaxNesting = 32;
+
+int nesting(const SceneDescription& scene, TextureId id) {
+    if (id == kNone) return 0;
+    const TextureNode& node = scene.textures[size_t(id)];
+    if (node.kind == TextureKind::kConstant || node.kind == TextureKind::kImage) return 1;
+    return 1 + std::max({nesting(scene, node.a), nesting(scene, node.b), nesting(scene, node.amount)});
+}
+
+TextureId add_node(Context* context, const TextureNode& node) {
+    context->scene.textures.push_back(node);
+    return TextureId(context->scene.textures.size()) - 1;
+}
+
+/// Reads a spectrum given by name, file or values; fails if there is none.
+Spectrum read_spectrum(Context* context, const Parameter& p, const std::string& what) {
+    if (!p.numbers.empty() && p.strings.empty()) {
+        if (auto spectrum = spectrum_from_pairs(p.numbers)) return *spectrum;
+        fail(p.where, what + ": the spectrum " + quoted(p.name) + " needs pairs of wavelength and value with increasing wavelengths");
+    }
+    if (p.strings.size() != 1 || !p.numbers.empty()) fail(p.where, what + ": the spectrum " + quoted(p.name) + " needs one name, one file or pairs of numbers");
+    const std::string text = context->read_file(p.where, p.strings[0]);
+    if (auto spectrum = parse_spectrum_text(text)) return *spectrum;
+    fail(p.where, what + ": " + quoted(p.strings[0]) + " is not a spectrum file (pairs of increasing wavelength and value)");
+}
+
+Rgb colour_of(Context* context, const Parameter& p, const std::string& what, ColourUse use) {
+    Rgb colour;
+    if (p.type == "rgb") {
+        if (p.numbers.size() != 3) fail(p.where, what + ": " + quoted("rgb " + p.name) + " needs three numbers");
+        colour = {float(p.numbers[0]), float(p.numbers[1]), float(p.numbers[2])};
+    } else if (use == ColourUse::kReflectance) {
+        colour = reflectance_rgb(read_spectrum(context, p, what));
+    } else {
+        colour = index_rgb(read_spectrum(context, p, what));
+    }
+    for (int c = 0; c < 3; ++c) {
+        if (colour[c] < 0) fail(p.where, what + ": " + quoted(p.name) + " is negative");
+        if (use == ColourUse::kReflectance && colour[c] > 1)
+            fail(p.where, what + ": " + quoted(p.name) + " is above 1; a reflectance must lie in [0, 1]");
+    }
+    return colour;
+}
+
+/// The (u, v) mapping parameters of 2D textures.
+void read_mapping(const ParameterList& parameters, TextureNode* node) {
+    parameters.one_choice("mapping", "uv", {"uv"});
+    node->su = parameters.one_float("uscale", 1);
+    node->sv = parameters.one_float("vscale", 1);
+    node->du = parameters.one_float("udelta", 0);
+    node->dv = parameters.one_float("vdelta", 0);
+}
+
+void read_encoding(const ParameterList& parameters, const std::string& fallback, ImageRequest* request) {
+    const std::string encoding = parameters.one_string("encoding", fallback);
+    request->srgb = encoding == "sRGB";
+    if (encoding == "sRGB" || encoding == "linear") return;
+    double gamma = 0;
+    if (encoding.rfind("gamma ", 0) != 0 || !parse_number(std::string_view(encoding).substr(6), &gamma) || !(gamma > 0) || gamma > 100)
+        fail(parameters.where(), parameters.what() + ": the encoding " + quoted(encoding) + " must be sRGB, linear or \"gamma VALUE\"");
+    request->gamma = float(gamma);
+}
+
+TextureId image_texture(Context* context, const ParameterList& parameters, bool is_float) {
+    TextureNode node;
+    node.kind = TextureKind::kImage;
+    read_mapping(parameters, &node);
+    node.scale = parameters.one_float("scale", 1);
+    node.invert = parameters.one_bool("invert", false);
+    const std::string wrap = parameters.one_choice("wrap", "repeat", {"repeat", "clamp", "black"});
+    node.wrap = wrap == "repeat" ? WrapMode::kRepeat : wrap == "clamp" ? WrapMode::kClamp : WrapMode::kBlack;
+    const std::string filter = parameters.one_choice("filter", "bilinear", {"point", "bilinear", "trilinear", "EWA", "ewa"});
+    node.nearest = filter == "point";
+    if (filter != "point" && filter != "bilinear")
+        context->diagnostics.warn(parameters.where(), parameters.what() + ": the filter " + quoted(filter) + " becomes bilinear; samples average the rest");
+    parameters.accept("maxanisotropy");  // Belongs to the EWA filter only.
+    const std::string reference = parameters.one_string("filename", "");
+    if (reference.empty()) fail(parameters.where(), parameters.what() + " has no \"string filename\"");
+    ImageRequest request;
+    request.channels = is_float ? ImageChannels::kScalar : ImageChannels::kColour;
+    read_encoding(parameters, "sRGB", &request);
+    node.image = context->load_image(parameters.where(), reference, request);
+    return add_node(context, node);
+}
+
+TextureId operand(Context* context, const ParameterList& parameters, std::string_view name, bool is_float, float fallback) {
+    const TextureId id = is_float ? float_texture_parameter(context, parameters, name)
+                                  : spectrum_texture_parameter(context, parameters, name, ColourUse::kUnbounded);
+    return id == kNone ? constant_texture(context, Rgb(fallback)) : id;
+}
+
+TextureId checkerboard(Context* context, const ParameterList& parameters, bool is_float) {
+    if (parameters.one_int("dimension", 2) != 2)
+        fail(parameters.where(), parameters.what() + ": only \"integer dimension\" 2 is supported");
+    TextureNode node;
+    node.kind = TextureKind::kCheckerboard;
+    read_mapping(parameters, &node);
+    node.a = operand(context, parameters, "tex1", is_float, 1);
+    node.b = operand(context, parameters, "tex2", is_float, 0);
+    return add_node(context, node);
+}
+
+TextureId make_texture(Context* context, const Definition& definition, bool is_float) {
+    const ParameterList& parameters = definition.parameters;
+    TextureNode node;
+    if (definition.kind == "constant") return operand(context, parameters, "value", is_float, 1);
+    if (definition.kind == "imagemap") return image_texture(context, parameters, is_float);
+    if (definition.kind == "checkerboard") return checkerboard(context, parameters, is_float);
+    if (definition.kind == "scale") {
+        node.kind = TextureKind::kScale;
+        node.a = operand(context, parameters, "tex", is_float, 1);
+        node.b = operand(context, parameters, "scale", true, 1);
+        return add_node(context, node);
+    }
+    if (definition.kind == "mix") {
+        node.kind = TextureKind::kMix;
+        node.a = operand(context, parameters, "tex1", is_float, 0);
+        node.b = operand(context, parameters, "tex2", is_float, 1);
+        node.amount = operand(context, parameters, "amount", true, 0.5f);
+        return add_node(context, node);
+    }
+    fail(parameters.where(), parameters.what() + " is not supported; use constant, scale, mix, checkerboard or imagemap");
+}
+
+/// Marks a texture that is being resolved, so that a cycle is found.
+constexpr TextureId kInProgress = -2;
+
+TextureId named_texture(Context* context, const Location& where, const std::string& name, bool is_float) {
+    auto& resolved = is_float ? context->resolved_float_textures : context->resolved_spectrum_textures;
+    const auto& definitions = is_float ? context->float_textures : context->spectrum_textures;
+    const auto& others = is_float ? context->spectrum_textures : context->float_textures;
+    const std::string type = is_float ? "float" : "spectrum";
+    if (const auto it = resolved.find(name); it != resolved.end()) {
+        if (it->second == kInProgress) fail(where, "the texture " + quoted(name) + " refers to itself");
+        return it->second;
+    }
+    const auto it = definitions.find(name);
+    if (it == definitions.end()) {
+        fail(where, "no " + type + " texture is named " + quoted(name) +
+                        (others.count(name) ? "; the texture of this name has the other type" : "; define it with Texture"));
+    }
+    if (resolved.size() > 100000) fail(where, "the scene has more than 100000 textures");
+    resolved[name] = kInProgress;
+    if (++context->texture_depth > kMaxNesting) fail(where, "textures refer to one another more than 32 levels deep");
+    const TextureId id = make_texture(context, it->second, is_float);
+    --context->texture_depth;
+    it->second.parameters.finish();
+    resolved[name] = id;
+    return id;
+}
+
+}  // namespace
+
+TextureId constant_texture(Context* context, const Rgb& value) {
+    const auto [it, inserted] = context->constants.try_emplace({value.r, value.g, value.b}, kNone);
+    if (inserted) {
+        TextureNode node;
+        node.value = value;
+        it->second = add_node(context, node);
+    }
+    return it->second;
+}
+
+TextureId named_float_texture(Context* context, const Location& where, const std::string& name) {
+    return named_texture(context, where, name, true);
+}
+
+TextureId named_spectrum_texture(Context* context, const Location& where, const std::string& name) {
+    return named_texture(context, where, name, false);
+}
+
+TextureId float_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name) {
+    if (const Parameter* p = parameters.find("texture", name)) {
+        if (p->strings.size() != 1) fail(p->where, parameters.what() + ": " + quoted(p->name) + " needs one texture name");
+        return named_float_texture(context, p->where, p->strings[0]);
+    }
+    if (!parameters.find("float", name)) return kNone;
+    return constant_texture(context, Rgb(parameters.one_float(name, 0)));
+}
+
+TextureId spectrum_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name, ColourUse use) {
+    if (const Parameter* p = parameters.find("texture", name)) {
+        if (p->strings.size() != 1) fail(p->where, parameters.what() + ": " + quoted(p->name) + " needs one texture name");
+        return named_spectrum_texture(context, p->where, p->strings[0]);
+    }
+    for (const std::string_view type : {"rgb", "spectrum"})
+        if (const Parameter* p = parameters.find(type, name)) return constant_texture(context, colour_of(context, *p, parameters.what(), use));
+    return kNone;
+}
+
+std::optional<Spectrum> spectrum_parameter(Context* context, const ParameterList& parameters, std::string_view name) {
+    const Parameter* p = parameters.find("spectrum", name);
+    if (!p) return std::nullopt;
+    return read_spectrum(context, *p, parameters.what());
+}
+
+}  // namespace lightloom::import

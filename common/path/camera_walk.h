@@ -1,0 +1,79 @@
+#pragma once
+// The camera sub-path: where samples of a pixel are placed, and the walk from the lens.
+
+#include "common/core/low_discrepancy.h"
+#include "common/path/connect.h"
+
+namespace lightloom {
+
+/// Random numbers of one camera sample: keyed by (seed, iteration, pixel). The film position, the lens and the first
+/// scattering and next event come from low-discrepancy sequences over the iterations of a pixel; the rest is independent.
+class CameraSampler {
+  public:
+    CameraSampler(uint64_t seed, uint64_t iteration, uint64_t pixel)
+        : rng_({seed, Stage::kCamera, iteration, pixel}),
+          scramble_(Rng({seed, Stage::kPixelScramble, 0, pixel}).next_u64()),
+          index_(uint32_t(iteration)) {}
+
+    Vec2 film() { return low_discrepancy_point(index_, scramble_); }
+    Vec2 lens() { return low_discrepancy_point(index_, scramble_ + 1); }
+    /// For the scattering at z_{t-1}.
+    ScatterSample scattering(int t) {
+        const Vec2 u = rng_.uniform2();
+        lobe_rest_ = u.y;
+        if (t == 2) return {u.x, low_discrepancy_point(index_, scramble_ + 2)};
+        return {u.x, rng_.uniform2()};
+    }
+    /// A uniform that comes for free with scattering().
+    float roulette() const { return lobe_rest_; }
+    Vec2 next_event(int t) { return t == 2 ? low_discrepancy_point(index_, scramble_ + 3) : rng_.uniform2(); }
+    Rng& rng() { return rng_; }
+
+  private:
+    Rng rng_;
+    uint64_t scramble_;
+    uint32_t index_;
+    float lobe_rest_ = 0;
+};
+
+/// Walks from the lens through the film position (px, py) + sampler.film(). `z` has room for max_edges + 2 vertices.
+/// After each arrival `visit(t)` is called with z[0 .. t-1] complete (material resolved unless nothing can follow), before
+/// the vertex scatters: next event and emitter hits belong there. `escape(t, ray)` is called when the sub-path of t
+/// vertices leaves the scene. Returns the number of vertices.
+template <class Visit, class Escape>
+int trace_camera_path(const Scene& scene, CameraSampler& sampler, int px, int py, int max_edges, const RouletteRule& rule,
+                      PathVertex* z, WalkCounters* counters, Visit&& visit, Escape&& escape) {
+    const Vec2 jitter = sampler.film();
+    const Camera::CameraRay lens_ray =
+        scene.camera().sample_ray({float(px) + jitter.x, float(py) + jitter.y}, sampler.lens());
+    WalkRay ray{lens_ray.origin, lens_ray.direction, Rgb(1.0f), lens_ray.pdf_solid_angle, false, true};
+    z[0].p = ray.origin;
+    z[0].alpha = ray.alpha;
+    z[0].delta = false;
+    int t = 1;
+    while (true) {
+        SurfacePoint point;
+        ++counters->rays;
+        if (!scene.intersect(ray.origin, ray.direction, &point)) {
+            escape(t, ray);
+            break;
+        }
+        PathVertex& v = z[t];
+        arrive<TransportMode::kRadiance>(ray, z[t - 1].p, z[t - 1].ng, t > 1, point, &v);
+        if (!(v.fwd > 0)) break;
+        ++t;
+        ++counters->vertices;
+        if (t > max_edges) {  // only an emitter hit can still be counted: k = t - 1
+            v.bsdf.kind = BsdfKind::kNull;
+            visit(t);
+            break;
+        }
+        v.bsdf = scene.bsdf_at(point);
+        visit(t);
+        if (!leave<TransportMode::kRadiance>(&v, &z[t - 2], sampler.scattering(t), &ray)) break;
+        if (!survive(rule, t, 1.0f, sampler.roulette(), &ray.alpha)) break;
+    }
+    return t;
+}
+
+}  // namespace lightloom

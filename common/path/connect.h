@@ -1,0 +1,179 @@
+#pragma once
+// The four ways to complete a path, each as: the unweighted contribution, and the PathView of the full path. Visibility is
+// tested here, the weight is not computed here. All functions return a black contribution when the technique fails.
+//
+// Camera sub-path z[0..t-1] (z_0 on the lens), light sub-path y[0..s-1]; the full path has k = s + t - 1 edges,
+// x_i = y_i for i < s and x_{k-j} = z_j for j < t.
+
+#include "common/path/path_view.h"
+#include "common/path/random_walk.h"
+#include "common/path/vertex.h"
+
+namespace lightloom {
+
+/// Copies what a light prefix of s vertices knows of itself: all of fwd, and rev up to x_{s-3}.
+inline void view_light_prefix(const PathVertex* y, int s, PathView* view) {
+    for (int i = 0; i < s; ++i) {
+        view->fwd[i] = y[i].fwd;
+        view->rev[i] = y[i].rev;
+        view->delta[i] = y[i].delta;
+    }
+}
+
+/// Copies what a camera suffix of t vertices knows of itself: all of rev, and fwd for x_{s+2} and later.
+inline void view_camera_suffix(const PathVertex* z, int t, int k, PathView* view) {
+    for (int j = 1; j < t; ++j) {
+        view->rev[k - j] = z[j].fwd;
+        view->fwd[k - j] = z[j].rev;
+        view->delta[k - j] = z[j].delta;
+    }
+}
+
+/// Which entries of the PathView a caller's techniques read: all, or only those of x_0 and x_1 (s = 0 and s = 1, where
+/// filling in the rest would cost more than the weight).
+enum class ViewDetail : uint8_t { kFull, kLightEnd };
+
+template <ViewDetail detail>
+void view_suffix(const PathVertex* z, int t, int k, PathView* view) {
+    if constexpr (detail == ViewDetail::kFull) {
+        view_camera_suffix(z, t, k, view);
+    } else {
+        for (int j = t - 1; j >= 1 && j >= t - 2; --j) {
+            view->rev[k - j] = z[j].fwd;
+            view->delta[k - j] = z[j].delta;
+        }
+    }
+}
+
+/// s = 0: the camera sub-path's last vertex z_{t-1} lies on an emitter. t >= 2.
+template <ViewDetail detail = ViewDetail::kFull>
+Rgb emitter_hit(const Scene& scene, const PathVertex* z, int t, PathView* view) {
+    const PathVertex& v = z[t - 1];
+    const EmitterSet& emitters = scene.emitters();
+    const Emitter& e = emitters[uint32_t(v.emitter)];
+    const Rgb radiance = emitters.emitted(e, v.ng, v.wo);
+    if (radiance.is_black()) return {};
+    const int k = t - 1;
+    view->k = k;
+    view_suffix<detail>(z, t, k, view);
+    view->delta[0] = false;
+    view->fwd[0] = emitters.pdf_position(e, v.wo);
+    if (k >= 2) {
+        view->fwd[1] = double(emitters.pdf_direction(e, v.ng, v.wo)) * v.to_previous;
+        view->next_event = emitters.pdf_next_event(e, z[t - 2].p, v.p, v.ng, -v.wo);
+    }
+    return v.alpha * radiance;
+}
+
+/// s = 0, environment: the camera sub-path of t vertices leaves the scene along `ray`; x_0 is the direction.
+template <ViewDetail detail = ViewDetail::kFull>
+Rgb environment_hit(const Scene& scene, const PathVertex* z, int t, const WalkRay& ray, PathView* view) {
+    const EmitterSet& emitters = scene.emitters();
+    if (emitters.environment_index() == kNone) return {};
+    const Emitter& e = emitters[uint32_t(emitters.environment_index())];
+    const Rgb radiance = emitters.emitted(e, {}, -ray.direction);
+    if (radiance.is_black()) return {};
+    const int k = t;
+    view->k = k;
+    view_suffix<detail>(z, t, k, view);
+    view->delta[0] = false;
+    view->rev[0] = ray.pdf;
+    view->fwd[0] = emitters.pdf_position(e, -ray.direction);
+    if (k >= 2) {
+        view->fwd[1] = double(emitters.pdf_direction(e, {}, -ray.direction)) * abs_dot(z[t - 1].ng, ray.direction);
+        view->next_event = view->fwd[0];
+    }
+    return ray.alpha * radiance;
+}
+
+/// s = 1: next event estimation from z_{t-1}, t >= 2, with x_0 = `light` chosen by EmitterSet::sample_next_event().
+template <ViewDetail detail = ViewDetail::kFull>
+Rgb next_event(const Scene& scene, const PathVertex* z, int t, const NextEventSample& light, PathView* view,
+               WalkCounters* counters) {
+    const PathVertex& v = z[t - 1];
+    const EmitterSet& emitters = scene.emitters();
+    const Scatter s = scatter<TransportMode::kRadiance>(v, light.wi);
+    const Rgb contribution = v.alpha * s.value * light.radiance * (light.geometry / light.pdf);
+    if (contribution.is_black()) return {};
+    const Emitter& e = emitters[light.emitter];
+    ++counters->rays;
+    ++counters->connections;
+    if (e.is_area() ? scene.occluded(v.p, v.ng, light.position, light.normal) : scene.occluded(v.p, v.ng, light.position))
+        return {};
+    const int k = t;
+    view->k = k;
+    view_suffix<detail>(z, t, k, view);
+    view->delta[0] = view->delta[1] = false;
+    view->rev[0] = e.is_delta() ? 0.0 : double(s.pdf_fwd) * light.geometry;
+    view->fwd[0] = emitters.pdf_position(e, -light.wi);
+    view->next_event = light.pdf;
+    const float receiver = abs_dot(v.ng, light.wi);
+    const float inv_d2 = e.is_infinite() ? 1.0f : 1 / length_squared(light.position - v.p);
+    view->fwd[1] = double(emitters.pdf_direction(e, light.normal, -light.wi)) * (receiver * inv_d2);
+    if (k >= 3) view->fwd[2] = double(s.pdf_rev) * v.to_previous;
+    return contribution;
+}
+
+/// 2 <= s, 2 <= t: connects y_{s-1} and z_{t-1}.
+inline Rgb connect(const Scene& scene, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view,
+                   WalkCounters* counters) {
+    const PathVertex &a = y[s - 1], &b = z[t - 1];
+    const Vec3 d = a.p - b.p;
+    const float d2 = length_squared(d);
+    if (!(d2 > 0)) return {};
+    const float inv_d2 = 1 / d2;
+    const Vec3 w = d * std::sqrt(inv_d2);  // from the camera side to the light side
+    const Scatter at_camera = scatter<TransportMode::kRadiance>(b, w);
+    if (at_camera.value.is_black()) return {};
+    const Scatter at_light = scatter<TransportMode::kImportance>(a, -w);
+    const Rgb contribution = b.alpha * at_camera.value * a.alpha * at_light.value * inv_d2;
+    if (contribution.is_black()) return {};
+    ++counters->rays;
+    ++counters->connections;
+    if (scene.occluded(b.p, b.ng, a.p, a.ng)) return {};
+    const int k = s + t - 1;
+    view->k = k;
+    view_light_prefix(y, s, view);
+    view_camera_suffix(z, t, k, view);
+    view->delta[s - 1] = view->delta[s] = false;
+    view->rev[s - 1] = double(at_camera.pdf_fwd) * (abs_dot(a.ng, w) * inv_d2);
+    view->rev[s - 2] = double(at_light.pdf_rev) * a.to_previous;
+    view->fwd[s] = double(at_light.pdf_fwd) * (abs_dot(b.ng, w) * inv_d2);
+    if (t >= 3) view->fwd[s + 1] = double(at_camera.pdf_rev) * b.to_previous;
+    // Next event would have chosen x_0 from x_1; both are on the light sub-path.
+    const Emitter& e = scene.emitters()[uint32_t(y[0].emitter)];
+    view->next_event = scene.emitters().pdf_next_event(e, y[1].p, y[0].p, y[0].ng, y[1].wo);
+    return contribution;
+}
+
+/// t = 1: connects y_{s-1}, s >= 2, to `lens_point` of Camera::sample_lens(). `film` receives the film position.
+inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, const Vec3& lens_point, Vec2* film, PathView* view,
+                             WalkCounters* counters) {
+    const PathVertex& a = y[s - 1];
+    const Vec3 d = a.p - lens_point;
+    const float d2 = length_squared(d);
+    if (!(d2 > 0)) return {};
+    const Vec3 w = d / std::sqrt(d2);
+    float pdf = 0;
+    if (!scene.camera().project(lens_point, w, film, &pdf)) return {};
+    const Rect& crop = scene.frame().crop;
+    if (!crop.contains(int(film->x), int(film->y))) return {};
+    const Scatter at_light = scatter<TransportMode::kImportance>(a, -w);
+    // The camera's We cos / d^2 equals its density of the direction, by the measure convention of camera.h.
+    const Rgb contribution = a.alpha * at_light.value * (pdf / d2);
+    if (contribution.is_black()) return {};
+    ++counters->rays;
+    ++counters->connections;
+    if (scene.occluded(a.p, a.ng, lens_point)) return {};
+    const int k = s;
+    view->k = k;
+    view_light_prefix(y, s, view);
+    view->delta[s - 1] = false;
+    view->rev[s - 1] = double(pdf) * (abs_dot(a.ng, w) / d2);
+    view->rev[s - 2] = double(at_light.pdf_rev) * a.to_previous;
+    const Emitter& e = scene.emitters()[uint32_t(y[0].emitter)];
+    view->next_event = scene.emitters().pdf_next_event(e, y[1].p, y[0].p, y[0].ng, y[1].wo);
+    return contribution;
+}
+
+}  // namespace lightloom

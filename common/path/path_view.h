@@ -1,0 +1,34 @@
+#pragma once
+// PathView: everything that a weight may know about a full path x_0 (light) ... x_k (camera), the same whichever technique
+// produced the path. [algorithms.md section 0 defines C(s), A(s) and the effective densities]
+
+#include <cstdint>
+
+namespace lightloom {
+
+/// Longest path, in edges. Scenes that ask for more are refused by name.
+inline constexpr int kMaxEdges = 256;
+
+struct PathView {
+    int k = 0;  ///< Edges; k + 1 vertices. Entries 0 .. k-1 of the arrays are valid.
+    /// Density of x_i when traced from the light: pL[0] native measure of the emitter with its pmf, otherwise area (m^-2).
+    /// At a vertex that scattered by a Dirac lobe the next density is discrete pmf times the same geometry.
+    double fwd[kMaxEdges + 1];
+    /// Density of x_i when traced from the camera: pE[k-1] is the camera's density of the primary vertex for one pixel.
+    double rev[kMaxEdges + 1];
+    /// x_i's scattering event is a Dirac lobe (0 < i < k); false at both ends.
+    bool delta[kMaxEdges + 1];
+    /// Density of x_0 under next event estimation from x_1, native measure, pmf included.
+    double next_event = 0;
+};
+
+/// How a path was made. kConnect covers s = 0 (emitter hit), s = 1 (next event), 2 <= s <= k-1 and s = k (t = 1).
+enum class TechniqueKind : uint8_t { kConnect, kMerge };
+
+struct Technique {
+    TechniqueKind kind = TechniqueKind::kConnect;
+    /// kConnect: the number of light vertices s. kMerge: the index i of the vertex at which both sub-paths met.
+    int s = 0;
+};
+
+}  // namespace lightloom

@@ -1,0 +1,147 @@
+#pragma once
+// The random walk of both sub-paths.
+//
+// Russian roulette divides the throughput by the true survival probability and stays out of every density: the weights
+// are a function of the path alone, and roulette is the same function of a sub-path's own throughput for every technique.
+
+#include "common/core/rng.h"
+#include "common/path/path_view.h"
+#include "common/path/vertex.h"
+
+namespace lightloom {
+
+struct RouletteRule {
+    int first_vertex = 4;                 ///< Sub-path vertices with a smaller index always go on.
+    float min_survival = 0.05f, max_survival = 0.95f;
+};
+
+/// Uniforms that one scattering event consumes.
+struct ScatterSample {
+    float lobe;
+    Vec2 direction;
+};
+
+/// State of a walk between two vertices.
+struct WalkRay {
+    Vec3 origin, direction;
+    Rgb alpha;                  ///< Throughput carried along the ray.
+    double pdf = 0;             ///< Density of the direction, solid angle; for an infinite light: area on its disc.
+    bool from_infinite = false;
+    bool previous_hittable = true;  ///< False leaving a light that cannot be hit: its reverse density is zero.
+};
+
+struct WalkCounters {
+    uint64_t rays = 0, vertices = 0, connections = 0;
+};
+
+/// Fills in geometry of the next vertex `v` reached by `ray` from `previous`; everything but the material.
+template <TransportMode mode>
+void arrive(const WalkRay& ray, const Vec3& previous_p, const Vec3& previous_ng, bool previous_on_surface,
+            const SurfacePoint& point, PathVertex* v) {
+    v->p = point.p;
+    v->ng = point.ng;
+    v->shading = point.shading;
+    v->wo = -ray.direction;
+    v->wo_local = point.shading.to_local(v->wo);
+    v->alpha = ray.alpha;
+    v->emitter = point.emitter;
+    v->delta = false;
+    v->rev = 0;
+    const float cosine = abs_dot(v->ng, v->wo);
+    if (ray.from_infinite) {
+        v->fwd = ray.pdf * cosine;
+        v->to_previous = ray.previous_hittable ? 1.0f : 0.0f;
+    } else {
+        const float inv_d2 = 1 / length_squared(point.p - previous_p);
+        v->fwd = ray.pdf * (cosine * inv_d2);
+        v->to_previous = !ray.previous_hittable    ? 0
+                         : previous_on_surface ? abs_dot(previous_ng, v->wo) * inv_d2
+                                               : inv_d2;
+    }
+    v->adjoint = mode == TransportMode::kImportance ? std::fabs(v->wo_local.z) / cosine : 1.0f;
+}
+
+/// Lets `v` scatter: chooses the next ray, sets v->delta and the predecessor's reverse density. False when the walk ends.
+template <TransportMode mode>
+bool leave(PathVertex* v, PathVertex* previous, const ScatterSample& u, WalkRay* ray) {
+    BsdfSample s;
+    if (!v->bsdf.sample(v->wo_local, u.lobe, u.direction, mode, &s)) return false;
+    ray->direction = v->shading.to_world(s.wi);
+    Rgb weight = s.weight;
+    if constexpr (mode == TransportMode::kImportance) {
+        const float shading_cosine = std::fabs(s.wi.z);
+        if (!(shading_cosine > 0)) return false;
+        weight *= v->adjoint * (abs_dot(ray->direction, v->ng) / shading_cosine);  // [Veach 1997, eq. 5.19]
+    }
+    ray->alpha = v->alpha * weight;
+    if (ray->alpha.is_black()) return false;
+    v->delta = s.delta;
+    previous->rev = double(s.pdf_rev) * v->to_previous;
+    ray->pdf = s.pdf_fwd;
+    ray->origin = offset_origin(v->p, v->ng, ray->direction);
+    ray->from_infinite = false;
+    ray->previous_hittable = true;
+    return true;
+}
+
+/// False when roulette ends the walk; otherwise the throughput is divided by the survival probability.
+/// `start` is the throughput that the sub-path began with.
+inline bool survive(const RouletteRule& rule, int vertex_index, float start, float u, Rgb* alpha) {
+    if (vertex_index < rule.first_vertex) return true;
+    const float q = clamp(scalar_of(*alpha) / start, rule.min_survival, rule.max_survival);
+    if (u >= q) return false;
+    *alpha *= 1 / q;
+    return true;
+}
+
+/// Start of a light sub-path at path[0] and the ray that leaves it. False when nothing is emitted.
+inline bool start_light_path(const Scene& scene, Rng& rng, PathVertex* y0, WalkRay* ray) {
+    EmissionSample s;
+    const double pick = rng.uniform_double();
+    const Vec2 u_position = rng.uniform2(), u_direction = rng.uniform2();
+    if (!scene.emitters().sample_emission(pick, u_position, u_direction, &s)) return false;
+    const Emitter& e = scene.emitters()[s.emitter];
+    y0->p = s.position;
+    y0->ng = s.normal;
+    y0->emitter = int32_t(s.emitter);
+    y0->alpha = s.alpha;
+    y0->fwd = s.pdf_position;
+    y0->rev = 0;
+    y0->delta = false;
+    ray->direction = s.direction;
+    ray->alpha = s.alpha;
+    ray->pdf = s.pdf_direction;
+    ray->from_infinite = e.is_infinite();
+    ray->previous_hittable = !e.is_delta();
+    ray->origin = e.is_area() ? offset_origin(s.position, s.normal, s.direction) : s.position;
+    return true;
+}
+
+/// Traces a light sub-path into `path` (room for `max_vertices`); returns the number of vertices, y_0 included. Vertices
+/// whose own event was a Dirac lobe are kept (marked) because later vertices need them.
+inline int trace_light_path(const Scene& scene, Rng& rng, int max_vertices, const RouletteRule& rule, PathVertex* path,
+                            WalkCounters* counters) {
+    WalkRay ray;
+    if (max_vertices < 2 || !start_light_path(scene, rng, &path[0], &ray)) return 0;
+    const bool area = scene.emitters()[uint32_t(path[0].emitter)].is_area();
+    const float start = scalar_of(ray.alpha);
+    int n = 1;
+    while (true) {
+        SurfacePoint point;
+        ++counters->rays;
+        if (!scene.intersect(ray.origin, ray.direction, &point)) break;
+        PathVertex& v = path[n];
+        arrive<TransportMode::kImportance>(ray, path[n - 1].p, path[n - 1].ng, n > 1 || area, point, &v);
+        if (!(v.fwd > 0) || !std::isfinite(v.adjoint)) break;
+        v.bsdf = scene.bsdf_at(point);
+        ++counters->vertices;
+        ++n;
+        if (n >= max_vertices) break;
+        const Vec2 u1 = rng.uniform2(), u2 = rng.uniform2();
+        if (!leave<TransportMode::kImportance>(&v, &path[n - 2], {u1.x, u2}, &ray)) break;
+        if (!survive(rule, n, start, u1.y, &ray.alpha)) break;
+    }
+    return n;
+}
+
+}  // namespace lightloom

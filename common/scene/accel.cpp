@@ -1,0 +1,278 @@
+#include "common/scene/accel.h"
+
+#include <embree3/rtcore.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstring>
+
+#include "common/core/rng.h"
+
+namespace lightloom {
+namespace {
+
+std::atomic<int64_t> g_device_memory{0};
+
+bool count_memory(void* user, ssize_t bytes, bool) {
+    static_cast<std::atomic<int64_t>*>(user)->fetch_add(bytes, std::memory_order_relaxed);
+    return true;
+}
+
+/// One device for the process: pinned instruction set, single-threaded builds.
+struct Device {
+    RTCDevice handle = rtcNewDevice("isa=avx2,threads=1,set_affinity=0,start_threads=0");
+    Device() {
+        if (handle != nullptr) rtcSetDeviceMemoryMonitorFunction(handle, count_memory, &g_device_memory);
+    }
+    ~Device() {
+        if (handle != nullptr) rtcReleaseDevice(handle);
+    }
+};
+
+RTCDevice device() {
+    static Device d;
+    return d.handle;
+}
+
+struct GeometryUser {
+    const void* opacity_user = nullptr;
+    Accel::Opacity opacity = nullptr;
+    int32_t object = -1;        // -1: the world, otherwise index into SceneDescription::objects
+    uint32_t geometry = 0;      // index of the mesh in its object
+};
+
+struct SphereUser {
+    const std::vector<Sphere>* spheres = nullptr;
+    GeometryUser filter;
+};
+
+/// Uniform in [0, 1) from the bits of a ray and a primitive.
+float ray_hash(float ox, float oy, float oz, float dx, float dy, float dz, uint64_t primitive) {
+    const auto bits = [](float a, float b) {
+        return (uint64_t(std::bit_cast<uint32_t>(a)) << 32) | std::bit_cast<uint32_t>(b);
+    };
+    uint64_t h = mix64(bits(ox, oy) + 0x9e3779b97f4a7c15ull);
+    h = mix64(h ^ bits(oz, dx));
+    h = mix64(h ^ bits(dy, dz));
+    h = mix64(h ^ primitive);
+    return float(h >> 40) * 0x1p-24f;
+}
+
+/// `salt` tells apart the crossings of one primitive (the two of a sphere).
+bool passes_through(const GeometryUser& g, uint32_t primitive, uint32_t salt, float u, float v, const RTCRay& ray) {
+    const float opacity = g.opacity(g.opacity_user, g.object, g.geometry, primitive, u, v);
+    if (opacity >= 1) return false;
+    if (opacity <= 0) return true;
+    const uint64_t id = (uint64_t(g.geometry * 2 + salt) << 32) | primitive;
+    return ray_hash(ray.org_x, ray.org_y, ray.org_z, ray.dir_x, ray.dir_y, ray.dir_z, id) >= opacity;
+}
+
+void alpha_filter(const RTCFilterFunctionNArguments* args) {
+    if (args->valid[0] == 0) return;
+    const auto& g = *static_cast<const GeometryUser*>(args->geometryUserPtr);
+    const RTCRay& ray = *reinterpret_cast<const RTCRay*>(args->ray);
+    const RTCHit& hit = *reinterpret_cast<const RTCHit*>(args->hit);
+    if (passes_through(g, hit.primID, 0, hit.u, hit.v, ray)) args->valid[0] = 0;
+}
+
+void sphere_bounds(const RTCBoundsFunctionArguments* args) {
+    const Sphere& s = (*static_cast<const SphereUser*>(args->geometryUserPtr)->spheres)[args->primID];
+    const float r = s.radius * 1.00001f;
+    *args->bounds_o = {s.centre.x - r, s.centre.y - r, s.centre.z - r, 0, s.centre.x + r, s.centre.y + r, s.centre.z + r, 0};
+}
+
+/// Both roots in double: a sphere of glass is hit from inside at grazing angles, where float cancels. `t` ascending.
+int sphere_roots(const Sphere& s, const RTCRay& ray, double t[2]) {
+    const double ox = double(ray.org_x) - s.centre.x, oy = double(ray.org_y) - s.centre.y, oz = double(ray.org_z) - s.centre.z;
+    const double dx = ray.dir_x, dy = ray.dir_y, dz = ray.dir_z, r = s.radius;
+    const double a = dx * dx + dy * dy + dz * dz;
+    const double b = ox * dx + oy * dy + oz * dz;
+    // The discriminant through the perpendicular from the centre, which does not cancel far from the sphere.
+    const double px = ox - b / a * dx, py = oy - b / a * dy, pz = oz - b / a * dz;
+    const double discriminant = r * r - (px * px + py * py + pz * pz);
+    if (discriminant < 0) return 0;
+    const double root = std::sqrt(a * discriminant);
+    const double c = ox * ox + oy * oy + oz * oz - r * r;
+    const double q = b > 0 ? -b - root : -b + root;
+    if (q == 0) return 0;
+    t[0] = q / a, t[1] = c / q;
+    if (t[0] > t[1]) std::swap(t[0], t[1]);
+    return 2;
+}
+
+void sphere_intersect(const RTCIntersectFunctionNArguments* args) {
+    if (args->valid[0] == 0) return;
+    const auto& user = *static_cast<const SphereUser*>(args->geometryUserPtr);
+    auto& rayhit = *reinterpret_cast<RTCRayHit*>(args->rayhit);
+    double t[2];
+    const int n = sphere_roots((*user.spheres)[args->primID], rayhit.ray, t);
+    for (int i = 0; i < n; ++i) {
+        if (!(t[i] > rayhit.ray.tnear && t[i] < rayhit.ray.tfar)) continue;
+        const float t_hit = float(t[i]);
+        if (user.filter.opacity != nullptr && passes_through(user.filter, args->primID, uint32_t(i), 0, 0, rayhit.ray)) continue;
+        rayhit.ray.tfar = t_hit;
+        rayhit.hit.geomID = args->geomID;
+        rayhit.hit.primID = args->primID;
+        rayhit.hit.instID[0] = args->context->instID[0];
+        rayhit.hit.u = rayhit.hit.v = 0;
+        rayhit.hit.Ng_x = rayhit.hit.Ng_y = rayhit.hit.Ng_z = 0;
+        return;
+    }
+}
+
+void sphere_occluded(const RTCOccludedFunctionNArguments* args) {
+    if (args->valid[0] == 0) return;
+    const auto& user = *static_cast<const SphereUser*>(args->geometryUserPtr);
+    auto& ray = *reinterpret_cast<RTCRay*>(args->ray);
+    double t[2];
+    const int n = sphere_roots((*user.spheres)[args->primID], ray, t);
+    for (int i = 0; i < n; ++i) {
+        if (!(t[i] > ray.tnear && t[i] < ray.tfar)) continue;
+        if (user.filter.opacity != nullptr && passes_through(user.filter, args->primID, uint32_t(i), 0, 0, ray)) continue;
+        ray.tfar = -INFINITY;
+        return;
+    }
+}
+
+}  // namespace
+
+struct Accel::Impl {
+    RTCScene world = nullptr;
+    std::vector<RTCScene> objects;
+    std::vector<std::unique_ptr<GeometryUser>> geometry_users;
+    std::vector<std::unique_ptr<SphereUser>> sphere_users;
+    uint32_t first_instance_id = 0;
+    uint64_t memory = 0;
+
+    ~Impl() {
+        if (world != nullptr) rtcReleaseScene(world);
+        for (RTCScene s : objects) rtcReleaseScene(s);
+    }
+
+    void add_meshes(RTCScene scene, const std::vector<TriangleMesh>& meshes, int32_t object, Opacity opacity, const void* user) {
+        for (uint32_t i = 0; i < meshes.size(); ++i) {
+            const TriangleMesh& mesh = meshes[i];
+            RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+            rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.positions.data(), 0, sizeof(Vec3),
+                                       mesh.positions.size() - 1);  // the last one is padding
+            rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices.data(), 0,
+                                       3 * sizeof(uint32_t), mesh.indices.size() / 3);
+            if (mesh.attributes.alpha != kNone) {
+                geometry_users.push_back(std::make_unique<GeometryUser>(GeometryUser{user, opacity, object, i}));
+                rtcSetGeometryUserData(g, geometry_users.back().get());
+                rtcSetGeometryIntersectFilterFunction(g, alpha_filter);
+                rtcSetGeometryOccludedFilterFunction(g, alpha_filter);
+            }
+            rtcCommitGeometry(g);
+            rtcAttachGeometryByID(scene, g, i);
+            rtcReleaseGeometry(g);
+        }
+    }
+
+    void add_spheres(RTCScene scene, const std::vector<Sphere>& spheres, uint32_t id, int32_t object, Opacity opacity,
+                         const void* user) {
+        if (spheres.empty()) return;
+        bool any_alpha = false;
+        for (const Sphere& s : spheres) any_alpha |= s.attributes.alpha != kNone;
+        sphere_users.push_back(std::make_unique<SphereUser>());
+        sphere_users.back()->spheres = &spheres;
+        if (any_alpha) sphere_users.back()->filter = GeometryUser{user, opacity, object, kSphereGeometry};
+        RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
+        rtcSetGeometryUserPrimitiveCount(g, unsigned(spheres.size()));
+        rtcSetGeometryUserData(g, sphere_users.back().get());
+        rtcSetGeometryBoundsFunction(g, sphere_bounds, nullptr);
+        rtcSetGeometryIntersectFunction(g, sphere_intersect);
+        rtcSetGeometryOccludedFunction(g, sphere_occluded);
+        rtcCommitGeometry(g);
+        rtcAttachGeometryByID(scene, g, id);
+        rtcReleaseGeometry(g);
+    }
+};
+
+Accel::Accel() : impl_(std::make_unique<Impl>()) {}
+Accel::~Accel() = default;
+
+Result<std::unique_ptr<Accel>> Accel::build(const SceneDescription& scene, Opacity opacity, const void* opacity_user) {
+    if (device() == nullptr)
+        return failed_precondition("Embree has no device with the AVX2 instruction set here; run on an x86-64-v3 machine");
+    std::unique_ptr<Accel> accel(new Accel);
+    Impl& impl = *accel->impl_;
+    const int64_t before = g_device_memory.load();
+    const auto new_scene = [] {
+        RTCScene s = rtcNewScene(device());
+        rtcSetSceneBuildQuality(s, RTC_BUILD_QUALITY_HIGH);
+        rtcSetSceneFlags(s, RTC_SCENE_FLAG_ROBUST);
+        return s;
+    };
+    for (int32_t o = 0; o < int32_t(scene.objects.size()); ++o) {
+        RTCScene s = new_scene();
+        impl.objects.push_back(s);
+        impl.add_meshes(s, scene.objects[size_t(o)].meshes, o, opacity, opacity_user);
+        impl.add_spheres(s, scene.objects[size_t(o)].spheres, uint32_t(scene.objects[size_t(o)].meshes.size()), o, opacity,
+                         opacity_user);
+        rtcCommitScene(s);
+    }
+    impl.world = new_scene();
+    impl.add_meshes(impl.world, scene.meshes, -1, opacity, opacity_user);
+    impl.add_spheres(impl.world, scene.spheres, uint32_t(scene.meshes.size()), -1, opacity, opacity_user);
+    impl.first_instance_id = uint32_t(scene.meshes.size()) + 1;
+    for (uint32_t i = 0; i < scene.instances.size(); ++i) {
+        const Instance& instance = scene.instances[i];
+        RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_INSTANCE);
+        rtcSetGeometryInstancedScene(g, impl.objects[size_t(instance.object)]);
+        float m[12];
+        for (int c = 0; c < 4; ++c)
+            for (int r = 0; r < 3; ++r) m[c * 3 + r] = float(instance.object_to_world.m[r][c]);
+        rtcSetGeometryTransform(g, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, m);
+        rtcCommitGeometry(g);
+        rtcAttachGeometryByID(impl.world, g, impl.first_instance_id + i);
+        rtcReleaseGeometry(g);
+    }
+    rtcCommitScene(impl.world);
+    if (const RTCError error = rtcGetDeviceError(device()); error != RTC_ERROR_NONE)
+        return internal_error("Embree could not build the acceleration structure (error " + std::to_string(int(error)) +
+                              "); the machine may be out of memory");
+    impl.memory = uint64_t(std::max<int64_t>(0, g_device_memory.load() - before));
+    return accel;
+}
+
+bool Accel::intersect(const Vec3& o, const Vec3& d, float t_max, RawHit* hit) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRayHit r;
+    r.ray = {o.x, o.y, o.z, 0, d.x, d.y, d.z, 0, t_max, 0xffffffffu, 0, 0};
+    r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(impl_->world, &context, &r);
+    if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+    hit->t = r.ray.tfar;
+    hit->primitive = r.hit.primID;
+    hit->u = r.hit.u;
+    hit->v = r.hit.v;
+    const bool instanced = r.hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
+    hit->instance = instanced ? int32_t(r.hit.instID[0] - impl_->first_instance_id) : -1;
+    hit->geometry = r.hit.geomID;
+    return true;
+}
+
+bool Accel::occluded(const Vec3& o, const Vec3& d, float t_max) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRay r{o.x, o.y, o.z, 0, d.x, d.y, d.z, 0, t_max, 0xffffffffu, 0, 0};
+    rtcOccluded1(impl_->world, &context, &r);
+    return r.tfar < 0;
+}
+
+Bounds3 Accel::bounds() const {
+    RTCBounds b;
+    rtcGetSceneBounds(impl_->world, &b);
+    Bounds3 r;
+    if (b.lower_x > b.upper_x) return r;
+    r.lo = {b.lower_x, b.lower_y, b.lower_z};
+    r.hi = {b.upper_x, b.upper_y, b.upper_z};
+    return r;
+}
+
+uint64_t Accel::memory_bytes() const { return impl_->memory; }
+
+}  // namespace lightloom

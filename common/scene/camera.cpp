@@ -1,0 +1,89 @@
+#include "common/scene/camera.h"
+
+#include <cmath>
+
+#include "common/core/math.h"
+#include "common/scene/sampling.h"
+
+namespace lightloom {
+
+Result<Camera> Camera::create(const PerspectiveCamera& source, int width, int height) {
+    if (width <= 0 || height <= 0) return invalid_argument("the image resolution must be positive");
+    if (!(source.fov_degrees > 0 && source.fov_degrees < 180))
+        return invalid_argument("camera fov must lie between 0 and 180 degrees, not " + std::to_string(source.fov_degrees));
+    if (source.lens_radius < 0 || !(source.focal_distance > 0))
+        return invalid_argument("camera lensradius must not be negative and focaldistance must be positive");
+    Camera c;
+    const auto& m = source.camera_to_world.m;
+    const auto column = [&](int j) { return Vec3{float(m[0][j]), float(m[1][j]), float(m[2][j])}; };
+    const float sx = length(column(0)), sy = length(column(1)), sz = length(column(2));
+    c.right_ = column(0) / sx;
+    c.up_ = column(1) / sy;
+    c.forward_ = column(2) / sz;
+    c.position_ = column(3);
+    const float tolerance = 1e-4f;
+    if (std::fabs(sx / sz - 1) > tolerance || std::fabs(sy / sz - 1) > tolerance || abs_dot(c.right_, c.up_) > tolerance ||
+        abs_dot(c.right_, c.forward_) > tolerance || abs_dot(c.up_, c.forward_) > tolerance)
+        return invalid_argument("the camera transformation must not shear or scale axes differently; use fov or screenwindow");
+    c.width_ = width;
+    c.height_ = height;
+    const float aspect = source.frame_aspect_ratio > 0 ? source.frame_aspect_ratio : float(width) / float(height);
+    float window[4] = {-1, 1, -1, 1};
+    if (source.has_screen_window)
+        for (int i = 0; i < 4; ++i) window[i] = source.screen_window[i];
+    else if (aspect > 1)
+        window[0] = -aspect, window[1] = aspect;
+    else
+        window[2] = -1 / aspect, window[3] = 1 / aspect;
+    if (!(window[1] > window[0] && window[3] > window[2])) return invalid_argument("camera screenwindow is empty");
+    const float scale = float(math::tan(double(source.fov_degrees) * (kPiD / 360)));
+    c.x0_ = window[0] * scale;
+    c.y1_ = window[3] * scale;
+    c.pixel_w_ = (window[1] - window[0]) * scale / float(width);
+    c.pixel_h_ = (window[3] - window[2]) * scale / float(height);
+    c.inv_pixel_area_ = 1 / (c.pixel_w_ * c.pixel_h_);
+    c.lens_radius_ = source.lens_radius * sz;
+    c.focal_distance_ = source.focal_distance * sz;
+    return c;
+}
+
+Vec3 Camera::sample_lens(Vec2 lens) const {
+    if (lens_radius_ == 0) return position_;
+    const Vec2 d = sample_disk(lens);
+    return position_ + right_ * (d.x * lens_radius_) + up_ * (d.y * lens_radius_);
+}
+
+Camera::CameraRay Camera::sample_ray(Vec2 film, Vec2 lens) const {
+    const Vec3 p{x0_ + film.x * pixel_w_, y1_ - film.y * pixel_h_, 1};  // on the film plane, camera space
+    CameraRay ray;
+    ray.origin = position_;
+    Vec3 d = p;
+    if (lens_radius_ > 0) {
+        const Vec2 l = sample_disk(lens);
+        ray.origin = position_ + right_ * (l.x * lens_radius_) + up_ * (l.y * lens_radius_);
+        d = p * focal_distance_ - Vec3{l.x * lens_radius_, l.y * lens_radius_, 0};
+    }
+    d = normalize(d);
+    ray.direction = normalize(right_ * d.x + up_ * d.y + forward_ * d.z);
+    // d(omega) = pixel area * cos^3, also through a thin lens: the plane of focus is the film plane scaled by f.
+    ray.pdf_solid_angle = inv_pixel_area_ / (d.z * d.z * d.z);
+    return ray;
+}
+
+bool Camera::project(const Vec3& lens_point, const Vec3& direction, Vec2* film, float* pdf_solid_angle) const {
+    const Vec3 d{dot(direction, right_), dot(direction, up_), dot(direction, forward_)};
+    if (!(d.z > 1e-6f)) return false;
+    Vec3 p{d.x / d.z, d.y / d.z, 1};
+    if (lens_radius_ > 0) {
+        const Vec3 l = lens_point - position_;
+        p.x += dot(l, right_) / focal_distance_;
+        p.y += dot(l, up_) / focal_distance_;
+    }
+    film->x = (p.x - x0_) / pixel_w_;
+    film->y = (y1_ - p.y) / pixel_h_;
+    if (!(film->x >= 0 && film->x < float(width_) && film->y >= 0 && film->y < float(height_))) return false;
+    *pdf_solid_angle = inv_pixel_area_ / (d.z * d.z * d.z);
+    return true;
+}
+
+}  // namespace lightloom

@@ -1,0 +1,206 @@
+#include "common/scene/emitter.h"
+
+#include <cmath>
+
+#include "common/core/math.h"
+
+namespace lightloom {
+namespace {
+
+constexpr float kInvFourPi = 0.07957747154594766788f;
+
+float spot_falloff(const Emitter& e, float cos_theta) {
+    if (cos_theta < e.cos_total) return 0;
+    if (cos_theta >= e.cos_falloff) return 1;
+    const float x = (cos_theta - e.cos_total) / (e.cos_falloff - e.cos_total);
+    return x * x * (3 - 2 * x);
+}
+
+/// 1 - cos of the half angle under which a sphere is seen from distance^2 `d2`, without cancellation.
+float cone_height(float radius, float d2) {
+    const float sin2 = radius * radius / d2;
+    return sin2 / (1 + safe_sqrt(1 - sin2));
+}
+
+/// Whether next event samples the sphere by the cone that it subtends (otherwise by area).
+bool samples_cone(const Emitter& e, float d2) { return !e.inward && d2 > e.radius * e.radius * 1.0001f; }
+
+}  // namespace
+
+EmitterSet::EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius)
+    : emitters_(std::move(emitters)), environment_(std::move(environment)), centre_(centre), scene_radius_(radius) {
+    disc_pdf_ = 1 / (kPi * radius * radius);
+    std::vector<double> powers;
+    for (size_t i = 0; i < emitters_.size(); ++i) {
+        if (emitters_[i].kind == EmitterKind::kEnvironment) environment_index_ = int32_t(i);
+        powers.push_back(power(emitters_[i]));
+    }
+    pick_ = AliasTable(powers);
+    for (size_t i = 0; i < emitters_.size(); ++i) emitters_[i].pmf = pick_.pmf(i);
+}
+
+double EmitterSet::power(const Emitter& e) const {
+    const double disc = kPiD * double(scene_radius_) * scene_radius_;
+    switch (e.kind) {
+        case EmitterKind::kTriangle:
+        case EmitterKind::kSphere: return kPiD * scalar_of(e.radiance) / e.inv_area * (e.two_sided ? 2 : 1);
+        case EmitterKind::kPoint: return 4 * kPiD * scalar_of(e.radiance);
+        case EmitterKind::kSpot:
+            return 2 * kPiD * scalar_of(e.radiance) * ((1 - double(e.cos_falloff)) + (double(e.cos_falloff) - e.cos_total) / 2);
+        case EmitterKind::kDistant: return scalar_of(e.radiance) * disc;
+        case EmitterKind::kEnvironment: return environment_.integrated_radiance() * disc;
+    }
+    return 0;
+}
+
+Rgb EmitterSet::emitted(const Emitter& e, const Vec3& normal, const Vec3& w) const {
+    switch (e.kind) {
+        case EmitterKind::kTriangle:
+        case EmitterKind::kSphere: return e.two_sided || dot(normal, w) > 0 ? e.radiance : Rgb{};
+        case EmitterKind::kPoint: return e.radiance;
+        case EmitterKind::kSpot: return e.radiance * spot_falloff(e, dot(e.normal, w));
+        case EmitterKind::kDistant: return e.radiance;
+        case EmitterKind::kEnvironment: return environment_.radiance(-w);
+    }
+    return {};
+}
+
+float EmitterSet::pdf_position(const Emitter& e, const Vec3& w) const {
+    if (e.is_area()) return e.pmf * e.inv_area;
+    if (e.kind == EmitterKind::kEnvironment) return e.pmf * environment_.pdf_solid_angle(-w);
+    return e.pmf;
+}
+
+float EmitterSet::pdf_direction(const Emitter& e, const Vec3& normal, const Vec3& w) const {
+    switch (e.kind) {
+        case EmitterKind::kTriangle:
+        case EmitterKind::kSphere: {
+            const float c = dot(normal, w);
+            if (e.two_sided) return std::fabs(c) * (0.5f * kInvPi);
+            return c > 0 ? c * kInvPi : 0;
+        }
+        case EmitterKind::kPoint: return kInvFourPi;
+        case EmitterKind::kSpot: return dot(e.normal, w) >= e.cos_total ? 1 / (kTwoPi * (1 - e.cos_total)) : 0;
+        case EmitterKind::kDistant:
+        case EmitterKind::kEnvironment: return disc_pdf_;
+    }
+    return 0;
+}
+
+bool EmitterSet::sample_emission(double pick, Vec2 u_position, Vec2 u_direction, EmissionSample* out) const {
+    if (emitters_.empty()) return false;
+    float rest = 0;
+    out->emitter = pick_.sample(pick, &rest);
+    const Emitter& e = emitters_[out->emitter];
+    switch (e.kind) {
+        case EmitterKind::kTriangle:
+        case EmitterKind::kSphere: {
+            if (e.kind == EmitterKind::kTriangle) {
+                const Vec2 b = sample_triangle(u_position);
+                out->position = e.position + e.edge1 * b.x + e.edge2 * b.y;
+                out->normal = e.normal;
+            } else {
+                const Vec3 n = sample_sphere(u_position);
+                out->position = e.position + n * e.radius;
+                out->normal = e.inward ? -n : n;
+            }
+            Vec3 local = sample_cosine_hemisphere(u_direction);
+            if (e.two_sided && rest < 0.5f) local.z = -local.z;
+            out->direction = Frame(out->normal).to_world(local);
+            break;
+        }
+        case EmitterKind::kPoint:
+            out->position = e.position;
+            out->direction = out->normal = sample_sphere(u_direction);
+            break;
+        case EmitterKind::kSpot: {
+            const float z = 1 - u_direction.x * (1 - e.cos_total);
+            const float r = safe_sqrt(1 - z * z);
+            const math::SinCos sc = math::sincos_turns(u_direction.y);
+            out->position = e.position;
+            out->direction = out->normal = Frame(e.normal).to_world({r * float(sc.cos), r * float(sc.sin), z});
+            break;
+        }
+        case EmitterKind::kDistant:
+        case EmitterKind::kEnvironment: {
+            out->direction = e.kind == EmitterKind::kDistant ? e.normal : -environment_.sample(rest, u_position);
+            out->normal = out->direction;
+            const Vec2 d = sample_disk(u_direction);
+            const Frame f(out->direction);
+            out->position = centre_ + (f.s * d.x + f.t * d.y - f.n) * scene_radius_;
+            break;
+        }
+    }
+    out->pdf_position = pdf_position(e, out->direction);
+    out->pdf_direction = pdf_direction(e, out->normal, out->direction);
+    if (!(out->pdf_position > 0 && out->pdf_direction > 0)) return false;
+    const float cosine = e.is_area() ? abs_dot(out->normal, out->direction) : 1;
+    out->alpha = emitted(e, out->normal, out->direction) * (cosine / (out->pdf_position * out->pdf_direction));
+    return !out->alpha.is_black();
+}
+
+bool EmitterSet::sample_next_event(const Vec3& reference, double pick, Vec2 u, NextEventSample* out) const {
+    if (emitters_.empty()) return false;
+    float rest = 0;
+    out->emitter = pick_.sample(pick, &rest);
+    const Emitter& e = emitters_[out->emitter];
+    if (e.is_infinite()) {
+        out->wi = e.kind == EmitterKind::kDistant ? -e.normal : environment_.sample(rest, u);
+        out->normal = -out->wi;
+        out->position = reference + out->wi * (2 * scene_radius_);
+        out->geometry = 1;
+        out->pdf = pdf_position(e, -out->wi);
+    } else {
+        if (e.kind == EmitterKind::kTriangle) {
+            const Vec2 b = sample_triangle(u);
+            out->position = e.position + e.edge1 * b.x + e.edge2 * b.y;
+            out->normal = e.normal;
+        } else if (e.kind == EmitterKind::kSphere) {
+            const Vec3 to_centre = e.position - reference;
+            const float d2 = length_squared(to_centre);
+            Vec3 n;
+            if (samples_cone(e, d2)) {
+                // A direction in the cone, then the near intersection, expressed as a normal of the sphere.
+                const float h = cone_height(e.radius, d2);
+                const float one_minus_cos = h * u.x, cos_t = 1 - one_minus_cos;
+                const float sin2 = one_minus_cos * (2 - one_minus_cos);
+                const float d = std::sqrt(d2);
+                const float along = d * cos_t - safe_sqrt(e.radius * e.radius - d2 * sin2);
+                const math::SinCos sc = math::sincos_turns(u.y);
+                const float sin_t = safe_sqrt(sin2);
+                const Frame f(to_centre / d);
+                const Vec3 w = f.to_world({sin_t * float(sc.cos), sin_t * float(sc.sin), cos_t});
+                n = normalize(reference + w * along - e.position);
+            } else {
+                n = sample_sphere(u);
+            }
+            out->position = e.position + n * e.radius;
+            out->normal = e.inward ? -n : n;
+        } else {
+            out->position = e.position;
+        }
+        const Vec3 to_light = out->position - reference;
+        const float d2 = length_squared(to_light);
+        if (!(d2 > 0)) return false;
+        out->wi = to_light / std::sqrt(d2);
+        if (!e.is_area()) out->normal = -out->wi;
+        out->geometry = (e.is_area() ? abs_dot(out->normal, out->wi) : 1.0f) / d2;
+        out->pdf = pdf_next_event(e, reference, out->position, out->normal, out->wi);
+    }
+    out->radiance = emitted(e, out->normal, -out->wi);
+    return out->pdf > 0 && out->geometry > 0 && !out->radiance.is_black();
+}
+
+float EmitterSet::pdf_next_event(const Emitter& e, const Vec3& reference, const Vec3& position, const Vec3& normal,
+                                 const Vec3& wi) const {
+    if (e.kind != EmitterKind::kSphere) return pdf_position(e, -wi);
+    const float centre_d2 = length_squared(e.position - reference);
+    if (!samples_cone(e, centre_d2)) return pdf_position(e, -wi);
+    const float solid_angle = kTwoPi * cone_height(e.radius, centre_d2);
+    const float d2 = length_squared(position - reference);
+    // Only the near side is sampled.
+    if (dot(normal, wi) >= 0) return 0;
+    return e.pmf / solid_angle * abs_dot(normal, wi) / d2;
+}
+
+}  // namespace lightloom

@@ -1,0 +1,104 @@
+#pragma once
+// Emitters: everything that light sub-paths start from and next event estimation connects to. One list; an emissive
+// triangle is one emitter, all infinite lights together are one.
+//
+// The "native measure" of a point x_0 on an emitter: area (m^-2) for triangles and spheres, solid angle (sr^-1) of the
+// direction towards it for the environment, counting measure for point, spot and distant lights.
+
+#include <cstdint>
+#include <vector>
+
+#include "common/scene/description.h"
+#include "common/scene/environment.h"
+#include "common/scene/sampling.h"
+
+namespace lightloom {
+
+enum class EmitterKind : uint8_t { kTriangle, kSphere, kPoint, kSpot, kDistant, kEnvironment };
+
+struct Emitter {
+    EmitterKind kind = EmitterKind::kTriangle;
+    bool two_sided = false;
+    float pmf = 0;              ///< Of being selected, for light sub-paths and for next event alike (by power).
+    Rgb radiance;               ///< Radiance; intensity for point and spot; irradiance for distant; unused for environment.
+    Vec3 position;              ///< First corner, centre, or light position.
+    Vec3 edge1, edge2;          ///< kTriangle.
+    Vec3 normal;                ///< Unit; side that emits. Spot: axis. Distant: direction of travel.
+    float radius = 0;           ///< kSphere; negative-free. `inward` flips its emitting side.
+    bool inward = false;
+    float inv_area = 0;
+    float cos_total = 0, cos_falloff = 0;  ///< kSpot.
+    int32_t light = 0;          ///< Group for reports: the area-light shape or light source it came from.
+
+    bool is_area() const { return kind == EmitterKind::kTriangle || kind == EmitterKind::kSphere; }
+    bool is_infinite() const { return kind == EmitterKind::kDistant || kind == EmitterKind::kEnvironment; }
+    /// x_0 cannot be hit by chance: no technique with s = 0.
+    bool is_delta() const { return !is_area() && kind != EmitterKind::kEnvironment; }
+};
+
+/// Start of a light sub-path: x_0 and the ray towards x_1.
+struct EmissionSample {
+    uint32_t emitter = 0;
+    Vec3 position;             ///< x_0 for finite lights; ray origin outside the scene for infinite ones.
+    Vec3 normal;               ///< Geometric normal at x_0 on the emitting side; for infinite lights the ray direction.
+    Vec3 direction;            ///< Unit, along the light's travel.
+    Rgb alpha;                 ///< Emitted throughput: L |cos| / (pdf_position * pdf_direction).
+    float pdf_position = 0;    ///< pmf included; native measure of x_0.
+    float pdf_direction = 0;   ///< Solid angle for finite lights; area on the disc facing the scene, m^-2, for infinite ones.
+};
+
+/// x_0 chosen from a reference point.
+struct NextEventSample {
+    uint32_t emitter = 0;
+    Vec3 position;             ///< Point on a finite light; for infinite ones a point beyond the scene to test visibility to.
+    Vec3 normal;               ///< At x_0, geometric; for infinite lights the direction of travel.
+    Vec3 wi;                   ///< Unit, from the reference point to the light.
+    Rgb radiance;              ///< Emitted towards the reference point (intensity for point and spot, irradiance for distant).
+    float geometry = 0;        ///< Converts a solid-angle density at the reference point to the native measure: |cos| / d^2 for
+                               ///< area lights, 1 / d^2 for point and spot, 1 for infinite.
+    float pdf = 0;             ///< Native measure, pmf included.
+};
+
+class EmitterSet {
+  public:
+    EmitterSet() = default;
+    /// `emitters` without their pmf; `centre` and `radius` of the sphere around the scene, for infinite lights.
+    EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius);
+
+    bool empty() const { return emitters_.empty(); }
+    const std::vector<Emitter>& all() const { return emitters_; }
+    const Emitter& operator[](uint32_t i) const { return emitters_[i]; }
+    /// Index of the environment emitter, or kNone.
+    int32_t environment_index() const { return environment_index_; }
+    const Environment& environment() const { return environment_; }
+    float scene_radius() const { return scene_radius_; }
+
+    /// Scalar power of an emitter, W.
+    double power(const Emitter& e) const;
+
+    /// False when nothing emits there (a black texel, for instance).
+    bool sample_emission(double pick, Vec2 u_position, Vec2 u_direction, EmissionSample* out) const;
+    /// False when the point chosen cannot light `reference` (wrong side, inside a cone's shadow...).
+    bool sample_next_event(const Vec3& reference, double pick, Vec2 u, NextEventSample* out) const;
+
+    /// Radiance (or intensity, irradiance) leaving x_0 of emitter `e` along `w` (unit, away from the light); `normal` is the
+    /// geometric normal at x_0 on the emitting side. The environment looks its map up in -w.
+    Rgb emitted(const Emitter& e, const Vec3& normal, const Vec3& w) const;
+    /// pL of x_0: density of sample_emission() for the point, native measure, pmf included. `w` as above (environment).
+    float pdf_position(const Emitter& e, const Vec3& w) const;
+    /// Density of the emission direction `w` given x_0: solid angle for finite lights, disc area for infinite ones.
+    float pdf_direction(const Emitter& e, const Vec3& normal, const Vec3& w) const;
+    /// Density of sample_next_event() at x_0, native measure, pmf included. `position`, `normal` at x_0; `wi` from the
+    /// reference point to it.
+    float pdf_next_event(const Emitter& e, const Vec3& reference, const Vec3& position, const Vec3& normal, const Vec3& wi) const;
+
+  private:
+    std::vector<Emitter> emitters_;
+    AliasTable pick_;
+    Environment environment_;
+    int32_t environment_index_ = kNone;
+    Vec3 centre_;
+    float scene_radius_ = 1, disc_pdf_ = 0;
+};
+
+}  // namespace lightloom

@@ -1,0 +1,79 @@
+// Material + textures at a point -> Bsdf. Parameters that a material leaves unset have pbrt-v4's defaults.
+
+#include "common/scene/texture.h"
+
+namespace lightloom {
+namespace {
+
+Rgb value(const TextureTables& tables, TextureId id, Vec2 uv, const Rgb& fallback) {
+    if (id == kNone) return fallback;
+    const TextureNode& node = tables.nodes[size_t(id)];
+    return node.kind == TextureKind::kConstant ? node.value : evaluate_texture(tables, id, uv);
+}
+
+float alpha(const TextureTables& tables, TextureId id, Vec2 uv, bool remap) {
+    if (id == kNone) return 0;
+    const float roughness = value(tables, id, uv, Rgb(0)).r;
+    return remap ? safe_sqrt(roughness) : roughness;
+}
+
+struct ConductorIndex {
+    Rgb eta, k;
+};
+
+ConductorIndex conductor_index(const TextureTables& tables, const Material& m, Vec2 uv) {
+    if (m.reflectance != kNone) return {Rgb(1), conductor_k(value(tables, m.reflectance, uv, Rgb(0)))};
+    // Copper, at the wavelengths of the three primaries.
+    return {value(tables, m.eta, uv, Rgb(0.200f, 0.924f, 1.102f)), value(tables, m.k, uv, Rgb(3.912f, 2.452f, 2.142f))};
+}
+
+}  // namespace
+
+Bsdf resolve_material(const TextureTables& tables, MaterialId material, Vec2 uv, float choice) {
+    // Import bounds the nesting; a cycle that got past it ends as an absorber instead of hanging a worker.
+    for (int level = 0; level < 32 && material != kNone; ++level) {
+        const Material& m = tables.materials[size_t(material)];
+        const float ior = m.ior > 0 ? m.ior : 1.0f;
+        switch (m.kind) {
+            case MaterialKind::kMix: {
+                const float amount = value(tables, m.mix_amount, uv, Rgb(0.5f)).r;
+                // What is left of `choice` is uniform again, for mixes inside mixes.
+                if (choice < amount) {
+                    choice /= amount < 1 ? amount : 1.0f;
+                    material = m.mix_b;
+                } else {
+                    choice = amount > 0 ? (choice - amount) / (1 - amount) : choice;
+                    material = m.mix_a;
+                }
+                continue;
+            }
+            case MaterialKind::kDiffuse: return make_diffuse(value(tables, m.reflectance, uv, Rgb(0.5f)));
+            case MaterialKind::kDiffuseTransmission:
+                return make_diffuse_transmission(value(tables, m.reflectance, uv, Rgb(0.25f)),
+                                                 value(tables, m.transmittance, uv, Rgb(0.25f)));
+            case MaterialKind::kThinDielectric: return make_thin_dielectric(ior);
+            default: break;
+        }
+        const float alpha_x = alpha(tables, m.roughness_u, uv, m.remap_roughness);
+        const float alpha_y = m.roughness_v == m.roughness_u ? alpha_x : alpha(tables, m.roughness_v, uv, m.remap_roughness);
+        switch (m.kind) {
+            case MaterialKind::kConductor: {
+                const ConductorIndex index = conductor_index(tables, m, uv);
+                return make_conductor(index.eta, index.k, alpha_x, alpha_y);
+            }
+            case MaterialKind::kDielectric: return make_dielectric(ior, alpha_x, alpha_y);
+            case MaterialKind::kCoatedDiffuse:
+                return make_coated_diffuse(value(tables, m.reflectance, uv, Rgb(0.5f)), ior, alpha_x, alpha_y);
+            case MaterialKind::kCoatedConductor: {
+                const ConductorIndex index = conductor_index(tables, m, uv);
+                return make_coated_conductor(index.eta, index.k,
+                                             alpha(tables, m.base_roughness_u, uv, m.remap_roughness),
+                                             alpha(tables, m.base_roughness_v, uv, m.remap_roughness), ior, alpha_x, alpha_y);
+            }
+            default: return {};
+        }
+    }
+    return {};
+}
+
+}  // namespace lightloom

@@ -1,0 +1,36 @@
+#pragma once
+// Rays, hits and the one rule for leaving a surface without hitting it again.
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include "common/core/vec.h"
+
+namespace lightloom {
+
+/// What the acceleration structure reports.
+struct RawHit {
+    float t = 0;                      ///< In units of the ray's direction length.
+    uint32_t geometry = 0;            ///< Index of the mesh in its object (or world); the number of meshes means: its spheres.
+    uint32_t primitive = 0;           ///< Triangle or sphere index.
+    int32_t instance = -1;            ///< Index of the instance, or -1.
+    float u = 0, v = 0;               ///< Barycentric weights of the second and third vertex.
+};
+
+/// `p` moved off its surface to the side that `direction` points to, by a distance that is a few hundred units in the last
+/// place of each coordinate (with a floor near the origin) [Waechter and Binder 2019, A Fast and Robust Method for Avoiding
+/// Self-Intersection]. Camera and light sub-paths, next event and connections all use this one rule, so that a segment has
+/// the same visibility from either end.
+inline Vec3 offset_origin(const Vec3& p, const Vec3& geometric_normal, const Vec3& direction) {
+    constexpr float kOrigin = 1.0f / 32, kFloatScale = 1.0f / 65536, kIntScale = 256;
+    const Vec3 n = face_forward(geometric_normal, direction);
+    const auto move = [](float c, float nc) {
+        if (std::fabs(c) < kOrigin) return c + kFloatScale * nc;
+        const int32_t steps = int32_t(kIntScale * nc);
+        return std::bit_cast<float>(std::bit_cast<int32_t>(c) + (c < 0 ? -steps : steps));
+    };
+    return {move(p.x, n.x), move(p.y, n.y), move(p.z, n.z)};
+}
+
+}  // namespace lightloom

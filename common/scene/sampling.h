@@ -1,0 +1,46 @@
+#pragma once
+// Discrete and warped sampling that several emitters share.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/core/math.h"
+#include "common/core/vec.h"
+
+namespace lightloom {
+
+/// Discrete distribution with O(1) sampling [Walker 1974; Vose 1991]. pmf() is exactly what sample() does up to the
+/// rounding of the alias table, because both are derived from the same normalised doubles.
+class AliasTable {
+  public:
+    AliasTable() = default;
+    /// Weights must be finite and non-negative; all zero means uniform.
+    explicit AliasTable(std::span<const double> weights);
+
+    size_t size() const { return pmf_.size(); }
+    bool empty() const { return pmf_.empty(); }
+    float pmf(size_t i) const { return pmf_[i]; }
+    /// `u` in [0, 1); `remapped`, when given, receives a fresh uniform in [0, 1).
+    uint32_t sample(double u, float* remapped = nullptr) const;
+
+  private:
+    std::vector<float> pmf_;
+    std::vector<double> keep_;
+    std::vector<uint32_t> alias_;
+};
+
+/// Uniform on the unit disk, concentric mapping [Shirley and Chiu 1997].
+Vec2 sample_disk(Vec2 u);
+/// Uniform on the unit sphere; density 1 / (4 pi).
+Vec3 sample_sphere(Vec2 u);
+/// Cosine-weighted on the upper hemisphere (z up); density cos / pi.
+Vec3 sample_cosine_hemisphere(Vec2 u);
+/// Uniform barycentric weights (b1, b2) of a triangle.
+Vec2 sample_triangle(Vec2 u);
+
+/// Equal-area octahedral mapping between [0,1]^2 and the sphere [Clarberg 2008], pbrt-v4's orientation.
+Vec3 equal_area_square_to_sphere(Vec2 p);
+Vec2 equal_area_sphere_to_square(const Vec3& d);
+
+}  // namespace lightloom

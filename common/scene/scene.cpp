@@ -1,0 +1,129 @@
+#include "common/scene/scene.h"
+
+#include <bit>
+#include <cmath>
+
+#include "common/core/math.h"
+#include "common/core/rng.h"
+
+namespace lightloom {
+namespace {
+
+/// Uniform in [0, 1) from the bits of a position: decides mixed materials. The decision belongs to the point, so it is
+/// independent of the technique that found it.
+float position_hash(const Vec3& p) {
+    const uint64_t xy = (uint64_t(std::bit_cast<uint32_t>(p.x)) << 32) | std::bit_cast<uint32_t>(p.y);
+    return float(mix64(mix64(xy + 0x632be59bd9b4e019ull) ^ std::bit_cast<uint32_t>(p.z)) >> 40) * 0x1p-24f;
+}
+
+/// A tangent frame around `n` aligned with dp/du where there is one (anisotropic roughness needs it).
+Frame frame_along(const Vec3& n, const Vec3& dpdu) {
+    const Vec3 t = cross(n, dpdu);
+    const float len2 = length_squared(t);
+    if (!(len2 > 0)) return Frame(n);
+    const Vec3 unit_t = t / std::sqrt(len2);
+    return {cross(unit_t, n), unit_t, n};
+}
+
+}  // namespace
+
+void Scene::triangle_point(const TriangleMesh& mesh, const RawHit& hit, SurfacePoint* out) const {
+    const uint32_t* index = &mesh.indices[size_t(hit.primitive) * 3];
+    const Vec3 &p0 = mesh.positions[index[0]], &p1 = mesh.positions[index[1]], &p2 = mesh.positions[index[2]];
+    const Vec3 e1 = p1 - p0, e2 = p2 - p0;
+    const float b1 = hit.u, b2 = hit.v, b0 = 1 - b1 - b2;
+    out->p = p0 + e1 * b1 + e2 * b2;
+    out->ng = normalize(cross(e1, e2));
+    if (mesh.attributes.flip_normal) out->ng = -out->ng;
+    Vec2 uv[3] = {{0, 0}, {1, 0}, {1, 1}};
+    if (!mesh.uvs.empty())
+        for (int i = 0; i < 3; ++i) uv[i] = mesh.uvs[index[i]];
+    out->uv = {b0 * uv[0].x + b1 * uv[1].x + b2 * uv[2].x, b0 * uv[0].y + b1 * uv[1].y + b2 * uv[2].y};
+    Vec3 n = out->ng;
+    if (!mesh.normals.empty()) {
+        const Vec3 ns = mesh.normals[index[0]] * b0 + mesh.normals[index[1]] * b1 + mesh.normals[index[2]] * b2;
+        const float len2 = length_squared(ns);
+        if (len2 > 0) {
+            n = ns / std::sqrt(len2);
+            out->ng = face_forward(out->ng, n);
+        }
+    }
+    const float du1 = uv[1].x - uv[0].x, dv1 = uv[1].y - uv[0].y, du2 = uv[2].x - uv[0].x, dv2 = uv[2].y - uv[0].y;
+    out->shading = frame_along(n, (e1 * dv2 - e2 * dv1) * (du1 * dv2 - dv1 * du2 < 0 ? -1.0f : 1.0f));
+    out->material = mesh.attributes.material;
+}
+
+bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out) const {
+    RawHit hit;
+    if (!accel_->intersect(o, d, 1e30f, &hit)) return false;
+    const bool instanced = hit.instance >= 0;
+    const ObjectDefinition* object =
+        instanced ? &description_.objects[size_t(description_.instances[size_t(hit.instance)].object)] : nullptr;
+    const auto& meshes = instanced ? object->meshes : description_.meshes;
+    if (hit.geometry < meshes.size()) {
+        triangle_point(meshes[hit.geometry], hit, out);
+        const int32_t first = instanced ? kNone : mesh_first_emitter_[hit.geometry];
+        out->emitter = first == kNone ? kNone : first + int32_t(hit.primitive);
+    } else {
+        const Sphere& s = (instanced ? object->spheres : description_.spheres)[hit.primitive];
+        Vec3 from = o, along = d;
+        if (instanced) {
+            const Mat4& inv = instance_inverse_[size_t(hit.instance)];
+            from = inv.point(o), along = inv.vector(d);
+        }
+        const Vec3 n = normalize(from + along * hit.t - s.centre);
+        out->p = s.centre + n * s.radius;
+        out->ng = s.attributes.flip_normal ? -n : n;
+        const Vec3 local = s.orientation.to_local(n);
+        double phi = math::atan2(local.y, local.x);
+        if (phi < 0) phi += 2 * kPiD;
+        out->uv = {float(phi / (2 * kPiD)), float(1 - math::acos(local.z) / kPiD)};
+        out->shading = frame_along(out->ng, s.orientation.to_world({-local.y, local.x, 0}));
+        out->material = s.attributes.material;
+        out->emitter = instanced ? kNone : sphere_emitter_[hit.primitive];
+    }
+    if (instanced) {
+        const Mat4& m = description_.instances[size_t(hit.instance)].object_to_world;
+        const Mat4& inv = instance_inverse_[size_t(hit.instance)];
+        out->p = m.point(out->p);
+        out->ng = normalize(inv.normal_by_inverse(out->ng));
+        const Vec3 n = normalize(inv.normal_by_inverse(out->shading.n));
+        out->shading = frame_along(n, m.vector(out->shading.s));
+    }
+    return true;
+}
+
+Bsdf Scene::bsdf_at(const SurfacePoint& point) const {
+    return resolve_material(tables_, point.material, point.uv, position_hash(point.p));
+}
+
+bool Scene::occluded(const Vec3& p, const Vec3& ng_p, const Vec3& q, const Vec3& ng_q) const {
+    const Vec3 d = q - p;
+    const Vec3 from = offset_origin(p, ng_p, d), to = offset_origin(q, ng_q, -d);
+    return accel_->occluded(from, to - from, 0.99999f);
+}
+
+bool Scene::occluded(const Vec3& p, const Vec3& ng_p, const Vec3& q) const {
+    const Vec3 from = offset_origin(p, ng_p, q - p);
+    return accel_->occluded(from, q - from, 0.99999f);
+}
+
+float Scene::opacity(const void* user, int32_t object, uint32_t geometry, uint32_t primitive, float u, float v) {
+    const Scene& scene = *static_cast<const Scene*>(user);
+    const SceneDescription& d = scene.description_;
+    if (geometry == Accel::kSphereGeometry) {
+        const Sphere& s = (object < 0 ? d.spheres : d.objects[size_t(object)].spheres)[primitive];
+        return s.attributes.alpha == kNone ? 1 : evaluate_texture(scene.tables_, s.attributes.alpha, {0.5f, 0.5f}).r;
+    }
+    const TriangleMesh& mesh = (object < 0 ? d.meshes : d.objects[size_t(object)].meshes)[geometry];
+    const uint32_t* index = &mesh.indices[size_t(primitive) * 3];
+    Vec2 uv[3] = {{0, 0}, {1, 0}, {1, 1}};
+    if (!mesh.uvs.empty())
+        for (int i = 0; i < 3; ++i) uv[i] = mesh.uvs[index[i]];
+    const float w = 1 - u - v;
+    return evaluate_texture(scene.tables_, mesh.attributes.alpha,
+                            {w * uv[0].x + u * uv[1].x + v * uv[2].x, w * uv[0].y + u * uv[1].y + v * uv[2].y})
+        .r;
+}
+
+}  // namespace lightloom

@@ -1,0 +1,275 @@
+// Scene::build(): checks a description, prepares it for rendering and counts what it holds.
+
+#include <chrono>
+#include <cmath>
+
+#include "common/core/math.h"
+#include "common/scene/scene.h"
+
+namespace lightloom {
+namespace {
+
+std::string at(const ShapeAttributes& a) { return a.source.empty() ? std::string("shape") : a.source; }
+
+bool rgb_ok(const Rgb& c) { return is_finite(c) && c.r >= 0 && c.g >= 0 && c.b >= 0; }
+
+struct Checker {
+    const SceneDescription& d;
+
+    Status attributes(const ShapeAttributes& a, bool may_emit) const {
+        if (a.material < 0 || size_t(a.material) >= d.materials.size()) return invalid_argument(at(a) + ": no such material");
+        if (a.emission != kNone && (a.emission < 0 || size_t(a.emission) >= d.emissions.size()))
+            return invalid_argument(at(a) + ": no such area emission");
+        if (a.emission != kNone && !may_emit)
+            return invalid_argument(at(a) + ": a shape inside an object definition may not emit");
+        if (a.alpha != kNone && (a.alpha < 0 || size_t(a.alpha) >= d.textures.size()))
+            return invalid_argument(at(a) + ": no such alpha texture");
+        return {};
+    }
+
+    Status mesh(const TriangleMesh& m, bool may_emit) const {
+        LL_RETURN_IF_ERROR(attributes(m.attributes, may_emit));
+        const std::string where = at(m.attributes);
+        if (m.indices.size() % 3 != 0) return invalid_argument(where + ": the index count is not a multiple of three");
+        if (m.positions.size() >= 0xffffffffull) return invalid_argument(where + ": too many vertices");
+        if (!m.normals.empty() && m.normals.size() != m.positions.size())
+            return invalid_argument(where + ": normals and positions differ in number");
+        if (!m.uvs.empty() && m.uvs.size() != m.positions.size())
+            return invalid_argument(where + ": texture coordinates and positions differ in number");
+        for (const uint32_t i : m.indices)
+            if (i >= m.positions.size())
+                return invalid_argument(where + ": vertex index " + std::to_string(i) + " is out of range (" +
+                                        std::to_string(m.positions.size()) + " vertices)");
+        for (const Vec3& p : m.positions)
+            if (!is_finite(p)) return invalid_argument(where + ": a vertex position is not finite");
+        for (const Vec3& n : m.normals)
+            if (!is_finite(n)) return invalid_argument(where + ": a vertex normal is not finite");
+        return {};
+    }
+
+    Status sphere(const Sphere& s, bool may_emit) const {
+        LL_RETURN_IF_ERROR(attributes(s.attributes, may_emit));
+        if (!is_finite(s.centre) || !(s.radius > 0) || !std::isfinite(s.radius))
+            return invalid_argument(at(s.attributes) + ": a sphere needs a finite centre and a positive radius");
+        return {};
+    }
+};
+
+/// A triangle without area can neither be hit nor emit; dropping it keeps normals finite everywhere else.
+void drop_degenerate_triangles(TriangleMesh* mesh) {
+    std::vector<uint32_t>& index = mesh->indices;
+    size_t kept = 0;
+    for (size_t i = 0; i + 2 < index.size(); i += 3) {
+        const Vec3 &a = mesh->positions[index[i]], &b = mesh->positions[index[i + 1]], &c = mesh->positions[index[i + 2]];
+        const float area2 = length_squared(cross(b - a, c - a));
+        if (!(area2 > 0) || !std::isfinite(1 / std::sqrt(area2))) continue;
+        for (int k = 0; k < 3; ++k) index[kept + size_t(k)] = index[i + size_t(k)];
+        kept += 3;
+    }
+    index.resize(kept);
+}
+
+}  // namespace
+
+Status Scene::check() const {
+    const Checker checker{description_};
+    for (const TriangleMesh& m : description_.meshes) LL_RETURN_IF_ERROR(checker.mesh(m, true));
+    for (const Sphere& s : description_.spheres) LL_RETURN_IF_ERROR(checker.sphere(s, true));
+    for (const ObjectDefinition& o : description_.objects) {
+        for (const TriangleMesh& m : o.meshes) LL_RETURN_IF_ERROR(checker.mesh(m, false));
+        for (const Sphere& s : o.spheres) LL_RETURN_IF_ERROR(checker.sphere(s, false));
+    }
+    for (const Instance& i : description_.instances) {
+        if (i.object < 0 || size_t(i.object) >= description_.objects.size())
+            return invalid_argument(i.source + ": no such object to instance");
+        if (!inverse(i.object_to_world)) return invalid_argument(i.source + ": the instance's transformation is singular");
+    }
+    for (const AreaEmission& e : description_.emissions)
+        if (!rgb_ok(e.radiance)) return invalid_argument("an area light's radiance is negative or not finite");
+    for (const InfiniteLight& l : description_.infinite_lights) {
+        if (!rgb_ok(l.radiance)) return invalid_argument("an infinite light's radiance is negative or not finite");
+        if (!inverse(l.light_to_world)) return invalid_argument("an infinite light's transformation is singular");
+        if (l.image != kNone && (size_t(l.image) >= description_.images.size() || description_.images[size_t(l.image)].empty()))
+            return invalid_argument("an infinite light's image is missing or empty");
+    }
+    return {};
+}
+
+void Scene::collect_emitters(std::vector<Emitter>* emitters) {
+    const auto new_light = [&](const std::string& source) {
+        light_sources_.push_back(source);
+        return int32_t(light_sources_.size()) - 1;
+    };
+    for (const TriangleMesh& mesh : description_.meshes) {
+        const bool emits = mesh.attributes.emission != kNone &&
+                           !description_.emissions[size_t(mesh.attributes.emission)].radiance.is_black();
+        mesh_first_emitter_.push_back(emits ? int32_t(emitters->size()) : kNone);
+        if (!emits) continue;
+        const AreaEmission& emission = description_.emissions[size_t(mesh.attributes.emission)];
+        Emitter e;
+        e.kind = EmitterKind::kTriangle;
+        e.two_sided = emission.two_sided;
+        e.radiance = emission.radiance;
+        e.light = new_light(mesh.attributes.source);
+        for (size_t t = 0; t + 2 < mesh.indices.size(); t += 3) {
+            const uint32_t* index = &mesh.indices[t];
+            e.position = mesh.positions[index[0]];
+            e.edge1 = mesh.positions[index[1]] - e.position;
+            e.edge2 = mesh.positions[index[2]] - e.position;
+            const Vec3 n = cross(e.edge1, e.edge2);
+            const float len = length(n);
+            e.normal = n / len;
+            e.inv_area = 2 / len;
+            if (mesh.attributes.flip_normal) e.normal = -e.normal;
+            // The emitting side must be the one that a hit sees: Scene::triangle_point() turns the geometric normal
+            // towards the interpolated one, which may differ within a triangle only for broken meshes.
+            if (!mesh.normals.empty())
+                e.normal = face_forward(e.normal, mesh.normals[index[0]] + mesh.normals[index[1]] + mesh.normals[index[2]]);
+            emitters->push_back(e);
+        }
+    }
+    for (const Sphere& s : description_.spheres) {
+        const bool emits =
+            s.attributes.emission != kNone && !description_.emissions[size_t(s.attributes.emission)].radiance.is_black();
+        sphere_emitter_.push_back(emits ? int32_t(emitters->size()) : kNone);
+        if (!emits) continue;
+        const AreaEmission& emission = description_.emissions[size_t(s.attributes.emission)];
+        Emitter e;
+        e.kind = EmitterKind::kSphere;
+        e.two_sided = emission.two_sided;
+        e.radiance = emission.radiance;
+        e.position = s.centre;
+        e.radius = s.radius;
+        e.inward = s.attributes.flip_normal;
+        e.inv_area = 1 / (4 * kPi * s.radius * s.radius);
+        e.light = new_light(s.attributes.source);
+        emitters->push_back(e);
+    }
+    for (const PointLight& l : description_.point_lights) {
+        Emitter e;
+        e.kind = EmitterKind::kPoint;
+        e.position = l.position;
+        e.radiance = l.intensity;
+        e.light = new_light("point light");
+        emitters->push_back(e);
+    }
+    for (const SpotLight& l : description_.spot_lights) {
+        Emitter e;
+        e.kind = EmitterKind::kSpot;
+        e.position = l.position;
+        e.normal = l.axes.n;
+        e.radiance = l.intensity;
+        e.cos_total = l.cos_total;
+        e.cos_falloff = l.cos_falloff;
+        e.light = new_light("spot light");
+        emitters->push_back(e);
+    }
+    for (const DistantLight& l : description_.distant_lights) {
+        Emitter e;
+        e.kind = EmitterKind::kDistant;
+        e.normal = l.direction;
+        e.radiance = l.irradiance;
+        e.light = new_light("distant light");
+        emitters->push_back(e);
+    }
+    if (!description_.infinite_lights.empty()) {
+        Emitter e;
+        e.kind = EmitterKind::kEnvironment;
+        e.light = new_light("infinite light");
+        emitters->push_back(e);
+    }
+}
+
+Result<std::unique_ptr<Scene>> Scene::build(SceneDescription description, const SceneOptions& options) {
+    const auto start = std::chrono::steady_clock::now();
+    std::unique_ptr<Scene> scene(new Scene);
+    scene->description_ = std::move(description);
+    SceneDescription& d = scene->description_;
+    LL_RETURN_IF_ERROR(scene->check());
+
+    const auto prepare = [](std::vector<TriangleMesh>& meshes) {
+        for (TriangleMesh& m : meshes) {
+            drop_degenerate_triangles(&m);
+            m.positions.push_back({});  // padding that Embree's shared buffers need
+        }
+    };
+    prepare(d.meshes);
+    for (ObjectDefinition& o : d.objects) prepare(o.meshes);
+    scene->tables_ = {d.textures, d.images, d.materials};
+    for (const Instance& i : d.instances) scene->instance_inverse_.push_back(*inverse(i.object_to_world));
+
+    FilmDescription& film = d.film;
+    if (options.width < 0 || options.height < 0 || (options.width == 0) != (options.height == 0))
+        return invalid_argument("a resolution needs a positive width and height");
+    FrameLayout& frame = scene->frame_;
+    frame.width = options.width > 0 ? options.width : film.width;
+    frame.height = options.height > 0 ? options.height : film.height;
+    if (frame.width <= 0 || frame.height <= 0 || frame.width > 65536 || frame.height > 65536)
+        return invalid_argument("the image resolution must lie between 1 and 65536 pixels");
+    frame.crop = {0, 0, frame.width, frame.height};
+    if (film.crop[0] >= 0) {
+        // The crop scales with an overridden resolution, rounded outwards.
+        const auto scaled = [](int v, int from, int to, bool up) { return int((int64_t(v) * to + (up ? from - 1 : 0)) / from); };
+        frame.crop = {scaled(film.crop[0], film.width, frame.width, false), scaled(film.crop[2], film.height, frame.height, false),
+                      scaled(film.crop[1], film.width, frame.width, true), scaled(film.crop[3], film.height, frame.height, true)};
+        if (frame.crop.empty() || frame.crop.x1 > frame.width || frame.crop.y1 > frame.height)
+            return invalid_argument("the film's crop window is empty or outside of the frame");
+    }
+    Result<Camera> camera = Camera::create(d.camera, frame.width, frame.height);
+    if (!camera.ok()) return camera.status();
+    scene->camera_ = *camera;
+
+    Result<std::unique_ptr<Accel>> accel = Accel::build(d, &Scene::opacity, scene.get());
+    if (!accel.ok()) return accel.status();
+    scene->accel_ = std::move(accel).value();
+
+    std::vector<Emitter> emitters;
+    scene->collect_emitters(&emitters);
+    const Bounds3 bounds = scene->accel_->bounds();
+    const Vec3 centre = bounds.empty() ? Vec3{} : bounds.centre();
+    // A little larger than the bounding sphere, so that rounding never starts a light sub-path inside of the scene.
+    const float radius = bounds.empty() ? 1.0f : length(bounds.hi - centre) * 1.0001f + 1e-6f;
+    scene->emitters_ = EmitterSet(std::move(emitters), Environment(d.infinite_lights, d.images), centre, radius);
+
+    scene->summarise();
+    scene->summary_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return scene;
+}
+
+void Scene::summarise() {
+    SceneSummary& s = summary_;
+    const auto count = [&](const std::vector<TriangleMesh>& meshes) {
+        uint64_t triangles = 0;
+        for (const TriangleMesh& m : meshes) {
+            triangles += m.indices.size() / 3;
+            s.geometry_bytes += m.positions.size() * sizeof(Vec3) + m.normals.size() * sizeof(Vec3) +
+                                m.uvs.size() * sizeof(Vec2) + m.indices.size() * sizeof(uint32_t);
+        }
+        return triangles;
+    };
+    s.triangle_count = s.instanced_triangle_count = count(description_.meshes);
+    s.sphere_count = description_.spheres.size();
+    std::vector<uint64_t> object_triangles;
+    for (const ObjectDefinition& o : description_.objects) {
+        object_triangles.push_back(count(o.meshes));
+        s.triangle_count += object_triangles.back();
+        s.sphere_count += o.spheres.size();
+    }
+    for (const Instance& i : description_.instances) s.instanced_triangle_count += object_triangles[size_t(i.object)];
+    s.instance_count = description_.instances.size();
+    s.texture_count = description_.textures.size();
+    for (const Image& image : description_.images) s.image_bytes += image.memory_bytes();
+    s.acceleration_bytes = accel_->memory_bytes();
+    static constexpr const char* kKinds[] = {"area", "area", "point", "spot", "distant", "infinite"};
+    s.lights.resize(light_sources_.size());
+    for (const Emitter& e : emitters_.all()) {
+        SceneSummary::Light& light = s.lights[size_t(e.light)];
+        light.kind = kKinds[int(e.kind)];
+        light.where = light_sources_[size_t(e.light)];
+        light.power += emitters_.power(e);
+        ++light.primitives;
+        s.emissive_triangle_count += e.kind == EmitterKind::kTriangle;
+    }
+}
+
+}  // namespace lightloom

@@ -1,0 +1,81 @@
+// Throughput of light transport alone: samples and rays per second of each algorithm on a scene, one process, a given
+// number of threads, algorithms interleaved over repetitions so that a drift of the machine hits all of them.
+//
+//   throughput SCENE [--algorithms path,bdpt] [--iterations N] [--repetitions N] [--threads N] [--resolution WxH]
+
+#include <tbb/global_control.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+
+#include "common/import/import.h"
+#include "common/transport/renderer.h"
+
+using namespace lightloom;
+
+int main(int argc, char** argv) {
+    CLI::App app("Samples and rays per second of light transport");
+    std::string scene_path;
+    std::vector<std::string> algorithms{"path", "bdpt"};
+    int iterations = 2, repetitions = 5, threads = 1;
+    std::string resolution;
+    app.add_option("scene", scene_path)->required();
+    app.add_option("--algorithms", algorithms)->delimiter(',');
+    app.add_option("--iterations", iterations);
+    app.add_option("--repetitions", repetitions);
+    app.add_option("--threads", threads);
+    app.add_option("--resolution", resolution);
+    CLI11_PARSE(app, argc, argv);
+
+    tbb::global_control control(tbb::global_control::max_allowed_parallelism, size_t(threads));
+    auto imported = import_pbrt(scene_path);
+    if (!imported.ok()) return std::fprintf(stderr, "%s\n", imported.status().message().c_str()), 2;
+    SceneOptions options;
+    if (!resolution.empty() && std::sscanf(resolution.c_str(), "%dx%d", &options.width, &options.height) != 2) return 2;
+    const int max_depth = imported->description.max_depth;
+    auto built = Scene::build(std::move(imported->description), options);
+    if (!built.ok()) return std::fprintf(stderr, "%s\n", built.status().message().c_str()), 2;
+    std::shared_ptr<const Scene> scene = std::move(built).value();
+
+    struct Row {
+        std::unique_ptr<Renderer> renderer;
+        std::vector<double> samples, rays;
+        double mean = 0;
+    };
+    std::vector<Row> rows(algorithms.size());
+    for (size_t i = 0; i < rows.size(); ++i) {
+        RenderSettings settings;
+        settings.algorithm = algorithms[i];
+        settings.max_depth = max_depth;
+        auto r = Renderer::create(scene, settings);
+        if (!r.ok()) return std::fprintf(stderr, "%s\n", r.status().message().c_str()), 2;
+        rows[i].renderer = std::move(*r);
+    }
+    const Rect crop = scene->frame().crop;
+    const double samples = double(crop.area()) * iterations;
+    for (int rep = 0; rep < repetitions; ++rep)
+        for (Row& row : rows) {
+            const auto start = std::chrono::steady_clock::now();
+            auto partial = row.renderer->render({uint64_t(rep) * uint64_t(iterations), uint32_t(iterations), 0, crop, 0,
+                                                 uint64_t(samples)}, {});
+            const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+            if (!partial.ok()) return std::fprintf(stderr, "%s\n", partial.status().message().c_str()), 1;
+            row.samples.push_back(samples / seconds);
+            row.rays.push_back(double(partial->counters.rays) / seconds);
+            double sum = 0;
+            for (const double v : partial->camera) sum += v / samples;
+            for (const SplatSum& s : partial->splats) sum += (s.rgb[0] + s.rgb[1] + s.rgb[2]) / samples / double(crop.area());
+            row.mean += sum / 3 / repetitions;
+        }
+    const auto median = [](std::vector<double> v) {
+        std::sort(v.begin(), v.end());
+        return v[v.size() / 2];
+    };
+    for (size_t i = 0; i < rows.size(); ++i)
+        std::printf("%-8s %d thread(s)  %9.0f samples/s  %6.3f M rays/s  %5.1f rays/sample  image mean %.6f\n",
+                    algorithms[i].c_str(), threads, median(rows[i].samples), median(rows[i].rays) * 1e-6,
+                    median(rows[i].rays) / median(rows[i].samples), rows[i].mean);
+    return 0;
+}

@@ -1,0 +1,324 @@
+// The weight suites: on the very same path, the weights of all techniques sum to one, and every technique describes that
+// path by the same PathView. Everything is rebuilt through production code.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/transport/bdpt.h"
+#include "common/transport/light.h"
+#include "common/transport/path.h"
+#include "tests/support/path_generator.h"
+#include "tests/support/small_scenes.h"
+
+namespace lightloom {
+namespace {
+
+using testing::FullPath;
+using testing::SceneBuilder;
+
+/// Vertex merging with a fixed radius on top of classic connections [Georgiev et al. 2012]: a stub that shows that the
+/// evaluator needs no change for merges.
+struct MergeStubSelection {
+    static constexpr bool kMerges = true;
+    BdptSelection connections;
+    double light_paths = 4096, radius = 0.02;
+
+    int s_min(int k) const { return connections.s_min(k); }
+    int s_max(int k) const { return connections.s_max(k); }
+    double connect_factor(const PathView& view, int s) const { return connections.connect_factor(view, s); }
+    double merge_factor(const PathView&, int) const { return light_paths * kPiD * radius * radius; }
+};
+
+/// Pairs every camera sub-path with `per_pair` light sub-paths chosen over the whole frame (matrix BDPT's shape): each light
+/// path is equally likely, so sigma of a connection is the number of pairs.
+struct PairingStubSelection {
+    static constexpr bool kMerges = false;
+    BdptSelection connections;
+    double pairs = 4;
+
+    int s_min(int k) const { return connections.s_min(k); }
+    int s_max(int k) const { return connections.s_max(k); }
+    double connect_factor(const PathView& view, int s) const {
+        return connections.connect_factor(view, s) * (s >= 2 && s < view.k ? pairs : 1);
+    }
+};
+
+/// Sum of the weights of all techniques that can make `path`, each from its own rebuilt view.
+template <class Selection>
+double weight_sum(const Scene& scene, const FullPath& path, const Selection& selection, Heuristic heuristic) {
+    double sum = 0;
+    const int k = path.k();
+    std::optional<testing::Rebuilt> any;
+    for (int s = selection.s_min(k); s <= selection.s_max(k); ++s) {
+        const auto r = testing::rebuild(scene, path, s);
+        if (!r) continue;
+        sum += mis_weight(r->view, {TechniqueKind::kConnect, s}, selection, heuristic);
+        any = r;
+    }
+    if constexpr (Selection::kMerges) {
+        for (int i = 1; any && i < k; ++i)
+            if (!any->view.delta[i]) sum += mis_weight(any->view, {TechniqueKind::kMerge, i}, selection, heuristic);
+    }
+    return sum;
+}
+
+struct NamedScene {
+    const char* name;
+    std::shared_ptr<const Scene> (*make)();
+};
+
+std::shared_ptr<const Scene> diffuse_box() { return testing::cornell_builder().build(); }
+
+std::shared_ptr<const Scene> glass_and_mirror() {
+    SceneBuilder b = testing::cornell_builder();
+    Material glass;
+    glass.kind = MaterialKind::kDielectric;
+    glass.ior = 1.5f;
+    Material mirror;
+    mirror.kind = MaterialKind::kConductor;
+    mirror.reflectance = b.constant({0.9f, 0.8f, 0.7f});
+    b.sphere({-0.4f, 0.35f, 0}, 0.35f, b.add(glass));
+    b.quad({-0.9f, 0.3f, 0.95f}, {0, 1, 0}, {1.4f, 0, 0}, b.add(mirror));
+    return b.build();
+}
+
+std::shared_ptr<const Scene> rough_and_coated() {
+    SceneBuilder b = testing::cornell_builder();
+    const TextureId rough = b.constant(Rgb(0.3f)), fine = b.constant(Rgb(0.05f));
+    Material coat;
+    coat.kind = MaterialKind::kCoatedDiffuse;
+    coat.reflectance = b.constant({0.5f, 0.4f, 0.3f});
+    coat.roughness_u = coat.roughness_v = rough;
+    coat.remap_roughness = false;
+    Material smooth_coat = coat;
+    smooth_coat.roughness_u = smooth_coat.roughness_v = b.constant(Rgb(0.0f));
+    Material metal;
+    metal.kind = MaterialKind::kConductor;
+    metal.reflectance = b.constant({0.9f, 0.8f, 0.7f});
+    metal.roughness_u = metal.roughness_v = fine;
+    Material frosted;
+    frosted.kind = MaterialKind::kDielectric;
+    frosted.ior = 1.5f;
+    frosted.roughness_u = frosted.roughness_v = rough;
+    frosted.remap_roughness = false;
+    b.sphere({-0.4f, 0.35f, 0}, 0.35f, b.add(metal));
+    b.sphere({-0.2f, 1.3f, 0.3f}, 0.3f, b.add(frosted));
+    b.description().meshes[0].attributes.material = b.add(coat);
+    b.description().meshes[5].attributes.material = b.add(smooth_coat);
+    return b.build();
+}
+
+std::shared_ptr<const Scene> delta_lights() {
+    SceneBuilder b = testing::cornell_builder();
+    b.description().meshes.erase(b.description().meshes.begin() + 1);  // open the ceiling to the distant light
+    b.description().point_lights.push_back({{0.5f, 1.5f, -0.5f}, {1, 2, 3}});
+    SpotLight spot;
+    spot.position = {-0.5f, 1.8f, 0};
+    spot.axes = Frame(normalize(Vec3{0.3f, -1, 0.2f}));
+    spot.intensity = {5, 4, 3};
+    spot.cos_total = 0.7f, spot.cos_falloff = 0.9f;
+    b.description().spot_lights.push_back(spot);
+    b.description().distant_lights.push_back({normalize(Vec3{0.2f, -1, 0.1f}), {2, 2, 2}});
+    return b.build();
+}
+
+std::shared_ptr<const Scene> environment_lit() {
+    SceneBuilder b;
+    const MaterialId white = b.diffuse(Rgb(0.6f));
+    b.quad({-2, 0, -2}, {0, 0, 4}, {4, 0, 0}, white);
+    b.sphere({0, 0.5f, 0}, 0.5f, white);
+    Image map;
+    map.width = map.height = 8;
+    for (int i = 0; i < 64; ++i) map.floats.insert(map.floats.end(), {0.1f * float(i % 7), 0.3f, float(i == 20) * 30});
+    b.description().images.push_back(map);
+    InfiniteLight image_light, constant_light;
+    image_light.image = 0;
+    image_light.light_to_world = rotation(40, 1, 1, 0);
+    constant_light.radiance = {0.2f, 0.3f, 0.1f};
+    b.description().infinite_lights = {image_light, constant_light};
+    b.quad({-1, 1.5f, 0}, {0.5f, 0, 0}, {0, 0, 0.5f}, white, b.emission({4, 4, 4}, true));
+    b.look({0, 1.5f, -3}, {0, 0.4f, 0}, 50);
+    return b.build();
+}
+
+std::shared_ptr<const Scene> smooth_normals_and_lens() {
+    SceneBuilder b = testing::cornell_builder();
+    // A coarse pyramid with normals far from the geometric ones, one side of it emitting.
+    TriangleMesh mesh;
+    mesh.positions = {{-0.3f, 0.01f, -0.3f}, {0.3f, 0.01f, -0.3f}, {0.3f, 0.01f, 0.3f}, {-0.3f, 0.01f, 0.3f}, {0, 0.6f, 0}};
+    for (const Vec3& p : mesh.positions) mesh.normals.push_back(normalize(p - Vec3{0, -0.1f, 0}));
+    mesh.indices = {1, 0, 4, 2, 1, 4, 3, 2, 4, 0, 3, 4};
+    mesh.attributes = {b.diffuse({0.4f, 0.6f, 0.8f}), kNone, kNone, false, "pyramid"};
+    TriangleMesh lamp = mesh;
+    for (Vec3& p : lamp.positions) p = p * 0.4f + Vec3{0.5f, 1.2f, -0.2f};
+    lamp.attributes.emission = b.emission({6, 5, 4});
+    b.description().meshes.push_back(mesh);
+    b.description().meshes.push_back(lamp);
+    b.sphere({-0.6f, 0.2f, 0.4f}, 0.2f, b.diffuse({0.3f, 0.3f, 0.3f}), b.emission({2, 2, 3}));
+    b.description().camera.lens_radius = 0.03f;
+    b.description().camera.focal_distance = 1.2f;
+    return b.build();
+}
+
+constexpr NamedScene kScenes[] = {
+    {"diffuse_box", diffuse_box},         {"glass_and_mirror", glass_and_mirror}, {"rough_and_coated", rough_and_coated},
+    {"delta_lights", delta_lights},       {"environment_lit", environment_lit},   {"smooth_normals_and_lens", smooth_normals_and_lens},
+};
+
+class Weights : public ::testing::TestWithParam<NamedScene> {};
+
+/// Weights come from float densities, recomputed along directions that differ in the last bits; grazing events and
+/// refraction near the critical angle amplify that. 1e-4 must hold for nearly all paths, one per cent for all but those.
+struct Tally {
+    uint64_t paths = 0, loose = 0, gross = 0;
+    void add(double deviation) {
+        ++paths;
+        loose += !(std::fabs(deviation) <= 1e-4);
+        gross += !(std::fabs(deviation) <= 1e-2);
+    }
+    void check(const char* what) const {
+        EXPECT_GT(paths, 500u) << what;
+        EXPECT_LT(double(loose), 2e-3 * double(paths)) << what << ": " << loose << " of " << paths << " deviate by over 1e-4";
+        EXPECT_LE(double(gross), 2e-4 * double(paths)) << what << ": " << gross << " of " << paths << " deviate by over 1e-2";
+    }
+};
+
+TEST_P(Weights, SumToOneOverAllTechniques) {
+    const auto scene = GetParam().make();
+    BdptSelection bdpt;
+    bdpt.light_paths_per_iteration = double(scene->frame().crop.area());
+    const MergeStubSelection merging{bdpt};
+    const PairingStubSelection pairing{bdpt};
+    Tally tallies[6];
+    std::vector<int> made(16, 0);
+    testing::for_each_path(*scene, 10000, 7, 11, [&](const FullPath& path, int s, const PathView&, const Rgb&) {
+        ++made[size_t(s)];
+        if (path.k() < 2) return;
+        tallies[0].add(weight_sum(*scene, path, bdpt, Heuristic::kBalance) - 1);
+        tallies[1].add(weight_sum(*scene, path, bdpt, Heuristic::kPower) - 1);
+        tallies[2].add(weight_sum(*scene, path, merging, Heuristic::kBalance) - 1);
+        tallies[3].add(weight_sum(*scene, path, pairing, Heuristic::kBalance) - 1);
+        if (s <= 1) tallies[4].add(weight_sum(*scene, path, PathSelection{}, Heuristic::kBalance) - 1);
+        if (s == path.k()) tallies[5].add(weight_sum(*scene, path, LightSelection{}, Heuristic::kBalance) - 1);
+    });
+    const char* names[] = {"bdpt balance", "bdpt power", "merge stub", "pairing stub", "path", "light"};
+    for (int i = 0; i < 6; ++i) tallies[i].check(names[i]);
+    for (int s = 0; s <= 4; ++s) EXPECT_GT(made[size_t(s)], 20) << "technique s = " << s << " was hardly exercised";
+}
+
+TEST_P(Weights, EveryTechniqueSeesTheSamePath) {
+    const auto scene = GetParam().make();
+    Tally densities, contributions;
+    testing::for_each_path(*scene, 1500, 6, 12, [&](const FullPath& path, int own, const PathView&, const Rgb&) {
+        const int k = path.k();
+        if (k < 2) return;
+        // f = contribution * density of the technique: the same number for all of them.
+        const auto f_of = [&](const PathView& v, const Rgb& c, int s) {
+            double density = s == 1 ? v.next_event : 1;
+            for (int i = 0; i < k; ++i)
+                if (!(s == 1 && i == 0)) density *= i < s ? v.fwd[i] : v.rev[i];
+            return density * scalar_of(c);
+        };
+        const auto mine = testing::rebuild(*scene, path, own);
+        if (!mine) return;
+        const double f = f_of(mine->view, mine->contribution, own);
+        for (int s = 0; s <= k; ++s) {
+            const auto other = testing::rebuild(*scene, path, s);
+            if (!other) continue;
+            EXPECT_EQ(other->view.k, k);
+            for (int i = 0; i < k; ++i) {
+                EXPECT_EQ(other->view.delta[i], path.x[size_t(i)].delta);
+                densities.add(other->view.fwd[i] / mine->view.fwd[i] - 1);
+                if (mine->view.rev[i] > 0) densities.add(other->view.rev[i] / mine->view.rev[i] - 1);
+            }
+            densities.add(other->view.next_event / mine->view.next_event - 1);
+            contributions.add(f_of(other->view, other->contribution, s) / f - 1);
+        }
+    });
+    densities.check("densities");
+    contributions.check("path integrand");
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, Weights, ::testing::ValuesIn(kScenes),
+                         [](const ::testing::TestParamInfo<NamedScene>& param) { return param.param.name; });
+
+// Synthetic views: no geometry, exact double densities.
+
+PathView synthetic_view(int k, uint64_t seed, double scale) {
+    Rng rng({seed, Stage::kTraining, 0, 0});
+    PathView view;
+    view.k = k;
+    // Area densities scale with 1 / length^2.
+    const auto density = [&] { return std::exp((rng.uniform_double() - 0.5) * 24) / (scale * scale); };
+    for (int i = 0; i < k; ++i) {
+        view.fwd[i] = density();
+        view.rev[i] = density();
+        view.delta[i] = i > 0 && rng.uniform() < 0.2f;
+    }
+    view.delta[0] = false;
+    view.next_event = density();
+    return view;
+}
+
+TEST(WeightEvaluator, PartitionOfUnityOnSyntheticPaths) {
+    for (uint64_t seed = 0; seed < 2000; ++seed) {
+        const int k = 2 + int(seed % 9);
+        const PathView view = synthetic_view(k, seed, 1);
+        const MergeStubSelection selection{{4096}, 1000, 0.01};
+        for (const Heuristic h : {Heuristic::kBalance, Heuristic::kPower, Heuristic::kMaximum}) {
+            double sum = 0;
+            for (int s = 0; s <= k; ++s) {
+                const bool blocked = (s > 0 && view.delta[s - 1]) || (s > 0 && s < k && view.delta[s]);
+                if (!blocked) sum += mis_weight(view, {TechniqueKind::kConnect, s}, selection, h);
+            }
+            for (int i = 1; i < k; ++i)
+                if (!view.delta[i]) sum += mis_weight(view, {TechniqueKind::kMerge, i}, selection, h);
+            EXPECT_NEAR(sum, 1, 1e-10) << "seed " << seed << " k " << k;
+        }
+    }
+}
+
+TEST(WeightEvaluator, EqualsExplicitProducts) {
+    for (uint64_t seed = 0; seed < 500; ++seed) {
+        const int k = 2 + int(seed % 7);
+        const PathView view = synthetic_view(k, seed, 1);
+        const BdptSelection selection{1000};
+        std::vector<double> rho(size_t(k) + 1, 0);
+        double sum = 0;
+        for (int s = 0; s <= k; ++s) {
+            if ((s > 0 && view.delta[s - 1]) || (s > 0 && s < k && view.delta[s])) continue;
+            double p = selection.connect_factor(view, s);
+            for (int i = 0; i < k; ++i) p *= i < s ? view.fwd[i] : view.rev[i];
+            sum += rho[size_t(s)] = p;
+        }
+        for (int s = 0; s <= k; ++s)
+            if (rho[size_t(s)] > 0) {
+                EXPECT_NEAR(mis_weight(view, {TechniqueKind::kConnect, s}, selection), rho[size_t(s)] / sum, 1e-12);
+            }
+    }
+}
+
+/// Depth 64 and scenes scaled by 1e-4 and 1e4: whole-path products would leave the range of double.
+TEST(WeightEvaluator, LongPathsAndScaledScenesKeepTheirWeights) {
+    for (uint64_t seed = 0; seed < 50; ++seed) {
+        const int k = 64;
+        const BdptSelection selection{1};
+        const PathView base = synthetic_view(k, seed, 1);
+        for (const double scale : {1e-4, 1e4}) {
+            const PathView scaled = synthetic_view(k, seed, scale);
+            double sum = 0;
+            for (int s = 0; s <= k; ++s) {
+                if ((s > 0 && base.delta[s - 1]) || (s > 0 && s < k && base.delta[s])) continue;
+                const double a = mis_weight(base, {TechniqueKind::kConnect, s}, selection);
+                const double b = mis_weight(scaled, {TechniqueKind::kConnect, s}, selection);
+                EXPECT_NEAR(a, b, 1e-9);
+                sum += b;
+            }
+            EXPECT_NEAR(sum, 1, 1e-9);
+        }
+    }
+}
+
+}  // namespace
+}  // namespace lightloom
