@@ -25,7 +25,7 @@ struct SceneFacts {
     int max_depth = 5;         ///< Bounces, if the job leaves them to the scene.
 };
 
-using SceneReader = std::function<Result<SceneFacts>(const JobSpec& spec, std::stop_token stop)>;
+using SceneReader = std::function<Result<SceneFacts>(const AssetStore& assets, const JobSpec& spec, std::stop_token stop)>;
 
 struct CoordinatorOptions {
     std::filesystem::path directory;  ///< Assets and finished images; made if need be.

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <charconv>
 #include <ctime>
 
 #include "common/film/atomic_file.h"
@@ -31,8 +32,8 @@ std::map<std::string, std::string> complete_parameters(const AlgorithmInfo& algo
     std::map<std::string, std::string> out;
     for (size_t i = 0; i < algorithm.parameters.size(); ++i) {
         char text[64];
-        std::snprintf(text, sizeof text, "%.17g", values.values[i]);
-        out[std::string(algorithm.parameters[i].name)] = text;
+        const auto end = std::to_chars(text, text + sizeof text, values.values[i]).ptr;
+        out[std::string(algorithm.parameters[i].name)] = std::string(text, end);
     }
     return out;
 }
@@ -45,7 +46,7 @@ void Coordinator::prepare(JobRecord& job, std::stop_token stop) {
         const std::lock_guard lock(mutex_);
         spec = job.spec;
     }
-    const auto facts = options_.read_scene(spec, stop);
+    const auto facts = options_.read_scene(assets_, spec, stop);
     const auto algorithm = find_algorithm(spec.algorithm);
     const auto parameters = parse_parameters(**algorithm, spec.parameters);
 

@@ -91,8 +91,12 @@ Status Worker::run(std::stop_token stop) {
         });
         const auto work = [&] {
             lane(internal.get_token());
-            const std::lock_guard lock(mutex_);
-            if (!refusal_.ok()) internal.request_stop();
+            bool refused = false;
+            {
+                const std::lock_guard lock(mutex_);
+                refused = !refusal_.ok();
+            }
+            if (refused) internal.request_stop();
         };
         // Two lanes: while one renders, the other submits its partial and leases the next unit.
         std::jthread first(work), second(work);

@@ -1,4 +1,4 @@
-# cmake -DROOT=... -DVERSION=... -DCOMPILER=... -DOUT=... -P build_id.cmake
+# cmake -DROOT=... -DVERSION=... -DTOOLS=... -DOUT=... -P build_id.cmake
 file(GLOB_RECURSE sources RELATIVE ${ROOT} ${ROOT}/common/*.h ${ROOT}/common/*.cpp)
 list(SORT sources)
 set(text "")
@@ -11,6 +11,6 @@ string(SUBSTRING ${digest} 0 16 short)
 file(WRITE ${OUT} "#include \"common/work/identity.h\"
 namespace lightloom {
 const char* const kBuildId = \"${VERSION}+${short}\";
-const char* const kCompiler = \"${COMPILER}\";
+const char* const kTools = \"${TOOLS}\";
 }  // namespace lightloom
 ")

@@ -9,7 +9,8 @@ namespace lightloom {
 
 /// Version and digest of all sources under common/, for example "0.1.0+1a2b3c4d5e6f7081".
 extern const char* const kBuildId;
-extern const char* const kCompiler;
+/// Compiler and ray tracer with their versions, for example "GNU-12.2.0 embree-3.13.5".
+extern const char* const kTools;
 
 /// Compiler, instruction set, contraction, ray tracer with its instruction set.
 std::string math_profile();
