@@ -1,6 +1,7 @@
 // lightloom compare: how far an image is from a reference.
 
 #include <cstdio>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -156,8 +157,10 @@ void add_compare_command(CLI::App& app, int* exit_code) {
     command->add_option("image", options->image, "Image to judge (EXR)")->required();
     command->add_option("reference", options->reference, "Reference (EXR)")->required();
     CLI::Option* json =
-        command->add_option("--json", options->json, "Write the metrics as JSON to FILE, or to standard output instead of the "
-                                                     "table if no FILE follows (then give it last)")
+        command
+            ->add_option("--json", options->json,
+                         "Write the metrics as JSON to FILE, or to standard output instead of the table if no FILE "
+                         "follows (then give it last)")
             ->type_name("[FILE]")
             ->expected(0, 1);
     command->add_option("--heat", options->heat,

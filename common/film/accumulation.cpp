@@ -1,63 +1,25 @@
 #include "common/film/accumulation.h"
 
-#include <bit>
-#include <cmath>
-#include <limits>
 #include <string>
 
 namespace lightloom {
 
 namespace {
 
-constexpr double kStepsPerUnit = 0x1p44;
-/// |sum| stays below 2^127 steps.
-constexpr double kRange = 0x1p83;
+constexpr double kRange = FixedSums::kRange;
 
-/// `value` in steps of 2^-44, rounded to nearest even. `value` is finite and |value| < kRange.
-inline Int128 to_fixed(double value) {
-    const double steps = value * kStepsPerUnit;  // Exact: a power of two, and no overflow below kRange.
-    if (std::fabs(steps) < 0x1p62) return std::llrint(steps);
-    // Beyond 2^53 every double is an integer: its mantissa, shifted.
-    const uint64_t bits = std::bit_cast<uint64_t>(steps);
-    const int shift = int((bits >> 52) & 0x7ff) - 1075;
-    const Int128 magnitude = Int128((bits & 0xfffffffffffffull) | 0x10000000000000ull) << shift;
-    return (bits >> 63) ? -magnitude : magnitude;
-}
-
-inline double to_double(Int128 steps) { return double(steps) * (1.0 / kStepsPerUnit); }
-
-inline bool addition_overflows(Int128 sum, double value) {
-    Int128 result;
-    return __builtin_add_overflow(sum, to_fixed(value), &result);
-}
-
-/// Largest magnitude, rounded up a little so that sums of these bounds stay bounds.
-double largest_magnitude(const double* values, size_t count) {
-    double largest = 0;
-    for (size_t i = 0; i < count; ++i) {
-        const double magnitude = std::fabs(values[i]);
-        largest = magnitude > largest ? magnitude : largest;
-    }
-    return largest * (1 + 0x1p-40) + 1 / kStepsPerUnit;
-}
-
-double largest_splat(const std::vector<SplatSum>& splats) {
-    double largest = 0;
-    for (const SplatSum& splat : splats) {
-        for (double value : splat.rgb) largest = std::fabs(value) > largest ? std::fabs(value) : largest;
-    }
-    return largest * (1 + 0x1p-40) + 1 / kStepsPerUnit;
-}
+/// Rounded up a little, so that sums of bounds stay bounds.
+double loosened(double bound) { return bound * (1 + 0x1p-40) + 0x1p-44; }
 
 Status out_of_range() {
     return data_loss("accumulation: a sum would exceed the range of about 1e25 radiance units; the partial was not added");
 }
 
 /// Value of one channel of a group or of the whole: camera mean plus splats per light path.
-inline double pixel_value(Int128 camera, uint64_t count, Int128 splat, uint64_t light_paths) {
+inline double pixel_value(double camera, uint64_t count, double splat, uint64_t light_paths) {
     double value = 0;
-    if (count != 0) value += to_double(camera) / double(count);
-    if (light_paths != 0) value += to_double(splat) / double(light_paths);
+    if (count != 0) value += camera / double(count);
+    if (light_paths != 0) value += splat / double(light_paths);
     return value;
 }
 
@@ -70,11 +32,11 @@ GroupSum::GroupSum(const FrameLayout& frame)
       camera_count_(size_t(frame.crop.area())) {}
 
 Status GroupSum::add(const Partial& partial) {
-    LL_RETURN_IF_ERROR(check_partial(partial, frame_));
+    const Result<PartialBounds> bounds = check_partial(partial, frame_);
+    if (!bounds.ok()) return bounds.status();
 
     const Rect& tile = partial.tile;
-    const double camera_largest = largest_magnitude(partial.camera.data(), partial.camera.size());
-    const double splat_largest = largest_splat(partial.splats);
+    const double camera_largest = loosened(bounds->camera), splat_largest = loosened(bounds->splat);
     if (camera_largest >= kRange || splat_largest >= kRange) return out_of_range();
     const size_t row_values = size_t(tile.width()) * 3;
     const auto row_of = [&](int y) { return size_t(frame_.crop.index(tile.x0, y)); };
@@ -83,30 +45,27 @@ Status GroupSum::add(const Partial& partial) {
     if (camera_bound_ + camera_largest >= kRange) {
         const double* source = partial.camera.data();
         for (int y = tile.y0; y < tile.y1; ++y, source += row_values) {
-            const Int128* sums = camera_.data() + row_of(y) * 3;
             for (size_t i = 0; i < row_values; ++i) {
-                if (addition_overflows(sums[i], source[i])) return out_of_range();
+                if (camera_.would_overflow(row_of(y) * 3 + i, source[i])) return out_of_range();
             }
         }
     }
     if (splat_bound_ + splat_largest >= kRange) {
         for (const SplatSum& splat : partial.splats) {
             for (size_t c = 0; c < 3; ++c) {
-                if (addition_overflows(splat_[size_t(splat.pixel) * 3 + c], splat.rgb[c])) return out_of_range();
+                if (splat_.would_overflow(size_t(splat.pixel) * 3 + c, splat.rgb[c])) return out_of_range();
             }
         }
     }
 
     const double* source = partial.camera.data();
     for (int y = tile.y0; y < tile.y1; ++y, source += row_values) {
-        Int128* sums = camera_.data() + row_of(y) * 3;
-        for (size_t i = 0; i < row_values; ++i) sums[i] += to_fixed(source[i]);
+        camera_.add(row_of(y) * 3, source, row_values, bounds->camera);
         uint64_t* counts = camera_count_.data() + row_of(y);
         for (int x = 0; x < tile.width(); ++x) counts[x] += partial.samples_per_pixel;
     }
     for (const SplatSum& splat : partial.splats) {
-        Int128* sums = splat_.data() + size_t(splat.pixel) * 3;
-        for (size_t c = 0; c < 3; ++c) sums[c] += to_fixed(splat.rgb[c]);
+        splat_.add(size_t(splat.pixel) * 3, splat.rgb.data(), 3, bounds->splat);
     }
     camera_bound_ += camera_largest;
     splat_bound_ += splat_largest;
@@ -137,21 +96,17 @@ Status Accumulation::fold(const GroupSum& group, uint32_t iterations) {
         }
     }
     if (camera_bound_ + group.camera_bound_ >= kRange || splat_bound_ + group.splat_bound_ >= kRange) {
-        Int128 unused;
         for (size_t i = 0; i < camera_.size(); ++i) {
-            if (__builtin_add_overflow(camera_[i], group.camera_[i], &unused) ||
-                __builtin_add_overflow(splat_[i], group.splat_[i], &unused)) {
-                return out_of_range();
-            }
+            if (camera_.would_overflow(i, group.camera_) || splat_.would_overflow(i, group.splat_)) return out_of_range();
         }
     }
 
+    camera_.add(group.camera_);
+    splat_.add(group.splat_);
     const double weight = iterations;
     const double total = double(iterations_) + weight;
     for (size_t i = 0; i < camera_.size(); ++i) {
-        camera_[i] += group.camera_[i];
-        splat_[i] += group.splat_[i];
-        const double x = pixel_value(group.camera_[i], expected, group.splat_[i], group.light_paths_);
+        const double x = pixel_value(group.camera_.value(i), expected, group.splat_.value(i), group.light_paths_);
         const double delta = x - mean_[i];
         mean_[i] += delta * (weight / total);
         moment_[i] += weight * delta * (x - mean_[i]);
@@ -169,7 +124,8 @@ Status Accumulation::fold(const GroupSum& group, uint32_t iterations) {
 RgbImage Accumulation::develop(float scale) const {
     RgbImage image{frame_.crop.width(), frame_.crop.height(), std::vector<float>(camera_.size())};
     for (size_t i = 0; i < camera_.size(); ++i) {
-        image.pixels[i] = float(double(scale) * pixel_value(camera_[i], camera_count_[i / 3], splat_[i], light_paths_));
+        const double value = pixel_value(camera_.value(i), camera_count_[i / 3], splat_.value(i), light_paths_);
+        image.pixels[i] = float(double(scale) * value);
     }
     return image;
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/core/result.h"
+#include "common/film/fixed_sums.h"
 #include "common/film/partial.h"
 
 namespace lightloom {
@@ -18,8 +19,6 @@ struct RgbImage {
     int width = 0, height = 0;
     std::vector<float> pixels;  ///< 3 * width * height
 };
-
-using Int128 = __int128;
 
 /// The sums of one group that is not complete yet. Partials may be added in any order.
 class GroupSum {
@@ -32,7 +31,7 @@ class GroupSum {
   private:
     friend class Accumulation;
     FrameLayout frame_;
-    std::vector<Int128> camera_, splat_;   // 3 per pixel of the crop
+    FixedSums camera_, splat_;            // 3 per pixel of the crop
     std::vector<uint64_t> camera_count_;   // samples per pixel
     uint64_t light_paths_ = 0;
     uint64_t dropped_ = 0;
@@ -62,7 +61,7 @@ class Accumulation {
 
   private:
     FrameLayout frame_;
-    std::vector<Int128> camera_, splat_;
+    FixedSums camera_, splat_;
     std::vector<uint64_t> camera_count_;
     uint64_t light_paths_ = 0;
     uint64_t dropped_ = 0;

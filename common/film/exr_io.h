@@ -1,6 +1,6 @@
 #pragma once
-// The final image as EXR: written with fixed settings, so that the same image gives the same bytes wherever and with however
-// many threads it is written; and read back, from our own or any other scanline or tiled EXR.
+// The final image as EXR: written with fixed settings, so that the same image gives the same bytes wherever and with
+// however many threads it is written; and read back, from our own or any other scanline or tiled EXR.
 
 #include <string>
 #include <string_view>
@@ -34,7 +34,7 @@ struct ExrImage {
     FrameLayout frame;  ///< Display window = full frame from (0, 0), data window = crop.
     RgbImage color;     ///< Linear radiance, Rec.709 primaries: channels R, G, B.
     std::vector<ImageLayer> layers;
-    std::vector<std::pair<std::string, std::string>> attributes;  ///< String attributes: name, value.
+    std::vector<std::pair<std::string, std::string>> attributes;  ///< Name and text; sorted by name in the file.
 
     /// Value of the attribute, or empty.
     std::string attribute(std::string_view name) const;

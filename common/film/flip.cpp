@@ -74,7 +74,7 @@ inline Triple from_ycxcz(Triple v) {
     return multiply(kFromXyz.m, {(v.y / 500 + y) * kWhite.x, y * kWhite.y, (y - v.z / 200) * kWhite.z});
 }
 
-/// CIE L*a*b* with the Hunt adjustment of its chroma [A20, eq. 7]: both chroma coordinates times 0.01 L*.
+/// CIE L*a*b* with the Hunt adjustment of its chroma [A20, sec. 4.1.2]: both chroma coordinates times 0.01 L*.
 inline Triple to_hunt_lab(Triple rgb) {
     const Triple xyz = multiply(kToXyz, rgb);
     const auto f = [](double t) {
@@ -86,7 +86,7 @@ inline Triple to_hunt_lab(Triple rgb) {
     return {lightness, 0.01 * lightness * 500 * (fx - fy), 0.01 * lightness * 200 * (fy - fz)};
 }
 
-/// City block in lightness plus Euclid in chroma [A20, eq. 8].
+/// City block in lightness plus Euclid in chroma [A20, sec. 4.1.2].
 inline double hyab(Triple a, Triple b) {
     const double da = a.y - b.y, db = a.z - b.z;
     return std::fabs(a.x - b.x) + std::sqrt(da * da + db * db);
@@ -98,7 +98,8 @@ constexpr double kColorSplitValue = 0.95;  // p_t
 constexpr double kFeatureExponent = 0.5;  // q_f
 constexpr double kFeatureWidth = 0.082;   // w, in degrees
 
-/// Maps the powered colour distance to [0, 1], most of the range for distances below 40 % of the largest [A20, eq. 9 and 10].
+/// Maps the powered colour distance to [0, 1], most of the range for distances below 40 % of the largest
+/// [A20, sec. 4.1.3].
 struct ColorErrorMap {
     double largest, split;
     ColorErrorMap() {
@@ -112,7 +113,7 @@ struct ColorErrorMap {
     }
 };
 
-/// One Gaussian a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees, of a contrast sensitivity function [A20, eq. 4, table 1].
+/// One Gaussian a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees, of a contrast sensitivity function [A20, sec. 4.1.1].
 struct CsfTerm {
     double a, b;
 };
@@ -227,10 +228,10 @@ std::vector<float> difference(const Appearance& a, const Appearance& b) {
         const double color = kColorError(hyab(a.color[i], b.color[i]));
         const double feature = std::max(std::fabs(a.edge.values[i] - b.edge.values[i]),
                                         std::fabs(a.point.values[i] - b.point.values[i]));
-        // [A20, eq. 11]; a difference of sqrt(2) is the largest.
+        // [A20, sec. 4.2]: a difference of sqrt(2) is the largest.
         static_assert(kFeatureExponent == 0.5);
         const double feature_error = std::min(1.0, std::sqrt(feature * 0.70710678118654752440));
-        map[i] = color == 0 ? 0.0f : float(math::pow(color, 1 - feature_error));  // [A20, eq. 12]
+        map[i] = color == 0 ? 0.0f : float(math::pow(color, 1 - feature_error));  // [A20, sec. 4.3]
     }
     return map;
 }
@@ -290,8 +291,9 @@ HdrFlip hdr_flip(const RgbImage& image, const RgbImage& reference, double ppd) {
             for (size_t i = 0; i < rgb.size(); ++i) rgb[i] = float(aces(source.pixels[i] * scale));
             return rgb;
         };
-        const std::vector<float> map = difference(appearance_of(tone_mapped(image), image.width, image.height, ppd),
-                                                  appearance_of(tone_mapped(reference), image.width, image.height, ppd));
+        const Appearance test = appearance_of(tone_mapped(image), image.width, image.height, ppd);
+        const Appearance wanted = appearance_of(tone_mapped(reference), image.width, image.height, ppd);
+        const std::vector<float> map = difference(test, wanted);
         for (size_t i = 0; i < map.size(); ++i) result.map[i] = std::max(result.map[i], map[i]);
     }
     return result;

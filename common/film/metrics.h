@@ -38,8 +38,8 @@ struct RegionRatio {
     double ratio = 0;                           ///< As Metrics::mean_ratio.
 };
 
-/// kInvalidArgument if the sizes differ, an image is empty, `trim_percent` is not in [0, 100), or a value is NaN or infinite
-/// (the message names the first such pixel).
+/// kInvalidArgument if the sizes differ, an image is empty, `trim_percent` is not in [0, 100), or a value is NaN or
+/// infinite (the message names the first such pixel).
 Result<Metrics> compute_metrics(const RgbImage& image, const RgbImage& reference, double trim_percent = 0.1);
 
 /// Ratios of means in `columns` x `rows` cells of nearly equal size, row by row. The images are of equal size.
@@ -54,8 +54,8 @@ double ssim(const RgbImage& image, const RgbImage& reference);
 /// Refuses to compare pictures of different frames or crop windows, with a line that names both sizes.
 Status check_comparable(const ExrImage& image, const ExrImage& reference);
 
-/// Signed relative error (L(x) - L(r)) / (|L(r)| + 0.01) of the luminance as 8-bit RGB: white for none, towards blue where the
-/// image is darker than the reference, towards red where it is brighter; full colour at +-`range`.
+/// Signed relative error (L(x) - L(r)) / (|L(r)| + 0.01) of the luminance as 8-bit RGB: white for none, towards blue where
+/// the image is darker than the reference, towards red where it is brighter; full colour at +-`range`.
 std::vector<uint8_t> signed_error_picture(const RgbImage& image, const RgbImage& reference, double range = 1);
 
 }  // namespace lightloom

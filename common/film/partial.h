@@ -49,8 +49,13 @@ struct Partial {
     static constexpr size_t kMaxDroppedRecords = 16;
 };
 
+/// Largest magnitudes in a partial.
+struct PartialBounds {
+    double camera = 0, splat = 0;
+};
+
 /// Checks everything that a Partial promises: a tile inside the crop, one sum per pixel and channel, splats inside the crop
 /// in ascending order, no more dropped records than allowed, and only finite sums. kDataLoss names the first violation.
-Status check_partial(const Partial& partial, const FrameLayout& frame);
+Result<PartialBounds> check_partial(const Partial& partial, const FrameLayout& frame);
 
 }  // namespace lightloom

@@ -179,7 +179,7 @@ uint64_t partial_payload_size(const FrameLayout& frame, const Rect& tile, uint64
 
 Result<EncodedPartial> encode_partial(const Partial& partial, const FrameLayout& frame) {
     LL_RETURN_IF_ERROR(check_frame(frame, partial.tile));
-    LL_RETURN_IF_ERROR(check_partial(partial, frame));
+    if (const Result<PartialBounds> checked = check_partial(partial, frame); !checked.ok()) return checked.status();
 
     uint64_t splat_count = 0;
     for (const SplatSum& splat : partial.splats) splat_count += !is_zero(splat.rgb);
@@ -312,7 +312,7 @@ Result<Partial> decode_partial(const PartialExpectation& expected, const Partial
                              std::to_string(d.splat_count));
         }
     }
-    LL_RETURN_IF_ERROR(check_partial(partial, expected.frame));
+    if (const auto checked = check_partial(partial, expected.frame); !checked.ok()) return checked.status();
     return partial;
 }
 

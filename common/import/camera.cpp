@@ -1,5 +1,6 @@
 // Camera, film, and the directives that say how pbrt samples: Sampler, PixelFilter, Integrator.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 

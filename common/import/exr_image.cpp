@@ -2,9 +2,11 @@
 
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
 #include <ImfIO.h>
 #include <ImfInputFile.h>
 
+#include <algorithm>
 #include <cstring>
 #include <exception>
 

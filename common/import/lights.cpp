@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "common/core/math.h"
-#include "common/core/octahedral.h"
 #include "common/import/context.h"
 #include "common/import/tessellate.h"
+#include "common/scene/sampling.h"
 
 namespace lightloom::import {
 namespace {
@@ -104,15 +104,16 @@ void distant_light(Context* context, const ParameterList& p, const Mat4& m) {
     context->scene.distant_lights.push_back({unit_vector(p, m, from, to), checked(p, light_colour(context, p, "L"), scale)});
 }
 
-/// Illuminance on the light's own xy plane from above under the map: what "illuminance" normalises.
+/// What "illuminance" normalises: the light's own xy plane lit by the upper half of the map. pbrt-v4 counts every pixel
+/// with 2 pi / n, half of its true solid angle; so do we, or a scene would look half as bright here.
 double illuminance_of(const Image& image) {
     double sum = 0;
     for (int y = 0; y < image.height; ++y)
         for (int x = 0; x < image.width; ++x) {
-            const Vec3 w = octahedral_direction((x + 0.5) / image.width, (y + 0.5) / image.height);
+            const Vec3 w = equal_area_square_to_sphere({(float(x) + 0.5f) / float(image.width), (float(y) + 0.5f) / float(image.height)});
             if (w.z > 0) sum += double(image.texel(x, y).luminance()) * w.z;
         }
-    return sum * 4 * kPiD / (double(image.width) * image.height);
+    return sum * 2 * kPiD / (double(image.width) * image.height);
 }
 
 void infinite_light(Context* context, const ParameterList& p, const Mat4& m) {

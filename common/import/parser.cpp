@@ -172,8 +172,10 @@ bool Parser::scope(Tokenizer* tokens, const std::string& word, const Location& w
         state_.ctm[0] = state_.ctm[1] = Mat4();
         state_.active[0] = state_.active[1] = true;
         coordinate_systems_["world"] = {Mat4(), Mat4()};
-    } else if (word == "Include" || word == "Import") {
+    } else if (word == "Include") {
         include(tokens, where);
+    } else if (word == "Import") {
+        import(tokens, where);
     } else if (word == "Attribute") {
         attribute(tokens, where);
     } else if (word == "Option") {
@@ -208,6 +210,18 @@ void Parser::include(Tokenizer* tokens, const Location& where) {
     ++include_depth_;
     parse_file(*name, where);
     --include_depth_;
+}
+
+void Parser::import(Tokenizer* tokens, const Location& where) {
+    require_world(where, "Import", true);
+    // Unlike Include, what the file does to the graphics state ends with it.
+    const GraphicsState state = state_;
+    const auto coordinate_systems = coordinate_systems_;
+    const size_t depth = scopes_.size();
+    include(tokens, where);
+    if (scopes_.size() != depth) fail(where, "the imported file leaves a scope open or closes one that it did not open");
+    state_ = state;
+    coordinate_systems_ = coordinate_systems;
 }
 
 void Parser::attribute(Tokenizer* tokens, const Location& where) {

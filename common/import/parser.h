@@ -44,6 +44,7 @@ class Parser {
     bool world_item(Tokenizer* tokens, const std::string& word, const Location& where);
 
     void include(Tokenizer* tokens, const Location& where);
+    void import(Tokenizer* tokens, const Location& where);
     void option(Tokenizer* tokens, const Location& where);
     void attribute(Tokenizer* tokens, const Location& where);
     void active_transform(Tokenizer* tokens, const Location& where);

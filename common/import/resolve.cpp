@@ -80,6 +80,8 @@ void add_shape(Context* context, PendingShape shape) {
     if (!shape.alpha_texture.empty()) attributes.alpha = named_float_texture(context, shape.where, shape.alpha_texture);
     else if (shape.alpha != 1) attributes.alpha = constant_texture(context, Rgb(shape.alpha));
     if (shape.area_light) {
+        if (shape.alpha_texture.empty() && shape.alpha == 0)
+            fail(shape.where, "an emitting shape with alpha 0 (pbrt's invisible light) is not supported; give it a visible alpha");
         const bool powered = area_light_uses_power(*shape.area_light);
         if (powered && mesh) return add_powered_mesh(context, std::move(*mesh), shape);
         const double area = sphere ? 4 * kPiD * double(sphere->radius) * sphere->radius : 0;

@@ -1,6 +1,6 @@
 // Texture directives and texture-valued parameters become TextureNodes.
 
-#include <charconv>
+#include <algorithm>
 #include <cmath>
 
 #include "common/import/context.h"

@@ -36,10 +36,9 @@ float make_coat(Bsdf* b, float eta, float alpha_x, float alpha_y) {
     b->alpha_x = ggx.alpha_x;
     b->alpha_y = ggx.alpha_y;
     const DirectionalTable& table = coat_albedo_table(eta);
-    if (ggx.alpha_x == 0) return 1 - table.smooth_mean;
     const float alpha = std::sqrt(ggx.alpha_x * ggx.alpha_y);
     b->coat_albedo = table.rows(alpha);
-    return 1 - table.mean(alpha);
+    return 1 - (alpha == 0 ? table.smooth_mean : table.mean(alpha));
 }
 
 /// E(w), for the cosine outside.
@@ -127,14 +126,7 @@ Bsdf make_coated_conductor(const Rgb& conductor_eta, const Rgb& conductor_k, flo
     const float r = clamp(1 - t_mean / (eta * eta), 0.0f, 1.0f);
     const auto scattered = [r](float m) { return m * m * (1 - r) / (1 - m * r); };
     b.trapped_reflectance = {scattered(mean.r), scattered(mean.g), scattered(mean.b)};
-    // 1 / C = 2 integral of T W cos d(cos), by Gauss and Legendre over cos^2.
-    constexpr float kNodes[4] = {0.06943184f, 0.33000948f, 0.66999052f, 0.93056816f};
-    constexpr float kWeights[4] = {0.17392742f, 0.32607258f, 0.32607258f, 0.17392742f};
-    float integral = 0;
-    for (int n = 0; n < 4; ++n) {
-        const float cos = std::sqrt(kNodes[n]);
-        integral += kWeights[n] * (1 - coat_albedo(b, cos)) * look_up(b.trapped, cos);
-    }
+    const float integral = cosine_mean_of_product(b.coat_albedo, b.trapped);  // 1 / C
     b.trapped_norm = integral > 0 ? 1 / integral : 0.0f;
     return b;
 }

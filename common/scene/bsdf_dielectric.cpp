@@ -46,7 +46,7 @@ BsdfEval eval_dielectric(const Bsdf& b, const Vec3& wo, const Vec3& wi, Transpor
     const float up = h.z > 0 ? 1.0f : -1.0f;
     if (!(up * oh * wo.z > 0) || !(up * ih * wi.z > 0)) return {};
     const float denominator = so * zi + si * zo;
-    if (!(denominator > 0)) return {};
+    if (!(denominator > kLeastDenominator)) return {};
 
     if (reflect) {
         const float h2 = length_squared(h);

@@ -40,6 +40,9 @@ struct Ggx {
     }
 };
 
+/// Both directions so close to the horizon that f, which grows like 1 / cos there, would leave float's range.
+inline constexpr float kLeastDenominator = 1e-30f;
+
 /// What a reflecting microfacet lobe shares between its value and its densities, for wo and wi above the surface.
 struct MicrofacetReflection {
     float value = 0;    ///< D G2 / (4 cos cos): the BRDF without Fresnel.
@@ -53,7 +56,7 @@ inline MicrofacetReflection microfacet_reflection(const Ggx& ggx, const Vec3& wo
     const float h2 = length_squared(h);
     const float so = ggx.slope_length(wo), si = ggx.slope_length(wi);
     const float denominator = so * wi.z + si * wo.z;
-    if (!(denominator > 0) || !(h2 > 0)) return {};
+    if (!(denominator > kLeastDenominator) || !(h2 > 0)) return {};
     const float half_density = 0.5f * h2 * h2 * ggx.scaled_density(h);
     const float cos_h = 0.5f * std::sqrt(h2);
     return {half_density / denominator, half_density / (so + wo.z), half_density / (si + wi.z), cos_h < 1 ? cos_h : 1.0f};

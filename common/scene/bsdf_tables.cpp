@@ -1,5 +1,6 @@
 #include "common/scene/bsdf_tables.h"
 
+#include <array>
 #include <atomic>
 
 #include "common/scene/bsdf_fresnel.h"
@@ -47,7 +48,9 @@ class TableCache {
 };
 
 float knot_cosine(int i) { return sqr(float(i) / (DirectionalTable::kCosines - 1)); }
-float knot_alpha(int i) { return sqr(float(i) / (DirectionalTable::kAlphas - 1)); }
+float knot_alpha(int i) {
+    return sqr(sqr(lerp(float(i) / (DirectionalTable::kAlphas - 1), DirectionalTable::kFirstRoot, 1.0f)));
+}
 
 /// 2 integral of row(c) c dc over [0, 1]: with x = sqrt(c) it is 4 integral of row x^3 dx, and the row is linear in x.
 float row_mean(const float* row) {
@@ -66,32 +69,42 @@ float row_mean(const float* row) {
     return float(sum);
 }
 
-/// Fills `table` with integrals over visible normals of weight(cos_h, wi) G2 / G1, for light arriving along the direction
-/// direction_of(cosine). The azimuth runs over half a turn: the lobe of an isotropic interface is symmetric.
+/// Fills `table` with integrals over visible normals of weight(cos_h, cos_i) G2 / G1, for light arriving in the xz plane
+/// along direction_of(cosine). The azimuth runs over half a turn, since the lobe of an isotropic interface is symmetric; the
+/// height u of Ggx::sample_visible_normal is substituted by 1 - (1 - t)^2, which gathers points in GGX's tail.
 template <typename DirectionOf, typename Weight>
-void integrate(int azimuths, int heights, DirectionOf direction_of, Weight weight, DirectionalTable* table) {
+void integrate(DirectionOf direction_of, Weight weight, DirectionalTable* table) {
+    constexpr int kAzimuths = 24, kHeights = 32;
+    float cosines[kAzimuths], sines[kAzimuths];
+    for (int i = 0; i < kAzimuths; ++i) {
+        const math::SinCos azimuth = math::sincos_turns(0.5 * (i + 0.5) / kAzimuths);
+        cosines[i] = float(azimuth.cos);
+        sines[i] = float(azimuth.sin);
+    }
     for (int a = 0; a < DirectionalTable::kAlphas; ++a) {
-        const Ggx ggx{knot_alpha(a), knot_alpha(a)};
+        const float alpha = knot_alpha(a);
+        const Ggx ggx{alpha, alpha};
         for (int c = 0; c < DirectionalTable::kCosines; ++c) {
             // The first knot stands for the limit at grazing incidence.
             const Vec3 wo = direction_of(std::max(knot_cosine(c), 1e-6f));
-            if (a == 0) {
-                table->values[a][c] = weight(wo.z, Vec3{-wo.x, -wo.y, wo.z});
-                continue;
-            }
+            const float so = ggx.slope_length(wo);
+            const Vec3 standard = normalize(Vec3{alpha * wo.x, 0, wo.z});
             double sum = 0;
-            for (int i = 0; i < azimuths; ++i) {
-                for (int j = 0; j < heights; ++j) {
-                    const Vec2 u{0.5f * (float(i) + 0.5f) / float(azimuths), (float(j) + 0.5f) / float(heights)};
-                    const Vec3 m = ggx.sample_visible_normal(wo, u);
-                    const float cos_h = dot(wo, m);
-                    const Vec3 wi = 2 * cos_h * m - wo;
+            for (int j = 0; j < kHeights; ++j) {
+                const float rest = 1 - (float(j) + 0.5f) / kHeights;
+                const float z = rest * rest * (1 + standard.z) - standard.z, radius = safe_sqrt(1 - z * z);
+                double ring = 0;
+                for (int i = 0; i < kAzimuths; ++i) {
+                    const Vec3 m{alpha * (radius * cosines[i] + standard.x), alpha * radius * sines[i], z + standard.z};
+                    const float length2 = length_squared(m), cosine = wo.x * m.x + wo.z * m.z;
+                    const Vec3 wi = (2 * cosine / length2) * m - wo;
                     if (!(wi.z > 0)) continue;
-                    const float so = ggx.slope_length(wo), si = ggx.slope_length(wi);
-                    sum += weight(std::min(cos_h, 1.0f), wi) * (so + wo.z) * wi.z / (so * wi.z + si * wo.z);
+                    const float cos_h = std::min(cosine / std::sqrt(length2), 1.0f);
+                    ring += weight(cos_h, wi.z) * (so + wo.z) * wi.z / (so * wi.z + ggx.slope_length(wi) * wo.z);
                 }
+                sum += ring * (2 * rest);
             }
-            table->values[a][c] = float(sum / (double(azimuths) * heights));
+            table->values[a][c] = float(sum / (kAzimuths * kHeights));
         }
         table->means[a] = row_mean(table->values[a]);
     }
@@ -99,8 +112,8 @@ void integrate(int azimuths, int heights, DirectionOf direction_of, Weight weigh
 
 void build_coat_albedo(float eta, DirectionalTable* table) {
     integrate(
-        16, 32, [](float cos) { return Vec3{safe_sqrt(1 - cos * cos), 0, cos}; },
-        [eta](float cos_h, const Vec3&) { return fresnel_dielectric(cos_h, eta).reflectance; }, table);
+        [](float cos) { return Vec3{safe_sqrt(1 - cos * cos), 0, cos}; },
+        [eta](float cos_h, float) { return fresnel_dielectric(cos_h, eta).reflectance; }, table);
     double mean = 0;
     constexpr int kSteps = 4096;
     for (int i = 0; i < kSteps; ++i) {
@@ -113,19 +126,50 @@ void build_coat_albedo(float eta, DirectionalTable* table) {
 void build_trapped(float eta, DirectionalTable* table) {
     const float cos2_critical = 1 - 1 / (eta * eta);
     integrate(
-        32, 64,
         [eta](float cos) {
             const float sin = safe_sqrt(1 - cos * cos) / std::max(eta, 1.0f);
             return Vec3{sin, 0, safe_sqrt(1 - sin * sin)};
         },
-        [cos2_critical](float, const Vec3& wi) { return wi.z * wi.z < cos2_critical ? 1.0f : 0.0f; }, table);
+        [cos2_critical](float, float cos_i) { return cos_i * cos_i < cos2_critical ? 1.0f : 0.0f; }, table);
     table->smooth_mean = 0;
 }
+
+/// Weights of the trapezoidal rule for 4 integral of f x^3 dx over the knots of x = sqrt(cos).
+constexpr std::array<float, DirectionalTable::kCosines> product_weights() {
+    std::array<float, DirectionalTable::kCosines> weights{};
+    double sum = 0;
+    for (int pass = 0; pass < 2; ++pass)
+        for (int i = 0; i < DirectionalTable::kCosines; ++i) {
+            const double x = double(i) / (DirectionalTable::kCosines - 1);
+            const double w = 4 * x * x * x / (DirectionalTable::kCosines - 1) * (i + 1 == DirectionalTable::kCosines ? 0.5 : 1);
+            if (pass == 0) sum += w;
+            if (pass == 1) weights[size_t(i)] = float(w / sum);
+        }
+    return weights;
+}
+constexpr auto kProductWeights = product_weights();
 
 constinit TableCache coat_albedo_cache{build_coat_albedo};
 constinit TableCache trapped_cache{build_trapped};
 
 }  // namespace
+
+float cosine_mean_of_product(const TableRows& a, const TableRows& b) {
+    constexpr int kLanes = 8;
+    static_assert(DirectionalTable::kCosines % kLanes == 0);
+    const float *a0 = a.rows, *a1 = a.rows + DirectionalTable::kCosines;
+    const float *b0 = b.rows, *b1 = b.rows + DirectionalTable::kCosines;
+    // Independent sums, so that the compiler may use vectors without reordering anything.
+    float sums[kLanes] = {};
+    for (int i = 0; i < DirectionalTable::kCosines; i += kLanes)
+        for (int l = 0; l < kLanes; ++l) {
+            const int k = i + l;
+            sums[l] += kProductWeights[size_t(k)] * (1 - lerp(a.fraction, a0[k], a1[k])) * lerp(b.fraction, b0[k], b1[k]);
+        }
+    float sum = 0;
+    for (float s : sums) sum += s;
+    return sum;
+}
 
 const DirectionalTable& coat_albedo_table(float eta) { return coat_albedo_cache.get(eta); }
 const DirectionalTable& trapped_table(float eta) { return trapped_cache.get(eta); }

@@ -9,18 +9,19 @@
 
 namespace lightloom {
 
-/// A function of (|cos|, alpha): linear between knots that are equidistant in sqrt(|cos|) and sqrt(alpha), which puts them
-/// where the albedo bends, near grazing angles and near smooth.
+/// A function of (|cos|, alpha): linear between knots that are equidistant in sqrt(|cos|) and in the fourth root of alpha
+/// (from the least rough alpha on), which puts them where the albedo bends: where |cos| and alpha are alike.
 struct DirectionalTable {
-    static constexpr int kCosines = 64;
-    static constexpr int kAlphas = 48;
+    static constexpr int kCosines = 96;
+    static constexpr int kAlphas = 80;
+    static constexpr float kFirstRoot = 0.17f;  ///< alpha = 8.4e-4, below which interfaces are smooth.
     float values[kAlphas][kCosines];
     /// Cosine-weighted mean over the hemisphere of the row as interpolated, exact.
     float means[kAlphas];
-    /// The same for alpha = 0, without interpolation: smooth coats evaluate Fresnel's equations.
+    /// The same for alpha = 0, without interpolation: smooth coats evaluate Fresnel's equations instead of looking up.
     float smooth_mean;
 
-    /// `alpha` above 1 is looked up at 1.
+    /// `alpha` is moved into the table's range, which ends at 1.
     TableRows rows(float alpha) const {
         int row;
         const float fraction = locate(alpha, &row);
@@ -34,7 +35,8 @@ struct DirectionalTable {
 
   private:
     static float locate(float alpha, int* row) {
-        const float x = std::sqrt(clamp(alpha, 0.0f, 1.0f)) * (kAlphas - 1);
+        const float root = clamp(std::sqrt(std::sqrt(alpha)), kFirstRoot, 1.0f);
+        const float x = (root - kFirstRoot) * ((kAlphas - 1) / (1 - kFirstRoot));
         *row = std::min(int(x), kAlphas - 2);
         return x - float(*row);
     }
@@ -48,6 +50,9 @@ inline float look_up(const TableRows& table, float cos) {
     const float t = x - float(i);
     return lerp(table.fraction, lerp(t, p[0], p[1]), lerp(t, q[0], q[1]));
 }
+
+/// 2 integral of (1 - a(c)) b(c) c dc over [0, 1], by the trapezoidal rule on the knots.
+float cosine_mean_of_product(const TableRows& a, const TableRows& b);
 
 /// Share of the light arriving at the interface from outside that it reflects (single scattering). Thread-safe; builds the
 /// table at the first call for an `eta`, after that it is a walk over the few indices of a scene.

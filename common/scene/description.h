@@ -29,8 +29,8 @@ struct TextureNode {
     int32_t image = kNone;             ///< kImage: index into SceneDescription::images.
     WrapMode wrap = WrapMode::kRepeat;
     bool nearest = false;              ///< kImage: point lookup; bilinear otherwise.
-    bool invert = false;               ///< kImage: 1 - value, before `scale`.
     float scale = 1;                   ///< kImage: multiplies the looked-up value.
+    bool invert = false;               ///< kImage: 1 - the scaled value (pbrt's order); below zero is zero.
     // (u, v) mapping: s = su * u + du, t = sv * v + dv.
     float su = 1, sv = 1, du = 0, dv = 0;
 };

@@ -36,8 +36,10 @@ Rgb image_value(const TextureNode& node, const Image& image, Vec2 st) {
         v = (texel(image, ix, iy, node.wrap) * (1 - dx) + texel(image, ix + 1, iy, node.wrap) * dx) * (1 - dy) +
             (texel(image, ix, iy + 1, node.wrap) * (1 - dx) + texel(image, ix + 1, iy + 1, node.wrap) * dx) * dy;
     }
+    v *= node.scale;
     if (node.invert) v = Rgb(1.0f) - v;
-    return v * node.scale;
+    // As in pbrt, an image texture is never negative, whatever its scale or inversion.
+    return {std::max(v.r, 0.0f), std::max(v.g, 0.0f), std::max(v.b, 0.0f)};
 }
 
 }  // namespace

@@ -1,0 +1,2 @@
+lightloom_test(import_test LINK lt_import)
+lightloom_test(import_scenes_test LINK lt_import)
