@@ -91,10 +91,12 @@ Result<JobInfo> GrpcJobPort::cancel_job(const std::string& job_id) {
     return wire::get(response);
 }
 
-Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<bool(const JobInfo&)>& on_change) {
+Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
+                              std::stop_token stop) {
     uint64_t seen = 0;
     for (int attempt = 0;; ++attempt) {
         grpc::ClientContext context;
+        const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
         v1::WatchJobRequest request;
         request.set_job_id(job_id);
         request.set_after_revision(seen);
@@ -102,16 +104,17 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<boo
         v1::Job message;
         while (reader->Read(&message)) {
             const auto info = wire::get(message);
-            const bool go_on = info.ok() && on_change(*info);
-            if (!go_on || is_terminal(info->state)) {
+            if (!info.ok()) {
                 context.TryCancel();
                 (void)reader->Finish();
-                return info.ok() ? Status() : info.status();
+                return info.status();
             }
+            on_change(*info);
             seen = info->revision;
             attempt = 0;
         }
         const grpc::Status status = reader->Finish();
+        if (stop.stop_requested()) return {StatusCode::kCancelled, "interrupted"};
         if (status.error_code() != grpc::StatusCode::UNAVAILABLE || attempt >= kWatchAttempts)
             return wire::from_grpc(status);
         std::this_thread::sleep_for(std::chrono::milliseconds(250));

@@ -16,7 +16,8 @@ class GrpcJobPort final : public JobPort {
     Result<JobInfo> get_job(const std::string& job_id) override;
     Result<std::vector<JobInfo>> list_jobs() override;
     Result<JobInfo> cancel_job(const std::string& job_id) override;
-    Status watch_job(const std::string& job_id, const std::function<bool(const JobInfo&)>& on_change) override;
+    Status watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
+                     std::stop_token stop) override;
     Result<std::string> image(const std::string& job_id, ImageKind kind) override;
     Result<std::string> manifest(const std::string& job_id) override;
     Result<std::vector<Digest>> find_missing(const std::vector<Digest>& digests) override;

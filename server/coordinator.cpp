@@ -106,7 +106,7 @@ Status Coordinator::check_assets(const JobSpec& spec) const {
     const auto manifest = AssetManifest::parse(*text);
     if (!manifest.ok()) return manifest.status();
     for (const AssetEntry& entry : manifest->entries) {
-        if (!assets_.contains(entry.digest))
+        if (options_.scene_files_needed && !assets_.contains(entry.digest))
             return failed_precondition("\"" + entry.path + "\" of the scene was not uploaded");
     }
     return {};

@@ -31,6 +31,7 @@ struct CoordinatorOptions {
     std::filesystem::path directory;  ///< Assets and finished images; made if need be.
     BuildIdentity identity;           ///< What a worker must be equal to.
     SceneReader read_scene;
+    bool scene_files_needed = true;   ///< False where read_scene and the workers have the files by other means.
     double lease_seconds = 10;
     double heartbeat_seconds = 1;
     std::optional<uint64_t> shuffle_seed;          ///< Lease units in a random order (tests).

@@ -11,15 +11,17 @@ Result<JobInfo> LocalJobPort::get_job(const std::string& job_id) { return coordi
 Result<std::vector<JobInfo>> LocalJobPort::list_jobs() { return coordinator_.list_jobs(); }
 Result<JobInfo> LocalJobPort::cancel_job(const std::string& job_id) { return coordinator_.cancel_job(job_id); }
 
-Status LocalJobPort::watch_job(const std::string& job_id, const std::function<bool(const JobInfo&)>& on_change) {
+Status LocalJobPort::watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
+                               std::stop_token stop) {
     uint64_t seen = 0;
-    for (;;) {
-        const auto info = coordinator_.wait_job(job_id, seen, 0.2);
+    while (!stop.stop_requested()) {
+        const auto info = coordinator_.wait_job(job_id, seen, 0.1);
         if (!info.ok()) return info.status();
-        // Called also without a change: the caller may want to look at a clock or a signal.
+        if (info->revision > seen) on_change(*info);
         seen = info->revision;
-        if (!on_change(*info) || is_terminal(info->state)) return {};
+        if (is_terminal(info->state)) return {};
     }
+    return {StatusCode::kCancelled, "interrupted"};
 }
 
 Result<std::string> LocalJobPort::image(const std::string& job_id, ImageKind kind) {

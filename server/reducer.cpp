@@ -15,7 +15,7 @@ Status Reducer::add(const WorkUnit& unit, Partial partial) {
         partial.light_paths != unit.light_path_count)
         return data_loss("the partial is of another unit");
     if (unit.key.group > accumulation_.group_count()) {
-        LL_RETURN_IF_ERROR(check_partial(partial, frame_));
+        if (const auto checked = check_partial(partial, frame_); !checked.ok()) return checked.status();
         waiting_[unit.key.group].emplace_back(unit, std::move(partial));
         return {};
     }

@@ -155,9 +155,7 @@ Result<Partial> Worker::render(const UnitLease& lease, std::stop_token unit_stop
     const std::lock_guard only_one(render_mutex_);
     if (unit_stop.stop_requested() || drain.stop_requested()) return Status(StatusCode::kCancelled, "given back");
     announce_rendering(lease.reference());
-    const WorkUnit& unit = lease.unit;
-    const UnitWork work{unit.first_iteration, unit.iteration_count,  unit.key.group,
-                        unit.tile,            unit.first_light_path, unit.light_path_count};
+    const UnitWork work = unit_work(lease.unit);
     const auto begin = Clock::now();
     auto partial = arena_.execute([&] { return (*renderer)->render(work, unit_stop); });
     *seconds = std::chrono::duration<double>(Clock::now() - begin).count();

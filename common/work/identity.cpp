@@ -90,10 +90,7 @@ Result<Digest> golden_unit_digest() {
         const Rect tile{0, 0, kGoldenSize, kGoldenSize};
         const std::vector<WorkUnit> units =
             split_group({0, 0, 4}, {tile}, light_paths_per_pixel(algorithm, *parameters));
-        const WorkUnit& unit = units.front();
-        const UnitWork work{unit.first_iteration, unit.iteration_count, 0, tile, unit.first_light_path,
-                            unit.light_path_count};
-        const auto partial = (*renderer)->render(work, {});
+        const auto partial = (*renderer)->render(unit_work(units.front()), {});
         if (!partial.ok()) return partial.status();
         const auto encoded = encode_partial(*partial, scene->frame());
         if (!encoded.ok()) return encoded.status();

@@ -10,6 +10,7 @@
 #include "common/core/digest.h"
 #include "common/core/result.h"
 #include "common/film/frame.h"
+#include "common/transport/renderer.h"
 
 namespace lightloom {
 
@@ -54,6 +55,16 @@ struct Group {
     uint64_t first_iteration = 0;
     uint32_t iteration_count = 0;
 };
+
+/// What light transport needs of a unit.
+inline UnitWork unit_work(const WorkUnit& unit) {
+    return {.first_iteration = unit.first_iteration,
+            .iteration_count = unit.iteration_count,
+            .group_first_iteration = unit.first_iteration,
+            .tile = unit.tile,
+            .first_light_path = unit.first_light_path,
+            .light_path_count = unit.light_path_count};
+}
 
 /// The units of a group: one per tile, in order. Light paths: the group's total, round(light_paths_per_pixel * iterations *
 /// pixels), is shared out in proportion to the tiles' areas with exact cumulative rounding.

@@ -97,8 +97,10 @@ class JobPort {
     virtual Result<JobInfo> get_job(const std::string& job_id) = 0;
     virtual Result<std::vector<JobInfo>> list_jobs() = 0;
     virtual Result<JobInfo> cancel_job(const std::string& job_id) = 0;
-    /// Calls `on_change` with the present state and then on changes, until it returns false or a terminal state was passed.
-    virtual Status watch_job(const std::string& job_id, const std::function<bool(const JobInfo&)>& on_change) = 0;
+    /// Calls `on_change` with the present state and then on changes until a terminal state was passed; kCancelled soon after a
+    /// stop request.
+    virtual Status watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
+                             std::stop_token stop) = 0;
     virtual Result<std::string> image(const std::string& job_id, ImageKind kind) = 0;
     virtual Result<std::string> manifest(const std::string& job_id) = 0;
     virtual Result<std::vector<Digest>> find_missing(const std::vector<Digest>& digests) = 0;
