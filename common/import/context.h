@@ -52,6 +52,12 @@ struct PendingShape {
     Location where;
 };
 
+/// What evaluating a texture takes.
+struct TextureCost {
+    int levels = 1;     ///< Of recursion.
+    double visits = 1;  ///< Nodes looked at.
+};
+
 struct Context {
     Context(FileSource* source, const ImportOptions& import_options)
         : files(source), options(import_options), diagnostics(import_options.strict) {}
@@ -73,6 +79,8 @@ struct Context {
     std::map<std::tuple<float, float, float>, TextureId> constants;
     std::map<std::string, int32_t> image_index;  ///< By file, encoding and channel choice.
     std::map<std::tuple<float, float, float, bool>, int32_t> emission_index;
+    std::vector<TextureCost> texture_costs;  ///< One per scene texture.
+    std::map<MaterialId, int> mix_levels;    ///< Of mix materials; others have none.
     int texture_depth = 0, material_depth = 0;   ///< Of the definitions being resolved.
 
     float exposure_time = 1, iso = 100;
@@ -87,6 +95,7 @@ struct Context {
 };
 
 // textures.cpp
+TextureId add_node(Context* context, const TextureNode& node);
 TextureId constant_texture(Context* context, const Rgb& value);
 TextureId named_float_texture(Context* context, const Location& where, const std::string& name);
 TextureId named_spectrum_texture(Context* context, const Location& where, const std::string& name);

@@ -100,6 +100,8 @@ void read_mix(Context* context, const ParameterList& p, Material* m) {
     m->mix_a = resolve_material_reference(context, {true, names->strings[0], 0, names->where});
     m->mix_b = resolve_material_reference(context, {true, names->strings[1], 0, names->where});
     --context->material_depth;
+    const int levels = 1 + std::max(context->mix_levels[m->mix_a], context->mix_levels[m->mix_b]);
+    if (levels > kMaxMixDepth) fail(p.where(), p.what() + ": mix materials refer to one another more than 32 levels deep");
     if (m->mix_a == kInterfaceMaterial || m->mix_b == kInterfaceMaterial)
         fail(p.where(), p.what() + ": a mix with an \"interface\" material is not supported; use the shape's alpha instead");
     m->mix_amount = float_texture_parameter(context, p, "amount");
@@ -135,8 +137,7 @@ MaterialId make_material(Context* context, const std::string& name, const Defini
                 node.kind = TextureKind::kScale;
                 node.a = *id;
                 node.b = constant_texture(context, Rgb(scale));
-                context->scene.textures.push_back(node);
-                *id = TextureId(context->scene.textures.size()) - 1;
+                *id = add_node(context, node);
             }
     } else if (kind == "conductor") {
         m.kind = MaterialKind::kConductor;
@@ -174,8 +175,11 @@ MaterialId make_material(Context* context, const std::string& name, const Defini
                             " is not supported; use diffuse, diffusetransmission, conductor, dielectric, thindielectric, coateddiffuse, coatedconductor, mix or interface");
     }
     p.finish();
+    const MaterialId id = MaterialId(context->scene.materials.size());
+    if (m.kind == MaterialKind::kMix)
+        context->mix_levels[id] = 1 + std::max(context->mix_levels[m.mix_a], context->mix_levels[m.mix_b]);
     context->scene.materials.push_back(std::move(m));
-    return MaterialId(context->scene.materials.size()) - 1;
+    return id;
 }
 
 }  // namespace

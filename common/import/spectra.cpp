@@ -192,8 +192,9 @@ std::optional<float> named_glass(const std::string& name) {
         float index;
     };
     // n_d of the manufacturers' catalogues.
-    constexpr std::array<Named, 8> kNamed{{{"glass-BK7", 1.5168f}, {"glass-BAF10", 1.6700f}, {"glass-FK51A", 1.4866f},
-        {"glass-LASF9", 1.8503f}, {"glass-F5", 1.6034f}, {"glass-F10", 1.6727f}, {"glass-SF10", 1.7283f}, {"glass-SF11", 1.7847f}}};
+    // pbrt-v4's glass-F5, -F10 and -F11 hold the curves of SF5, SF10 and SF11.
+    constexpr std::array<Named, 7> kNamed{{{"glass-BK7", 1.5168f}, {"glass-BAF10", 1.6700f}, {"glass-FK51A", 1.4866f},
+        {"glass-LASF9", 1.8503f}, {"glass-F5", 1.6727f}, {"glass-F10", 1.7283f}, {"glass-F11", 1.7847f}}};
     for (const Named& n : kNamed)
         if (n.name == name) return n.index;
     return std::nullopt;

@@ -10,20 +10,10 @@
 namespace lightloom::import {
 namespace {
 
-/// Levels of textures that refer to textures, constants not counted: the evaluation recurses as deep.
-constexpr int kMaxNesting = 32;
-
-int nesting(const SceneDescription& scene, TextureId id) {
-    if (id == kNone) return 0;
-    const TextureNode& node = scene.textures[size_t(id)];
-    if (node.kind == TextureKind::kConstant || node.kind == TextureKind::kImage) return 1;
-    return 1 + std::max({nesting(scene, node.a), nesting(scene, node.b), nesting(scene, node.amount)});
-}
-
-TextureId add_node(Context* context, const TextureNode& node) {
-    context->scene.textures.push_back(node);
-    return TextureId(context->scene.textures.size()) - 1;
-}
+/// Levels of nodes below a texture that a file may ask for; one more is left for a material's own scale.
+constexpr int kMaxNesting = 31;
+/// Nodes that one look-up may visit: textures that use each other twice on every level double it each time.
+constexpr double kMaxVisits = 4096;
 
 /// Reads a spectrum given by name, file or values; fails if there is none.
 Spectrum read_spectrum(Context* context, const Parameter& p, const std::string& what) {
@@ -154,15 +144,31 @@ TextureId named_texture(Context* context, const Location& where, const std::stri
     }
     if (resolved.size() > 100000) fail(where, "the scene has more than 100000 textures");
     resolved[name] = kInProgress;
-    if (++context->texture_depth > kMaxNesting) fail(where, "textures refer to one another more than 32 levels deep");
+    if (++context->texture_depth > kMaxNesting) fail(where, "textures refer to one another more than 31 levels deep");
     const TextureId id = make_texture(context, it->second, is_float);
     --context->texture_depth;
+    const TextureCost cost = context->texture_costs[size_t(id)];
+    if (cost.levels > kMaxNesting) fail(where, "textures refer to one another more than 31 levels deep");
+    if (cost.visits > kMaxVisits) fail(where, "the texture " + quoted(name) + " needs more than 4096 look-ups; use fewer textures in one another");
     it->second.parameters.finish();
     resolved[name] = id;
     return id;
 }
 
 }  // namespace
+
+TextureId add_node(Context* context, const TextureNode& node) {
+    TextureCost cost{1, 1};
+    for (const TextureId child : {node.a, node.b, node.amount}) {
+        if (child == kNone) continue;
+        const TextureCost below = context->texture_costs[size_t(child)];
+        cost.levels = std::max(cost.levels, below.levels + 1);
+        cost.visits += below.visits;
+    }
+    context->scene.textures.push_back(node);
+    context->texture_costs.push_back(cost);
+    return TextureId(context->scene.textures.size()) - 1;
+}
 
 TextureId constant_texture(Context* context, const Rgb& value) {
     const auto [it, inserted] = context->constants.try_emplace({value.r, value.g, value.b}, kNone);

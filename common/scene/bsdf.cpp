@@ -87,9 +87,9 @@ Rgb Bsdf::albedo() const {
         case BsdfKind::kDielectric:
         case BsdfKind::kThinDielectric: return Rgb(1);
         case BsdfKind::kCoatedDiffuse: {
-            // reflectance is the factor between the two transmissions; base_weight is its mean times T_avg.
-            const float mean = reflectance.average();
-            return unit(Rgb(coat) + reflectance * (mean > 0 ? (1 - coat) * base_weight / mean : 0.0f));
+            // The base's lobe carries A(wo) reflectance times the cosine mean of A, for which A stands in.
+            const float transmitted = 1 - coat;
+            return unit(Rgb(coat) + reflectance * (transmitted * transmitted));
         }
         case BsdfKind::kCoatedConductor: {
             const Rgb base = fresnel_conductor(1, reflectance, transmittance);

@@ -63,8 +63,9 @@ struct Bsdf {
     Rgb transmittance;                 ///< Diffuse transmission albedo; conductor: k.
     float reflect_pmf = 0;             ///< kDiffuseTransmission: probability of the reflected lobe.
     float base_alpha_x = 0, base_alpha_y = 0;  ///< kCoatedConductor: the base's alpha, widened by a rough coat.
-    TableRows coat_albedo;             ///< Directional albedo of a rough coat.
+    TableRows coat_transmission;       ///< Share of light that a rough coat lets down to its base.
     TableRows trapped;                 ///< kCoatedConductor: see bsdf_coated.cpp.
+    float thickness = 0;               ///< Optical thickness of a coat.
     float base_weight = 0;             ///< Scalar albedo of what is under the coat, for choosing lobes.
     Rgb trapped_reflectance;           ///< kCoatedConductor: albedo of the internally scattered light ...
     float trapped_norm = 0;            ///< ... and the normalisation of its lobe.
@@ -105,11 +106,11 @@ Rgb conductor_k(const Rgb& reflectance);
 Bsdf make_dielectric(float eta, float alpha_x, float alpha_y);
 /// A thin pane: both interfaces with all their inter-reflections, without refraction.
 Bsdf make_thin_dielectric(float eta);
-/// Dielectric coat of index `eta` over a Lambertian base.
-Bsdf make_coated_diffuse(const Rgb& reflectance, float eta, float alpha_x, float alpha_y);
+/// Dielectric coat of index `eta` and optical thickness `thickness` over a Lambertian base.
+Bsdf make_coated_diffuse(const Rgb& reflectance, float eta, float thickness, float alpha_x, float alpha_y);
 /// Dielectric coat over a conductor whose complex index is given against vacuum.
 Bsdf make_coated_conductor(const Rgb& conductor_eta, const Rgb& conductor_k, float base_alpha_x, float base_alpha_y,
-                           float eta, float alpha_x, float alpha_y);
+                           float eta, float thickness, float alpha_x, float alpha_y);
 
 // The Lambertian case inline: in an interior it is most of the work.
 

@@ -13,16 +13,16 @@ namespace {
 /// long as the program, because every Bsdf may point into them.
 class TableCache {
   public:
-    using Build = void (*)(float eta, DirectionalTable* table);
+    using Build = void (*)(float eta, float thickness, DirectionalTable* table);
     explicit constexpr TableCache(Build build) : build_(build) {}
 
-    const DirectionalTable& get(float eta) {
+    const DirectionalTable& get(float eta, float thickness) {
         Entry* head = head_.load(std::memory_order_acquire);
-        if (const Entry* found = find(head, nullptr, eta)) return found->table;
-        Entry* fresh = new Entry{eta, {}, head};
-        build_(eta, &fresh->table);
+        if (const Entry* found = find(head, nullptr, eta, thickness)) return found->table;
+        Entry* fresh = new Entry{eta, thickness, {}, head};
+        build_(eta, thickness, &fresh->table);
         while (!head_.compare_exchange_weak(fresh->next, fresh, std::memory_order_acq_rel)) {
-            if (const Entry* found = find(fresh->next, head, eta)) {
+            if (const Entry* found = find(fresh->next, head, eta, thickness)) {
                 delete fresh;
                 return found->table;
             }
@@ -33,13 +33,13 @@ class TableCache {
 
   private:
     struct Entry {
-        float eta;
+        float eta, thickness;
         DirectionalTable table;
         Entry* next;
     };
-    static const Entry* find(const Entry* from, const Entry* to, float eta) {
+    static const Entry* find(const Entry* from, const Entry* to, float eta, float thickness) {
         for (; from != to; from = from->next)
-            if (from->eta == eta) return from;
+            if (from->eta == eta && from->thickness == thickness) return from;
         return nullptr;
     }
 
@@ -52,86 +52,97 @@ float knot_alpha(int i) {
     return sqr(sqr(lerp(float(i) / (DirectionalTable::kAlphas - 1), DirectionalTable::kFirstRoot, 1.0f)));
 }
 
-/// 2 integral of row(c) c dc over [0, 1]: with x = sqrt(c) it is 4 integral of row x^3 dx, and the row is linear in x.
-float row_mean(const float* row) {
-    double sum = 0;
-    const auto power_integral = [](double a, double b, int n) {
-        double pa = 1, pb = 1;
-        for (int i = 0; i <= n; ++i) pa *= a, pb *= b;
-        return (pb - pa) / (n + 1);
-    };
-    for (int i = 0; i + 1 < DirectionalTable::kCosines; ++i) {
-        const double a = double(i) / (DirectionalTable::kCosines - 1);
-        const double b = double(i + 1) / (DirectionalTable::kCosines - 1);
-        const double slope = (double(row[i + 1]) - row[i]) / (b - a);
-        sum += 4 * ((row[i] - slope * a) * power_integral(a, b, 3) + slope * power_integral(a, b, 4));
+/// Integrates one microfacet event over visible normals: the mean of weight(wo.m, m, &wi) G2 / G1 for light that arrives along
+/// `wo` in the xz plane and goes on along wi. The azimuth runs over half a turn, since the lobe of an isotropic interface is
+/// symmetric; the height u of Ggx::sample_visible_normal is substituted by 1 - (1 - t)^2: more points in GGX's tail.
+class EventQuadrature {
+  public:
+    EventQuadrature() {
+        for (int i = 0; i < kAzimuths; ++i) {
+            const math::SinCos azimuth = math::sincos_turns(0.5 * (i + 0.5) / kAzimuths);
+            cosines_[i] = float(azimuth.cos);
+            sines_[i] = float(azimuth.sin);
+        }
     }
-    return float(sum);
-}
 
-/// Fills `table` with integrals over visible normals of weight(cos_h, cos_i) G2 / G1, for light arriving in the xz plane
-/// along direction_of(cosine). The azimuth runs over half a turn, since the lobe of an isotropic interface is symmetric; the
-/// height u of Ggx::sample_visible_normal is substituted by 1 - (1 - t)^2, which gathers points in GGX's tail.
-template <typename DirectionOf, typename Weight>
-void integrate(DirectionOf direction_of, Weight weight, DirectionalTable* table) {
-    constexpr int kAzimuths = 24, kHeights = 32;
-    float cosines[kAzimuths], sines[kAzimuths];
-    for (int i = 0; i < kAzimuths; ++i) {
-        const math::SinCos azimuth = math::sincos_turns(0.5 * (i + 0.5) / kAzimuths);
-        cosines[i] = float(azimuth.cos);
-        sines[i] = float(azimuth.sin);
+    template <typename Weight>
+    float operator()(float alpha, const Vec3& wo, Weight weight) const {
+        const Ggx ggx{alpha, alpha};
+        const float so = ggx.slope_length(wo);
+        const Vec3 standard = normalize(Vec3{alpha * wo.x, 0, wo.z});
+        double sum = 0;
+        for (int j = 0; j < kHeights; ++j) {
+            const float rest = 1 - (float(j) + 0.5f) / kHeights;
+            const float z = rest * rest * (1 + standard.z) - standard.z, radius = safe_sqrt(1 - z * z);
+            double ring = 0;
+            for (int i = 0; i < kAzimuths; ++i) {
+                const Vec3 unnormalised{alpha * (radius * cosines_[i] + standard.x), alpha * radius * sines_[i], z + standard.z};
+                const Vec3 m = unnormalised / std::sqrt(length_squared(unnormalised));
+                Vec3 wi;
+                const float w = weight(std::min(dot(wo, m), 1.0f), m, &wi);
+                const float zi = std::fabs(wi.z);
+                if (w > 0) ring += w * (so + wo.z) * zi / (so * zi + ggx.slope_length(wi) * wo.z);
+            }
+            sum += ring * (2 * rest);
+        }
+        return float(sum / (kAzimuths * kHeights));
     }
+
+  private:
+    static constexpr int kAzimuths = 24, kHeights = 32;
+    float cosines_[kAzimuths], sines_[kAzimuths];
+};
+
+Vec3 at_cosine(float cos) { return {safe_sqrt(1 - cos * cos), 0, cos}; }
+
+void build_coat(float eta, float thickness, DirectionalTable* table) {
+    const EventQuadrature event;
+    // Diffuse light inside: midpoints of equal projected solid angle.
+    constexpr int kInner = 24;
     for (int a = 0; a < DirectionalTable::kAlphas; ++a) {
         const float alpha = knot_alpha(a);
-        const Ggx ggx{alpha, alpha};
         for (int c = 0; c < DirectionalTable::kCosines; ++c) {
             // The first knot stands for the limit at grazing incidence.
-            const Vec3 wo = direction_of(std::max(knot_cosine(c), 1e-6f));
-            const float so = ggx.slope_length(wo);
-            const Vec3 standard = normalize(Vec3{alpha * wo.x, 0, wo.z});
-            double sum = 0;
-            for (int j = 0; j < kHeights; ++j) {
-                const float rest = 1 - (float(j) + 0.5f) / kHeights;
-                const float z = rest * rest * (1 + standard.z) - standard.z, radius = safe_sqrt(1 - z * z);
-                double ring = 0;
-                for (int i = 0; i < kAzimuths; ++i) {
-                    const Vec3 m{alpha * (radius * cosines[i] + standard.x), alpha * radius * sines[i], z + standard.z};
-                    const float length2 = length_squared(m), cosine = wo.x * m.x + wo.z * m.z;
-                    const Vec3 wi = (2 * cosine / length2) * m - wo;
-                    if (!(wi.z > 0)) continue;
-                    const float cos_h = std::min(cosine / std::sqrt(length2), 1.0f);
-                    ring += weight(cos_h, wi.z) * (so + wo.z) * wi.z / (so * wi.z + ggx.slope_length(wi) * wo.z);
-                }
-                sum += ring * (2 * rest);
-            }
-            table->values[a][c] = float(sum / (kAzimuths * kHeights));
+            const Vec3 wo = at_cosine(std::max(knot_cosine(c), 1e-6f));
+            table->values[a][c] = event(alpha, wo, [&](float cos_h, const Vec3& m, Vec3* wi) {
+                const DielectricFresnel f = fresnel_dielectric(cos_h, eta);
+                *wi = m * (cos_h / f.eta - f.cos_t) - wo / f.eta;
+                return wi->z < 0 ? (1 - f.reflectance) * slab_transmittance(thickness, -wi->z) : 0.0f;
+            });
         }
-        table->means[a] = row_mean(table->values[a]);
+        double returned = 0;
+        for (int c = 0; c < kInner; ++c) {
+            const Vec3 wo = at_cosine(std::sqrt((float(c) + 0.5f) / kInner));
+            returned += slab_transmittance(thickness, wo.z) * event(alpha, wo, [&](float cos_h, const Vec3& m, Vec3* wi) {
+                *wi = 2 * cos_h * m - wo;
+                return wi->z > 0 ? fresnel_dielectric(cos_h, 1 / eta).reflectance * slab_transmittance(thickness, wi->z) : 0.0f;
+            });
+        }
+        table->per_alpha[a] = float(returned / kInner);
     }
-}
-
-void build_coat_albedo(float eta, DirectionalTable* table) {
-    integrate(
-        [](float cos) { return Vec3{safe_sqrt(1 - cos * cos), 0, cos}; },
-        [eta](float cos_h, float) { return fresnel_dielectric(cos_h, eta).reflectance; }, table);
-    double mean = 0;
-    constexpr int kSteps = 4096;
+    double returned = 0;
+    constexpr int kSteps = 8192;
     for (int i = 0; i < kSteps; ++i) {
-        const double x = (i + 0.5) / kSteps;
-        mean += 4 * x * x * x * fresnel_dielectric(float(x * x), eta).reflectance / kSteps;
+        const float cos = std::sqrt((float(i) + 0.5f) / kSteps);
+        returned += sqr(slab_transmittance(thickness, cos)) * fresnel_dielectric(cos, 1 / eta).reflectance;
     }
-    table->smooth_mean = float(mean);
+    table->at_zero = float(returned / kSteps);
 }
 
-void build_trapped(float eta, DirectionalTable* table) {
+void build_trapped(float eta, float, DirectionalTable* table) {
+    *table = {};
+    if (eta <= 1) return;
+    const EventQuadrature event;
     const float cos2_critical = 1 - 1 / (eta * eta);
-    integrate(
-        [eta](float cos) {
-            const float sin = safe_sqrt(1 - cos * cos) / std::max(eta, 1.0f);
-            return Vec3{sin, 0, safe_sqrt(1 - sin * sin)};
-        },
-        [cos2_critical](float, float cos_i) { return cos_i * cos_i < cos2_critical ? 1.0f : 0.0f; }, table);
-    table->smooth_mean = 0;
+    for (int a = 0; a < DirectionalTable::kAlphas; ++a)
+        for (int c = 0; c < DirectionalTable::kCosines; ++c) {
+            const float sin = at_cosine(std::max(knot_cosine(c), 1e-6f)).x / eta;
+            const Vec3 wo{sin, 0, std::sqrt(1 - sin * sin)};
+            table->values[a][c] = event(knot_alpha(a), wo, [&](float cos_h, const Vec3& m, Vec3* wi) {
+                *wi = 2 * cos_h * m - wo;
+                return wi->z > 0 && wi->z * wi->z < cos2_critical ? 1.0f : 0.0f;
+            });
+        }
 }
 
 /// Weights of the trapezoidal rule for 4 integral of f x^3 dx over the knots of x = sqrt(cos).
@@ -149,7 +160,7 @@ constexpr std::array<float, DirectionalTable::kCosines> product_weights() {
 }
 constexpr auto kProductWeights = product_weights();
 
-constinit TableCache coat_albedo_cache{build_coat_albedo};
+constinit TableCache coat_cache{build_coat};
 constinit TableCache trapped_cache{build_trapped};
 
 }  // namespace
@@ -164,14 +175,14 @@ float cosine_mean_of_product(const TableRows& a, const TableRows& b) {
     for (int i = 0; i < DirectionalTable::kCosines; i += kLanes)
         for (int l = 0; l < kLanes; ++l) {
             const int k = i + l;
-            sums[l] += kProductWeights[size_t(k)] * (1 - lerp(a.fraction, a0[k], a1[k])) * lerp(b.fraction, b0[k], b1[k]);
+            sums[l] += kProductWeights[size_t(k)] * lerp(a.fraction, a0[k], a1[k]) * lerp(b.fraction, b0[k], b1[k]);
         }
     float sum = 0;
     for (float s : sums) sum += s;
     return sum;
 }
 
-const DirectionalTable& coat_albedo_table(float eta) { return coat_albedo_cache.get(eta); }
-const DirectionalTable& trapped_table(float eta) { return trapped_cache.get(eta); }
+const DirectionalTable& coat_table(float eta, float thickness) { return coat_cache.get(eta, thickness); }
+const DirectionalTable& trapped_table(float eta) { return trapped_cache.get(eta, 0); }
 
 }  // namespace lightloom

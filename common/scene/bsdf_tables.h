@@ -1,6 +1,6 @@
 #pragma once
-// Tables behind the coats: directional albedos of a rough dielectric interface over angle and roughness, one table per
-// index of refraction, computed by fixed quadrature when an index is first seen. They depend on nothing but the index.
+// Tables behind the coats: how much light a rough dielectric interface lets through, over angle and roughness. One table per
+// index of refraction and thickness, computed by fixed quadrature when the pair is first seen, from nothing else.
 
 #include <algorithm>
 #include <cmath>
@@ -16,10 +16,10 @@ struct DirectionalTable {
     static constexpr int kAlphas = 80;
     static constexpr float kFirstRoot = 0.17f;  ///< alpha = 8.4e-4, below which interfaces are smooth.
     float values[kAlphas][kCosines];
-    /// Cosine-weighted mean over the hemisphere of the row as interpolated, exact.
-    float means[kAlphas];
-    /// The same for alpha = 0, without interpolation: smooth coats evaluate Fresnel's equations instead of looking up.
-    float smooth_mean;
+    /// A second function, of alpha alone.
+    float per_alpha[kAlphas];
+    /// The same for alpha = 0, where per-direction values come from Fresnel's equations instead.
+    float at_zero;
 
     /// `alpha` is moved into the table's range, which ends at 1.
     TableRows rows(float alpha) const {
@@ -27,10 +27,11 @@ struct DirectionalTable {
         const float fraction = locate(alpha, &row);
         return {values[row], fraction};
     }
-    float mean(float alpha) const {
+    float at_alpha(float alpha) const {
+        if (alpha == 0) return at_zero;
         int row;
         const float fraction = locate(alpha, &row);
-        return lerp(fraction, means[row], means[row + 1]);
+        return lerp(fraction, per_alpha[row], per_alpha[row + 1]);
     }
 
   private:
@@ -51,15 +52,25 @@ inline float look_up(const TableRows& table, float cos) {
     return lerp(table.fraction, lerp(t, p[0], p[1]), lerp(t, q[0], q[1]));
 }
 
-/// 2 integral of (1 - a(c)) b(c) c dc over [0, 1], by the trapezoidal rule on the knots.
+/// 2 integral of a(c) b(c) c dc over [0, 1], by the trapezoidal rule on the knots.
 float cosine_mean_of_product(const TableRows& a, const TableRows& b);
 
-/// Share of the light arriving at the interface from outside that it reflects (single scattering). Thread-safe; builds the
-/// table at the first call for an `eta`, after that it is a walk over the few indices of a scene.
-const DirectionalTable& coat_albedo_table(float eta);
+/// Share of the light that crosses a slab of optical thickness `thickness` at |cos|: exp(-thickness / |cos|) to 2e-7 for the
+/// thin slabs of coats, and between 0 and 1 always.
+inline float slab_transmittance(float thickness, float cos) {
+    // 1 / (1 + x + x^2 / 2) with x = thickness / cos.
+    const float cos2 = cos * cos;
+    return cos2 > 0 ? cos2 / (cos2 + thickness * (cos + 0.5f * thickness)) : (thickness > 0 ? 0.0f : 1.0f);
+}
 
-/// A perfectly reflecting rough base under a smooth interface: the share of the light that it reflects beyond the critical
-/// angle, over the cosine outside of the light that came in. Zero for eta <= 1. Thread-safe in the same way.
+/// values: share of the light arriving from outside that gets to the bottom of a coat of this index and optical thickness
+/// (one scattering event at the rough interface, then the slab). per_alpha: share of diffuse light leaving the bottom that
+/// the coat returns to it. Thread-safe; builds the table at the first call for its arguments (some 50 ms), after that it is
+/// a walk over the few coats of a scene.
+const DirectionalTable& coat_table(float eta, float thickness);
+
+/// values: of what a perfectly reflecting rough base under a smooth coat reflects, the share beyond the critical angle, over
+/// the cosine outside of the light that came in. Zero for eta <= 1. Thread-safe in the same way.
 const DirectionalTable& trapped_table(float eta);
 
 }  // namespace lightloom

@@ -57,6 +57,7 @@ struct Material {
     TextureId base_roughness_u = kNone, base_roughness_v = kNone;  ///< kCoatedConductor's conductor.
     bool remap_roughness = true;              ///< pbrt: alpha = sqrt(roughness) if true, alpha = roughness otherwise.
     float ior = 1.5f;                         ///< Relative index of (thin) dielectric or of the coat.
+    float thickness = 0.01f;                  ///< Of the coat of coated kinds: every crossing transmits exp(-thickness / cos).
     MaterialId mix_a = kNone, mix_b = kNone;  ///< kMix: a with probability 1 - amount, b with probability amount.
     TextureId mix_amount = kNone;
 };

@@ -63,12 +63,13 @@ Bsdf resolve_material(const TextureTables& tables, MaterialId material, Vec2 uv,
             }
             case MaterialKind::kDielectric: return make_dielectric(ior, alpha_x, alpha_y);
             case MaterialKind::kCoatedDiffuse:
-                return make_coated_diffuse(value(tables, m.reflectance, uv, Rgb(0.5f)), ior, alpha_x, alpha_y);
+                return make_coated_diffuse(value(tables, m.reflectance, uv, Rgb(0.5f)), ior, m.thickness, alpha_x, alpha_y);
             case MaterialKind::kCoatedConductor: {
                 const ConductorIndex index = conductor_index(tables, m, uv);
                 return make_coated_conductor(index.eta, index.k,
                                              alpha(tables, m.base_roughness_u, uv, m.remap_roughness),
-                                             alpha(tables, m.base_roughness_v, uv, m.remap_roughness), ior, alpha_x, alpha_y);
+                                             alpha(tables, m.base_roughness_v, uv, m.remap_roughness), ior, m.thickness,
+                                             alpha_x, alpha_y);
             }
             default: return {};
         }

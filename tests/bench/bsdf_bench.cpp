@@ -64,10 +64,10 @@ void run() {
         {"smooth dielectric", [] { return make_dielectric(1.5f, 0, 0); }},
         {"rough dielectric", [] { return make_dielectric(1.5f, 0.2f, 0.2f); }},
         {"thin dielectric", [] { return make_thin_dielectric(1.5f); }},
-        {"smooth coat, diffuse", [] { return make_coated_diffuse(Rgb(0.5f), 1.5f, 0, 0); }},
-        {"rough coat, diffuse", [] { return make_coated_diffuse(Rgb(0.5f), 1.5f, 0.2f, 0.2f); }},
-        {"smooth coat, conductor", [&] { return make_coated_conductor(eta, k, 0.2f, 0.2f, 1.5f, 0, 0); }},
-        {"rough coat, conductor", [&] { return make_coated_conductor(eta, k, 0.2f, 0.2f, 1.5f, 0.1f, 0.1f); }},
+        {"smooth coat, diffuse", [] { return make_coated_diffuse(Rgb(0.5f), 1.5f, 0.01f, 0, 0); }},
+        {"rough coat, diffuse", [] { return make_coated_diffuse(Rgb(0.5f), 1.5f, 0.01f, 0.2f, 0.2f); }},
+        {"smooth coat, conductor", [&] { return make_coated_conductor(eta, k, 0.2f, 0.2f, 1.5f, 0.01f, 0, 0); }},
+        {"rough coat, conductor", [&] { return make_coated_conductor(eta, k, 0.2f, 0.2f, 1.5f, 0.01f, 0.1f, 0.1f); }},
     };
     std::printf("%-26s %9s %9s %9s   (ns)\n", "kind", "eval", "sample", "make");
     for (const auto& row : rows) {

@@ -29,26 +29,26 @@ inline std::vector<BsdfCase> bsdf_cases() {
         {"bubble", make_dielectric(1 / 1.5f, 0, 0), 1, true},
         {"no interface", make_dielectric(1, 0.3f, 0.3f), 1, true},
         {"pane", make_thin_dielectric(1.5f), 1, true},
-        {"smooth coat on diffuse", make_coated_diffuse({0.8f, 0.5f, 0.1f}, 1.5f, 0, 0), 1, true},
-        {"smooth coat on black", make_coated_diffuse(Rgb(0), 1.5f, 0, 0), 1, true},
-        {"smooth coat on mirror", make_coated_conductor(gold_eta(), gold_k(), 0, 0, 1.5f, 0, 0), 1, true},
-        {"smooth coat on metal .3", make_coated_conductor(gold_eta(), gold_k(), 0.3f, 0.3f, 1.5f, 0, 0), 0.3f},
-        {"smooth coat on metal .1/.5", make_coated_conductor(gold_eta(), gold_k(), 0.1f, 0.5f, 1.7f, 0, 0), 0.1f},
-        {"rough coat on mirror", make_coated_conductor(gold_eta(), gold_k(), 0, 0, 1.5f, 0.4f, 0.4f), 0.09f},
-        {"rough coat on rough metal", make_coated_conductor(gold_eta(), gold_k(), 0.6f, 0.6f, 1.5f, 0.2f, 0.2f), 0.2f},
+        {"smooth coat on diffuse", make_coated_diffuse({0.8f, 0.5f, 0.1f}, 1.5f, 0.01f, 0, 0), 1, true},
+        {"smooth coat on black", make_coated_diffuse(Rgb(0), 1.5f, 0.01f, 0, 0), 1, true},
+        {"smooth coat on mirror", make_coated_conductor(gold_eta(), gold_k(), 0, 0, 1.5f, 0.01f, 0, 0), 1, true},
+        {"smooth coat on metal .3", make_coated_conductor(gold_eta(), gold_k(), 0.3f, 0.3f, 1.5f, 0.01f, 0, 0), 0.3f},
+        {"smooth coat on metal .1/.5", make_coated_conductor(gold_eta(), gold_k(), 0.1f, 0.5f, 1.7f, 0.01f, 0, 0), 0.1f},
+        {"rough coat on mirror", make_coated_conductor(gold_eta(), gold_k(), 0, 0, 1.5f, 0.01f, 0.4f, 0.4f), 0.09f},
+        {"rough coat on rough metal", make_coated_conductor(gold_eta(), gold_k(), 0.6f, 0.6f, 1.5f, 0.01f, 0.2f, 0.2f), 0.2f},
         {"metal .1/.4", make_conductor(gold_eta(), gold_k(), 0.1f, 0.4f), 0.1f},
         {"metal .002/.3", make_conductor(gold_eta(), gold_k(), 0.002f, 0.3f), 0.002f},
         {"rough glass .1/.4", make_dielectric(1.5f, 0.1f, 0.4f), 0.1f},
         {"rough diamond", make_dielectric(2.4f, 0.3f, 0.3f), 0.3f},
         {"rough bubble", make_dielectric(1 / 1.33f, 0.25f, 0.25f), 0.25f},
         {"faint rough interface", make_dielectric(1.05f, 0.3f, 0.3f), 0.02f},
-        {"coated .1/.3", make_coated_diffuse({0.3f, 0.5f, 0.9f}, 1.5f, 0.1f, 0.3f), 0.1f},
+        {"coated .1/.3", make_coated_diffuse({0.3f, 0.5f, 0.9f}, 1.5f, 0.01f, 0.1f, 0.3f), 0.1f},
     };
     for (float alpha : {0.01f, 0.1f, 0.5f, 1.0f}) {
         const std::string a = " " + std::to_string(alpha).substr(0, 4);
         cases.push_back({"metal" + a, make_conductor(gold_eta(), gold_k(), alpha, alpha), alpha});
         cases.push_back({"rough glass" + a, make_dielectric(1.5f, alpha, alpha), alpha});
-        cases.push_back({"rough coat" + a, make_coated_diffuse({0.8f, 0.5f, 0.1f}, 1.5f, alpha, alpha), alpha});
+        cases.push_back({"rough coat" + a, make_coated_diffuse({0.8f, 0.5f, 0.1f}, 1.5f, 0.01f, alpha, alpha), alpha});
     }
     return cases;
 }
