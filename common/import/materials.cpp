@@ -89,12 +89,18 @@ void read_conductor(Context* context, const ParameterList& p, const std::string&
     if (m->eta == kNone || m->k == kNone) p.finish();  // A parameter of the wrong type.
 }
 
-void ignore_layer_medium(Context* context, const ParameterList& p) {
+void read_layers(Context* context, const ParameterList& p, Material* m) {
     Diagnostics* d = &context->diagnostics;
-    p.ignore(d, "thickness", "the layers here are joined analytically, without a medium between them");
+    m->thickness = p.one_float("thickness", m->thickness);
+    if (!(m->thickness >= 0)) fail(p.where(), p.what() + ": the thickness is negative");
+    if (m->kind == MaterialKind::kCoatedDiffuse) {
+        m->layer_events = p.one_int("maxdepth", m->layer_events);
+        if (m->layer_events < 1) fail(p.where(), p.what() + ": maxdepth must be positive");
+    } else {
+        p.ignore(d, "maxdepth", "the layers here are joined analytically, without a random walk");
+    }
     p.ignore(d, "g", "the medium between the layers is not modelled");
     p.ignore(d, "albedo", "the medium between the layers is not modelled");
-    p.ignore(d, "maxdepth", "the layers here are joined analytically, without a random walk");
     p.ignore(d, "nsamples", "the layers here are joined analytically, without a random walk");
 }
 
@@ -166,7 +172,7 @@ MaterialId make_material(Context* context, const std::string& name, const Defini
         m.ior = read_index(context, p, "eta");
         read_roughness(context, p, "", 0, &m.roughness_u, &m.roughness_v);
         m.remap_roughness = p.one_bool("remaproughness", true);
-        ignore_layer_medium(context, p);
+        read_layers(context, p, &m);
     } else if (kind == "coatedconductor") {
         m.kind = MaterialKind::kCoatedConductor;
         read_conductor(context, p, "conductor.", &m);
@@ -174,7 +180,7 @@ MaterialId make_material(Context* context, const std::string& name, const Defini
         read_roughness(context, p, "interface.", 0, &m.roughness_u, &m.roughness_v);
         read_roughness(context, p, "conductor.", 0, &m.base_roughness_u, &m.base_roughness_v);
         m.remap_roughness = p.one_bool("remaproughness", true);
-        ignore_layer_medium(context, p);
+        read_layers(context, p, &m);
     } else if (kind == "mix") {
         m.kind = MaterialKind::kMix;
         read_mix(context, p, &m);
