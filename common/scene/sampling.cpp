@@ -10,52 +10,48 @@ AliasTable::AliasTable(std::span<const double> weights) {
     double sum = 0;
     for (const double w : weights) sum += w;
     std::vector<double> scaled(n);
-    pmf_.resize(n);
-    for (size_t i = 0; i < n; ++i) {
-        const double p = sum > 0 ? weights[i] / sum : 1.0 / double(n);
-        pmf_[i] = float(p);
-        scaled[i] = p * double(n);
-    }
-    keep_.assign(n, 1);
-    alias_.resize(n);
+    entries_.resize(n);
     std::vector<uint32_t> small, large;
     for (uint32_t i = 0; i < n; ++i) {
-        alias_[i] = i;
+        const double p = sum > 0 ? weights[i] / sum : 1.0 / double(n);
+        scaled[i] = p * double(n);
+        entries_[i] = {float(p), 1, i};
         (scaled[i] < 1 ? small : large).push_back(i);
     }
     while (!small.empty() && !large.empty()) {
         const uint32_t s = small.back(), l = large.back();
         small.pop_back();
-        keep_[s] = scaled[s];
-        alias_[s] = l;
+        entries_[s].keep = float(scaled[s]);
+        entries_[s].alias = l;
         scaled[l] -= 1 - scaled[s];
         if (scaled[l] < 1) {
             large.pop_back();
             small.push_back(l);
         }
     }
-    // Rounding can strand an index of weight zero here: it must never be drawn, so it borrows from its neighbour.
+    // Rounding can strand an index of weight zero here: it must never be drawn, so it borrows from another.
     for (const uint32_t i : small)
-        if (pmf_[i] == 0) {
-            keep_[i] = 0;
+        if (entries_[i].pmf == 0) {
             uint32_t j = 0;
-            while (pmf_[j] == 0) ++j;
-            alias_[i] = j;
+            while (entries_[j].pmf == 0) ++j;
+            entries_[i].keep = 0;
+            entries_[i].alias = j;
         }
 }
 
 uint32_t AliasTable::sample(double u, float* remapped) const {
-    const double scaled = u * double(pmf_.size());
+    const double scaled = u * double(entries_.size());
     uint32_t i = uint32_t(scaled);
-    if (i >= pmf_.size()) i = uint32_t(pmf_.size() - 1);
+    if (i >= entries_.size()) i = uint32_t(entries_.size() - 1);
     const double f = scaled - double(i);
-    const double keep = keep_[i];
+    const Entry& entry = entries_[i];
+    const double keep = entry.keep;
     const bool own = f < keep;
     if (remapped != nullptr) {
         const double r = own ? f / keep : (f - keep) / (1 - keep);
         *remapped = r < 0x1.fffffep-1 ? float(r) : 0x1.fffffep-1f;
     }
-    return own ? i : alias_[i];
+    return own ? i : entry.alias;
 }
 
 Vec2 sample_disk(Vec2 u) {

@@ -18,16 +18,20 @@ class AliasTable {
     /// Weights must be finite and non-negative; all zero means uniform.
     explicit AliasTable(std::span<const double> weights);
 
-    size_t size() const { return pmf_.size(); }
-    bool empty() const { return pmf_.empty(); }
-    float pmf(size_t i) const { return pmf_[i]; }
+    size_t size() const { return entries_.size(); }
+    bool empty() const { return entries_.empty(); }
+    float pmf(size_t i) const { return entries_[i].pmf; }
     /// `u` in [0, 1); `remapped`, when given, receives a fresh uniform in [0, 1).
     uint32_t sample(double u, float* remapped = nullptr) const;
 
   private:
-    std::vector<float> pmf_;
-    std::vector<double> keep_;
-    std::vector<uint32_t> alias_;
+    /// One cache line serves a draw: a table of an environment map is far larger than any cache.
+    struct Entry {
+        float pmf = 0;
+        float keep = 1;
+        uint32_t alias = 0;
+    };
+    std::vector<Entry> entries_;
 };
 
 /// Uniform on the unit disk, concentric mapping [Shirley and Chiu 1997].

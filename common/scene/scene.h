@@ -20,6 +20,9 @@ struct SceneOptions {
     int width = 0, height = 0;  ///< Override of the film's resolution; 0 keeps the scene's. A crop window is scaled along.
 };
 
+/// The frame that a film makes with these options; kInvalidArgument if it is empty or too large.
+Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions& options);
+
 /// What `lightloom inspect` prints.
 struct SceneSummary {
     uint64_t triangle_count = 0;           ///< As stored (an instanced object counts once).

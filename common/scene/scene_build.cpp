@@ -180,6 +180,30 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
     }
 }
 
+Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions& options) {
+    if (options.width < 0 || options.height < 0 || (options.width == 0) != (options.height == 0))
+        return invalid_argument("a resolution needs a positive width and height");
+    FrameLayout frame;
+    frame.width = options.width > 0 ? options.width : film.width;
+    frame.height = options.height > 0 ? options.height : film.height;
+    if (frame.width <= 0 || frame.height <= 0 || frame.width > 65536 || frame.height > 65536)
+        return invalid_argument("the image resolution must lie between 1 and 65536 pixels");
+    frame.crop = {0, 0, frame.width, frame.height};
+    if (film.crop[0] >= 0) {
+        // The crop scales with an overridden resolution, rounded outwards.
+        const auto scaled = [](int v, int from, int to, bool up) {
+            return int((int64_t(v) * to + (up ? from - 1 : 0)) / from);
+        };
+        frame.crop = {scaled(film.crop[0], film.width, frame.width, false),
+                      scaled(film.crop[2], film.height, frame.height, false),
+                      scaled(film.crop[1], film.width, frame.width, true),
+                      scaled(film.crop[3], film.height, frame.height, true)};
+        if (frame.crop.empty() || frame.crop.x1 > frame.width || frame.crop.y1 > frame.height)
+            return invalid_argument("the film's crop window is empty or outside of the frame");
+    }
+    return frame;
+}
+
 Result<std::unique_ptr<Scene>> Scene::build(SceneDescription description, const SceneOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     std::unique_ptr<Scene> scene(new Scene);
@@ -198,23 +222,10 @@ Result<std::unique_ptr<Scene>> Scene::build(SceneDescription description, const 
     scene->tables_ = {d.textures, d.images, d.materials};
     for (const Instance& i : d.instances) scene->instance_inverse_.push_back(*inverse(i.object_to_world));
 
-    FilmDescription& film = d.film;
-    if (options.width < 0 || options.height < 0 || (options.width == 0) != (options.height == 0))
-        return invalid_argument("a resolution needs a positive width and height");
+    Result<FrameLayout> layout = frame_layout(d.film, options);
+    if (!layout.ok()) return layout.status();
     FrameLayout& frame = scene->frame_;
-    frame.width = options.width > 0 ? options.width : film.width;
-    frame.height = options.height > 0 ? options.height : film.height;
-    if (frame.width <= 0 || frame.height <= 0 || frame.width > 65536 || frame.height > 65536)
-        return invalid_argument("the image resolution must lie between 1 and 65536 pixels");
-    frame.crop = {0, 0, frame.width, frame.height};
-    if (film.crop[0] >= 0) {
-        // The crop scales with an overridden resolution, rounded outwards.
-        const auto scaled = [](int v, int from, int to, bool up) { return int((int64_t(v) * to + (up ? from - 1 : 0)) / from); };
-        frame.crop = {scaled(film.crop[0], film.width, frame.width, false), scaled(film.crop[2], film.height, frame.height, false),
-                      scaled(film.crop[1], film.width, frame.width, true), scaled(film.crop[3], film.height, frame.height, true)};
-        if (frame.crop.empty() || frame.crop.x1 > frame.width || frame.crop.y1 > frame.height)
-            return invalid_argument("the film's crop window is empty or outside of the frame");
-    }
+    frame = *layout;
     Result<Camera> camera = Camera::create(d.camera, frame.width, frame.height);
     if (!camera.ok()) return camera.status();
     scene->camera_ = *camera;

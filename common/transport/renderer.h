@@ -24,7 +24,9 @@ struct RenderSettings {
 struct UnitWork {
     uint64_t first_iteration = 0;
     uint32_t iteration_count = 0;
-    uint32_t group = 0;
+    /// First iteration of the whole group: keys its light paths. Differs from first_iteration only when a part of a unit is
+    /// rendered again (replay).
+    uint64_t group_first_iteration = 0;
     Rect tile;
     uint64_t first_light_path = 0;
     uint64_t light_path_count = 0;

@@ -87,7 +87,7 @@ Result<Partial> render_unit(const A& algorithm, const Scene& scene, const Render
                                   .light_path_vertices = light_path.data(),
                                   .splats = &chunk.splats,
                                   .counters = {}};
-            context.group_iteration = work.first_iteration;
+            context.group_iteration = work.group_first_iteration;
             const int64_t end = std::min(pixels, int64_t(c + 1) * chunk_pixels);
             for (int64_t i = int64_t(c) * chunk_pixels; i < end; ++i) {
                 context.px = tile.x0 + int(i % tile.width());

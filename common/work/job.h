@@ -10,6 +10,7 @@
 #include "common/core/digest.h"
 #include "common/core/result.h"
 #include "common/film/frame.h"
+#include "common/transport/renderer.h"
 
 namespace lightloom {
 
@@ -55,6 +56,20 @@ struct Group {
     uint32_t iteration_count = 0;
 };
 
+/// What light transport needs of a unit.
+inline UnitWork unit_work(const WorkUnit& unit) {
+    return {.first_iteration = unit.first_iteration,
+            .iteration_count = unit.iteration_count,
+            .group_first_iteration = unit.first_iteration,
+            .tile = unit.tile,
+            .first_light_path = unit.first_light_path,
+            .light_path_count = unit.light_path_count};
+}
+
+/// The units of a group: one per tile, in order. Light paths: the group's total, round(light_paths_per_pixel * iterations *
+/// pixels), is shared out in proportion to the tiles' areas with exact cumulative rounding.
+std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& tiles, double light_paths_per_pixel);
+
 /// The plan is a pure function of frame, N1 and the number of iterations. Group sizes grow geometrically: a group is at
 /// most 5 % of all iterations before it (at least one iteration, at most what makes about 2^18 camera samples), so that a
 /// job stopped at any group boundary wastes little, and rendering it again with that number of iterations makes the very
@@ -67,6 +82,8 @@ class Plan {
 
     /// Group `index` of an unbounded job.
     Group group(uint32_t index) const;
+    /// Upper bound of a group's iterations.
+    uint32_t max_group_iterations() const { return max_group_iterations_; }
     /// The groups that make exactly `iterations` iterations; the last one is cut short where need be.
     std::vector<Group> groups_for(uint64_t iterations) const;
     /// The units of a group, tile by tile.
@@ -74,7 +91,6 @@ class Plan {
     uint32_t tile_count() const { return uint32_t(tiles_.size()); }
 
   private:
-    FrameLayout frame_;
     double light_paths_per_pixel_;
     std::vector<Rect> tiles_;
     uint32_t max_group_iterations_;

@@ -113,7 +113,7 @@ int main(int argc, char** argv) {
     const uint32_t per_group = 4;
     uint32_t group = 0;
     do {
-        UnitWork work{uint64_t(group) * per_group, per_group, group, frame.crop, 0, uint64_t(per_group) * uint64_t(frame.crop.area())};
+        UnitWork work{uint64_t(group) * per_group, per_group, uint64_t(group) * per_group, frame.crop, 0, uint64_t(per_group) * uint64_t(frame.crop.area())};
         auto partial = (*renderer)->render(work, {});
         if (!partial.ok()) return fail(partial.status());
         GroupSum sum(frame), alone(frame);

@@ -1,15 +1,267 @@
-#include <gtest/gtest.h>
+// Directives, graphics state, parameters, camera and film.
 
-#include "common/import/importer.h"
+#include "import_testing.h"
 
 namespace lightloom {
 namespace {
 
-TEST(Import, SmallestScene) {
-    import::MemorySource files(std::map<std::string, std::string>{{"scene.pbrt", "Camera \"perspective\" WorldBegin Shape \"sphere\""}});
-    const auto scene = import::import_from(&files, "scene.pbrt", {});
+using testing::expect_error;
+using testing::expect_warning;
+using testing::import_text;
+using testing::import_world;
+using testing::world;
+
+const char kTriangle[] = "Shape \"trianglemesh\" \"point3 P\" [0 0 0  1 0 0  0 1 0] \"integer indices\" [0 1 2]\n";
+
+Vec3 first_corner(const SceneDescription& d, size_t mesh = 0) { return d.meshes.at(mesh).positions.at(0); }
+
+void expect_near(const Vec3& a, const Vec3& b, float tolerance = 1e-5f) {
+    EXPECT_NEAR(a.x, b.x, tolerance);
+    EXPECT_NEAR(a.y, b.y, tolerance);
+    EXPECT_NEAR(a.z, b.z, tolerance);
+}
+
+TEST(ImportTransform, ComposesInPbrtOrder) {
+    const std::string mesh = "Shape \"trianglemesh\" \"point3 P\" [1 0 0 0 1 0 0 0 1]";
+    expect_near(first_corner(world("Translate 1 2 3 Scale 2 2 2 " + mesh)), {3, 2, 3});
+    expect_near(first_corner(world("Rotate 90 0 0 1 " + mesh)), {0, 1, 0});
+    expect_near(first_corner(world("Translate 9 9 9 Identity " + mesh)), {1, 0, 0});
+    // Matrices are written column by column.
+    expect_near(first_corner(world("Translate 9 9 9 Transform [1 0 0 0 0 1 0 0 0 0 1 0 5 6 7 1] " + mesh)), {6, 6, 7});
+    expect_near(first_corner(world("Scale 2 1 1 ConcatTransform [1 0 0 0 0 1 0 0 0 0 1 0 5 6 7 1] " + mesh)),
+                {12, 6, 7});
+    expect_near(first_corner(world("Translate 1 0 0 CoordinateSystem \"a\" Identity CoordSysTransform \"a\" " + mesh)),
+                {2, 0, 0});
+    // LookAt is world to camera: the eye lands at the origin.
+    expect_near(first_corner(world("LookAt 1 0 0  1 0 5  0 1 0 " + mesh)), {0, 0, 0});
+    expect_near(first_corner(world(
+                    "AttributeBegin Translate 5 0 0 AttributeEnd TransformBegin Scale 7 7 7 TransformEnd " + mesh)),
+                {1, 0, 0});
+    expect_near(first_corner(world("ActiveTransform StartTime Translate 1 0 0 ActiveTransform EndTime Translate 1 0 0 "
+                                   "ActiveTransform All TransformTimes 0 1 " +
+                                   mesh)),
+                {2, 0, 0});
+}
+
+TEST(ImportTransform, Errors) {
+    expect_error("Scale 1 0 1", {"scene.pbrt:3", "singular"});
+    expect_error("Transform [1 0 0 0 0 1 0 0 0 0 0 0 0 0 0 1]", {"singular"});
+    expect_error("Translate 1 2 x", {"Translate", "\"x\""});
+    expect_error("Translate 1 2 nan", {"Translate"});
+    expect_error("Rotate 10 0 0 0", {"axis"});
+    expect_error("LookAt 0 0 0 0 0 0 0 1 0", {"LookAt"});
+    expect_error("LookAt 0 0 0 0 1 0 0 1 0", {"LookAt"});
+    expect_error("CoordSysTransform \"nowhere\"", {"nowhere"});
+    expect_error(std::string("ActiveTransform StartTime Translate 1 0 0 ActiveTransform All ") + kTriangle, {"moves"});
+    expect_error("Transform [1 2 3]", {"Transform"});
+    expect_error("ActiveTransform Sometimes", {"StartTime"});
+}
+
+TEST(ImportState, OrientationFollowsHandednessAndReversal) {
+    EXPECT_FALSE(world(kTriangle).meshes[0].attributes.flip_normal);
+    EXPECT_TRUE(world(std::string("ReverseOrientation ") + kTriangle).meshes[0].attributes.flip_normal);
+    EXPECT_TRUE(world(std::string("Scale -1 1 1 ") + kTriangle).meshes[0].attributes.flip_normal);
+    EXPECT_FALSE(world(std::string("Scale -1 1 1 ReverseOrientation ") + kTriangle).meshes[0].attributes.flip_normal);
+    // A sphere's normal points outwards however it is mirrored.
+    EXPECT_FALSE(world("Scale -1 1 1 Shape \"sphere\"").spheres[0].attributes.flip_normal);
+    EXPECT_TRUE(world("ReverseOrientation Shape \"sphere\"").spheres[0].attributes.flip_normal);
+}
+
+TEST(ImportState, AttributesAreDefaultsThatAShapeMayOverride) {
+    const SceneDescription d = world(
+        "AttributeBegin Attribute \"shape\" \"float radius\" 3 \"float alpha\" 0.5 Shape \"sphere\" Shape \"sphere\" "
+        "\"float radius\" 2 AttributeEnd Shape \"sphere\"");
+    ASSERT_EQ(d.spheres.size(), 3u);
+    EXPECT_EQ(d.spheres[0].radius, 3);
+    EXPECT_EQ(d.spheres[1].radius, 2);
+    EXPECT_EQ(d.spheres[2].radius, 1);
+    EXPECT_EQ(d.textures[size_t(d.spheres[1].attributes.alpha)].value.r, 0.5f);
+    EXPECT_EQ(d.spheres[2].attributes.alpha, kNone);
+    expect_error("Attribute \"hat\" \"float radius\" 3", {"hat"});
+}
+
+TEST(ImportState, ObjectsAreInstanced) {
+    const SceneDescription d =
+        world(std::string("ObjectBegin \"o\" Translate 1 0 0 ") + kTriangle +
+              "Shape \"sphere\" ObjectEnd Translate 0 5 0 ObjectInstance \"o\" ObjectInstance \"o\"");
+    ASSERT_EQ(d.objects.size(), 1u);
+    ASSERT_EQ(d.instances.size(), 2u);
+    EXPECT_TRUE(d.meshes.empty());
+    expect_near(d.objects[0].meshes[0].positions[0], {1, 0, 0});
+    EXPECT_EQ(d.objects[0].spheres.size(), 1u);
+    expect_near(d.instances[1].object_to_world.point({0, 0, 0}), {0, 5, 0});
+    expect_error("ObjectInstance \"x\"", {"\"x\""});
+    expect_error("ObjectBegin \"x\" ObjectBegin \"y\"", {"inside"});
+    expect_error("ObjectBegin \"x\" ObjectEnd ObjectBegin \"x\"", {"twice"});
+    expect_error("ObjectBegin \"x\" ObjectInstance \"x\"", {"nested"});
+    expect_warning(std::string("AreaLightSource \"diffuse\" ObjectBegin \"o\" ") + kTriangle + "ObjectEnd",
+                   "ignored, as in pbrt");
+}
+
+TEST(ImportState, ScopesMustMatch) {
+    expect_error("AttributeBegin", {"scene.pbrt:3", "never closed"});
+    expect_error("AttributeEnd", {"AttributeEnd"});
+    expect_error("AttributeBegin ObjectEnd", {"does not match"});
+    std::string deep;
+    for (int i = 0; i < 2000; ++i) deep += "AttributeBegin ";
+    expect_error(deep, {"nested deeper"});
+}
+
+TEST(ImportFiles, IncludeKeepsTheStateAndImportDoesNot) {
+    const testing::FileMap files{{"sub/more.pbrt", std::string("Translate 1 0 0\n") + kTriangle}};
+    const SceneDescription include = world(std::string("Include \"sub/more.pbrt\" ") + kTriangle, files);
+    expect_near(first_corner(include, 1), {1, 0, 0});
+    EXPECT_EQ(include.meshes[0].attributes.source, "sub/more.pbrt:2");
+    expect_near(first_corner(world(std::string("Import \"sub/more.pbrt\" ") + kTriangle, files), 1), {0, 0, 0});
+    const auto scene = import_world("Include \"./sub//../sub/more.pbrt\"", files);
     ASSERT_TRUE(scene.ok()) << scene.status().message();
-    EXPECT_EQ(scene->description.spheres.size(), 1u);
+    EXPECT_EQ(scene->files, (std::vector<std::string>{"scene.pbrt", "sub/more.pbrt"}));
+}
+
+TEST(ImportFiles, ReferencesStayInTheDirectoryAndEnd) {
+    expect_error("Include \"missing.pbrt\"", {"scene.pbrt:3", "missing.pbrt"});
+    expect_error("Include \"/etc/passwd\"", {"absolute"});
+    expect_error("Include \"a/../../b.pbrt\"", {"leaves"});
+    expect_error("Include \"scene.pbrt\"", {"WorldBegin"});
+    expect_error("Include \"a.pbrt\"", {"16", "include itself"}, {{"a.pbrt", "Include \"a.pbrt\""}});
+    expect_error("Shape \"plymesh\" \"string filename\" \"../a.ply\"", {"leaves"});
+    testing::FileMap laughs{{"9.pbrt", ""}};
+    for (int i = 0; i < 9; ++i) {
+        const std::string line = "Include \"" + std::to_string(i + 1) + ".pbrt\"\n";
+        for (int k = 0; k < 10; ++k) laughs[std::to_string(i) + ".pbrt"] += line;
+    }
+    expect_error("Include \"0.pbrt\"", {"100000 times"}, laughs);
+    EXPECT_FALSE(import_pbrt("/nowhere/at/all.pbrt").ok());
+    EXPECT_FALSE(import_pbrt("/").ok());
+}
+
+TEST(ImportSyntax, ValuesWithAndWithoutBrackets) {
+    const SceneDescription d = world(
+        "Shape \"sphere\" \"float radius\" 2 # a comment \" [ \n Shape \"sphere\" \"float radius\" [ 2 ] "
+        "Shape\"sphere\"\"float  radius\"[+2.0e0]\n"
+        "Material \"conductor\" \"bool remaproughness\" \"false\" Shape \"sphere\" Material \"conductor\" \"bool "
+        "remaproughness\" [false] Shape \"sphere\"");
+    ASSERT_EQ(d.spheres.size(), 5u);
+    for (size_t i = 0; i < 3; ++i) EXPECT_EQ(d.spheres[i].radius, 2);
+    for (size_t i = 3; i < 5; ++i) EXPECT_FALSE(d.materials[size_t(d.spheres[i].attributes.material)].remap_roughness);
+}
+
+TEST(ImportSyntax, Errors) {
+    expect_error("Frobnicate", {"scene.pbrt:3", "Frobnicate"});
+    expect_error("Shape \"sphere\" \"float radius\" [1", {"not closed"});
+    expect_error("Shape \"sphere\" \"float radius\"", {"no value"});
+    expect_error("Shape \"sphere\" \"float radius\" []", {"no value"});
+    expect_error("Shape \"sphere\" \"float radius\" [1 2]", {"1 value"});
+    expect_error("Shape \"sphere\" \"float radius\" \"big\"", {"big"});
+    expect_error("Shape \"sphere\" \"float radius\" 1e999", {"finite"});
+    expect_error("Shape \"sphere\" \"float radius\" 1e60", {"single precision"});
+    expect_error("Shape \"sphere\" \"integer radius\" 1", {"wrong type", "float radius"});
+    expect_error("Shape \"sphere\" \"float radios\" 1", {"unknown parameter", "radios"});
+    expect_error("Shape \"sphere\" \"float radius\" 1 \"float radius\" 2", {"twice"});
+    expect_error("Shape \"sphere\" \"number radius\" 1", {"number"});
+    expect_error("Shape \"sphere\" \"radius\" 1", {"float radius"});
+    expect_error("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1]", {"multiple of 3"});
+    expect_error("Shape \"trianglemesh\" \"integer indices\" [0.5 1 2]", {"32-bit integer"});
+    expect_error("Shape \"sphere", {"inside a quoted string"});
+    expect_error("Shape \"sp\nhere\"", {"closed"});
+    expect_error("Shape sphere", {"quoted"});
+    expect_error("Shape", {"quoted"});
+    expect_error("\"Shape\"", {"expected a directive"});
+    EXPECT_FALSE(import_text("").ok());
+    EXPECT_FALSE(import_text("Shape \"sphere\"").ok());
+    EXPECT_FALSE(import_text("WorldBegin Camera \"perspective\"").ok());
+    EXPECT_FALSE(import_text(std::string("WorldBegin \0\xff\xfe", 14)).ok());
+}
+
+TEST(ImportOptions, CameraFilmAndDepth) {
+    const auto scene = import_text(
+        "Transform [-1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1] LookAt 1 2 3 1 2 8 0 1 0\n"
+        "Camera \"perspective\" \"float fov\" 40 \"float lensradius\" 0.1 \"float focaldistance\" 7 \"float "
+        "screenwindow\" [-1 1 -2 2] \"float shutterclose\" 0.5\n"
+        "Film \"rgb\" \"integer xresolution\" 400 \"integer yresolution\" 200 \"float cropwindow\" [0 0.5 0.25 1] "
+        "\"float iso\" 400\n"
+        "Sampler \"stratified\" \"integer xsamples\" 3 \"integer ysamples\" 2 \"bool jitter\" true Integrator "
+        "\"volpath\" \"integer maxdepth\" 9 ColorSpace \"srgb\"\n"
+        "PixelFilter \"box\" \"float xradius\" 0.5 WorldBegin");
+    ASSERT_TRUE(scene.ok()) << scene.status().message();
+    const SceneDescription& d = scene->description;
+    EXPECT_TRUE(d.warnings.empty());
+    expect_near(d.camera.camera_to_world.point({0, 0, 0}), {1, 2, 3});
+    // LookAt alone puts camera +x at world -x for this up vector; the Transform mirrors it.
+    expect_near(d.camera.camera_to_world.vector({1, 0, 0}), {-1, 0, 0});
+    EXPECT_TRUE(d.camera.camera_to_world.swaps_handedness());
+    EXPECT_EQ(d.camera.fov_degrees, 40);
+    EXPECT_EQ(d.camera.lens_radius, 0.1f);
+    EXPECT_TRUE(d.camera.has_screen_window);
+    EXPECT_EQ(d.camera.screen_window[3], 2);
+    const int crop[4] = {0, 200, 50, 200};
+    for (int i = 0; i < 4; ++i) EXPECT_EQ(d.film.crop[i], crop[i]);
+    EXPECT_FLOAT_EQ(d.film.exposure_scale, 2);
+    EXPECT_EQ(d.samples_per_pixel, 6);
+    EXPECT_EQ(d.max_depth, 9);
+}
+
+TEST(ImportOptions, DefaultsAreThoseOfPbrt) {
+    const auto scene = import_text("WorldBegin");
+    ASSERT_TRUE(scene.ok());
+    const SceneDescription& d = scene->description;
+    EXPECT_EQ(d.film.width, 1280);
+    EXPECT_EQ(d.film.height, 720);
+    EXPECT_EQ(d.film.exposure_scale, 1);
+    EXPECT_EQ(d.camera.fov_degrees, 90);
+    EXPECT_EQ(d.camera.focal_distance, 1e6f);
+    EXPECT_EQ(d.max_depth, 5);
+    EXPECT_EQ(d.samples_per_pixel, 16);
+    ASSERT_EQ(d.warnings.size(), 1u);
+    EXPECT_NE(d.warnings[0].find("gaussian"), std::string::npos);
+    EXPECT_FALSE(import_text("WorldBegin", {}, true).ok());
+}
+
+TEST(ImportOptions, UnsupportedOnesAreNamed) {
+    const auto refused = [](const std::string& text, const char* part) {
+        const auto scene = import_text(text + " WorldBegin");
+        ASSERT_FALSE(scene.ok()) << text;
+        EXPECT_NE(scene.status().message().find(part), std::string::npos) << scene.status().message();
+    };
+    const auto warned = [](const std::string& text, const char* part) {
+        const bool filter = text.find("PixelFilter") != std::string::npos;
+        const auto scene = import_text((filter ? "" : "PixelFilter \"box\" ") + text + " WorldBegin");
+        ASSERT_TRUE(scene.ok()) << scene.status().message();
+        ASSERT_EQ(scene->description.warnings.size(), 1u) << text;
+        EXPECT_NE(scene->description.warnings[0].find(part), std::string::npos) << scene->description.warnings[0];
+    };
+    refused("Camera \"spherical\"", "perspective");
+    refused("Camera \"perspective\" \"float fov\" 180", "fov");
+    refused("Film \"gbuffer\"", "rgb");
+    refused("Film \"rgb\" \"integer xresolution\" 0", "resolution");
+    refused("Film \"rgb\" \"integer xresolution\" 2000000000", "resolution");
+    refused("Film \"rgb\" \"string sensor\" \"canon_eos_5d\"", "sensor");
+    refused("Film \"rgb\" \"float cropwindow\" [0.5 0.5 0 1]", "empty");
+    refused("Integrator \"ambientocclusion\"", "ambientocclusion");
+    refused("Integrator \"path\" \"integer depth\" 3", "depth");
+    refused("ColorSpace \"rec2020\"", "srgb");
+    refused("Option \"bool forcediffuse\" true", "forcediffuse");
+    refused("Option \"bool nonsense\" true", "nonsense");
+    warned("Film \"rgb\" \"float maxcomponentvalue\" 10", "clamps");
+    warned("PixelFilter \"gaussian\"", "box");
+    warned("PixelFilter \"box\" \"float xradius\" 1", "radius");
+    warned("Integrator \"path\" \"bool regularize\" true", "regularize");
+    warned("Integrator \"bdpt\" \"string lightsampler\" \"power\"", "lightsampler");
+    warned("Sampler \"halton\" \"integer seed\" 3", "--seed");
+    warned("Accelerator \"bvh\" \"string splitmethod\" \"sah\"", "Accelerator");
+    warned("Option \"integer seed\" 3", "seed");
+}
+
+TEST(ImportState, Media) {
+    EXPECT_TRUE(world("MediumInterface \"\" \"\"").warnings.empty());
+    expect_warning("MakeNamedMedium \"fog\" \"string type\" \"homogeneous\"", "fog");
+    expect_error("MakeNamedMedium \"fog\" \"string type\" \"homogeneous\" MediumInterface \"fog\"", {"media"});
+}
+
+TEST(ImportDiagnostics, RepeatedWarningsAreCounted) {
+    const SceneDescription d = world("Shape \"disk\" Shape \"disk\" Shape \"disk\"");
+    ASSERT_EQ(d.warnings.size(), 1u);
+    EXPECT_NE(d.warnings[0].find("and 2 more"), std::string::npos);
 }
 
 }  // namespace

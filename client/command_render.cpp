@@ -1,0 +1,117 @@
+// lightloom render: coordinator and workers in this process.
+
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+#include "client/commands.h"
+#include "client/run_job.h"
+#include "common/work/identity.h"
+#include "server/local_ports.h"
+#include "server/scene_reader.h"
+#include "worker/scene_cache.h"
+
+namespace lightloom::client {
+namespace {
+
+constexpr const char* kFooter = R"(Examples:
+  lightloom render room.pbrt                                  the scene's own samples per pixel, to room.exr
+  lightloom render room.pbrt -o out.exr --png out.png --algorithm bdpt --spp 64
+  lightloom render room.pbrt --time 60                        stop after a minute of rendering
+  lightloom render room.pbrt --spp 4 --resolution 320x180     a quick look
+
+The same job submitted to a service (`lightloom submit`) gives a file with the same SHA-256.)";
+
+/// A directory that goes with the object.
+struct ScratchDirectory {
+    std::filesystem::path path;
+    ScratchDirectory() {
+        std::string name = (std::filesystem::temp_directory_path() / "lightloom-XXXXXX").string();
+        if (::mkdtemp(name.data())) path = name;
+    }
+    ~ScratchDirectory() {
+        std::error_code ignored;
+        if (!path.empty()) std::filesystem::remove_all(path, ignored);
+    }
+};
+
+int render(const JobOptions& options, uint32_t threads, uint32_t worker_count) {
+    (void)interrupt_token();
+    auto scene = load_scene(options);
+    if (!scene.ok()) return report_error(scene.status());
+    const auto spec = make_spec(options, *scene);
+    if (!spec.ok()) return report_error(spec.status());
+    const auto facts = scene_facts(scene->imported.description, *spec);
+    if (!facts.ok()) return report_error(facts.status());
+    const ScratchDirectory scratch;
+    if (scratch.path.empty()) return report_error(internal_error("no directory for temporary files can be made"));
+
+    const tbb::global_control parallelism(tbb::global_control::max_allowed_parallelism, threads * worker_count);
+    const auto identity = build_identity();
+    if (!identity.ok()) return report_error(identity.status());
+    CoordinatorOptions coordinator_options;
+    coordinator_options.directory = scratch.path;
+    coordinator_options.identity = *identity;
+    coordinator_options.scene_files_needed = false;
+    coordinator_options.read_scene = [&](const AssetStore&, const JobSpec&, std::stop_token) { return facts; };
+    // A worker of this process cannot get lost, but its machine may be suspended.
+    coordinator_options.lease_seconds = 3600;
+    Coordinator coordinator(std::move(coordinator_options));
+    LocalJobPort jobs(coordinator);
+    LocalWorkerPort work(coordinator);
+    if (Status s = jobs.upload_bytes(spec->scene_root, scene->manifest.canonical_text()); !s.ok()) return report_error(s);
+
+    // All workers share the one scene; it is built when the first unit asks for it.
+    RendererCache renderers([&](const JobSpec& job, std::stop_token) -> Result<std::shared_ptr<const Scene>> {
+        auto built = Scene::build(std::move(scene->imported.description), {.width = job.width, .height = job.height});
+        if (!built.ok()) return built.status();
+        return std::shared_ptr<const Scene>(std::move(built).value());
+    });
+    std::vector<std::unique_ptr<Worker>> workers;
+    std::vector<std::jthread> running;
+    for (uint32_t i = 0; i < worker_count; ++i) {
+        workers.push_back(std::make_unique<Worker>(
+            work,
+            WorkerOptions{.identity = *identity, .thread_count = threads, .host = "embedded", .process_id = uint64_t(::getpid())},
+            [&](const JobSpec& job, std::stop_token stop) { return renderers.renderer(job, stop); }));
+        running.emplace_back([worker = workers.back().get()](std::stop_token stop) { (void)worker->run(stop); });
+    }
+    ClientTimes times{.import_seconds = scene->import_seconds, .digest_seconds = scene->digest_seconds};
+    const auto begin = std::chrono::steady_clock::now();
+    const auto job = submit(jobs, *spec);
+    if (!job.ok()) return report_error(job.status());
+    const auto ended = watch(jobs, job->job_id, options.quiet, true);
+    times.wait_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    for (std::jthread& thread : running) thread.request_stop();
+    running.clear();
+    if (!ended.ok()) return report_error(ended.status());
+    return fetch(jobs, *ended, options, times);
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& app, int* exit_code) {
+    struct Options {
+        JobOptions job;
+        uint32_t threads = 0, workers = 1;
+    };
+    auto options = std::make_shared<Options>();
+    CLI::App* command = app.add_subcommand("render", "Render a scene on this machine");
+    command->footer(kFooter);
+    add_render_settings(*command, options->job);
+    add_output_settings(*command, options->job);
+    command->add_option("--threads", options->threads, "Threads of each worker (default: all processors, shared out)")
+        ->check(CLI::Range(1, 1024));
+    command->add_option("--workers", options->workers, "Embedded workers; the bytes do not depend on it")
+        ->check(CLI::Range(1, 256))->capture_default_str();
+    command->callback([options, exit_code] {
+        uint32_t threads = options->threads;
+        if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency() / options->workers);
+        *exit_code = render(options->job, threads, options->workers);
+    });
+}
+
+}  // namespace lightloom::client

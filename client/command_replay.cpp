@@ -1,0 +1,120 @@
+// lightloom replay: one camera sample of one iteration, or one whole unit, rendered again exactly as a job rendered it.
+
+#include <cstdio>
+#include <memory>
+
+#include "client/commands.h"
+#include "client/job_options.h"
+#include "common/scene/scene.h"
+#include "common/transport/renderer.h"
+#include "common/work/job.h"
+
+namespace lightloom::client {
+namespace {
+
+constexpr const char* kFooter = R"(Examples:
+  lightloom replay room.pbrt --algorithm bdpt --iteration 17 --pixel 120,64
+  lightloom replay room.pbrt --algorithm bdpt --unit 3,0
+
+A manifest lists these commands for the samples that were dropped. --algorithm, --set, --seed, --max-depth and --resolution
+must be those of the job. The printed value is the sample's camera part; what its light path splats elsewhere is listed
+behind it.)";
+
+struct ReplayOptions {
+    JobOptions job;
+    uint64_t iteration = 0;
+    std::string pixel, unit;
+};
+
+Result<WorkUnit> find_unit(const ReplayOptions& options, const Plan& plan, uint64_t iteration, int x, int y) {
+    if (!options.unit.empty()) {
+        unsigned group = 0, tile = 0;
+        if (std::sscanf(options.unit.c_str(), "%u,%u", &group, &tile) != 2 || tile >= plan.tile_count())
+            return invalid_argument("--unit takes GROUP,TILE with a tile below " + std::to_string(plan.tile_count()));
+        return plan.units(plan.group(group))[tile];
+    }
+    for (uint32_t g = 0;; ++g) {
+        const Group group = plan.group(g);
+        if (iteration >= group.first_iteration + group.iteration_count) continue;
+        for (const WorkUnit& unit : plan.units(group)) {
+            if (unit.tile.contains(x, y)) return unit;
+        }
+        return invalid_argument("the pixel lies outside of the rendered window");
+    }
+}
+
+int replay(const ReplayOptions& options) {
+    auto local = load_scene(options.job);
+    if (!local.ok()) return report_error(local.status());
+    auto spec = make_spec(options.job, *local);
+    if (!spec.ok()) return report_error(spec.status());
+    if (spec->max_depth < 0) spec->max_depth = local->imported.description.max_depth;
+    auto built = Scene::build(std::move(local->imported.description), {.width = spec->width, .height = spec->height});
+    if (!built.ok()) return report_error(built.status());
+    const std::shared_ptr<const Scene> scene = std::move(built).value();
+    const auto renderer = Renderer::create(scene, {.algorithm = spec->algorithm,
+                                                   .parameters = spec->parameters,
+                                                   .seed = spec->seed,
+                                                   .max_depth = spec->max_depth});
+    if (!renderer.ok()) return report_error(renderer.status());
+    const auto algorithm = find_algorithm(spec->algorithm);
+    const auto parameters = parse_parameters(**algorithm, spec->parameters);
+    const Plan plan(scene->frame(), light_paths_per_pixel(**algorithm, *parameters));
+
+    int x = 0, y = 0;
+    if (options.unit.empty() && std::sscanf(options.pixel.c_str(), "%d,%d", &x, &y) != 2)
+        return report_error(invalid_argument("--pixel takes X,Y, for example 120,64"));
+    const auto unit = find_unit(options, plan, options.iteration, x, y);
+    if (!unit.ok()) return report_error(unit.status());
+    UnitWork work = unit_work(*unit);
+    if (options.unit.empty()) {
+        // The light path of a camera sample is numbered by its place in the unit.
+        const uint64_t place = (options.iteration - unit->first_iteration) * uint64_t(unit->tile.area()) +
+                               uint64_t(unit->tile.index(x, y));
+        work.first_iteration = options.iteration;
+        work.iteration_count = 1;
+        work.tile = {x, y, x + 1, y + 1};
+        work.first_light_path = unit->first_light_path + place;
+        work.light_path_count = unit->light_path_count > 0 ? 1 : 0;
+    }
+    const auto partial = (*renderer)->render(work, {});
+    if (!partial.ok()) return report_error(partial.status());
+    double sum[3] = {};
+    for (size_t i = 0; i < partial->camera.size(); ++i) sum[i % 3] += partial->camera[i];
+    std::printf("unit %u,%u  camera %.9g %.9g %.9g\n", unit->key.group, unit->key.tile, sum[0], sum[1], sum[2]);
+    const int width = scene->frame().crop.width();
+    if (options.unit.empty()) {
+        for (const SplatSum& splat : partial->splats) {
+            std::printf("splat at %d,%d  %.9g %.9g %.9g\n", scene->frame().crop.x0 + int(splat.pixel) % width,
+                        scene->frame().crop.y0 + int(splat.pixel) / width, splat.rgb[0], splat.rgb[1], splat.rgb[2]);
+        }
+    }
+    std::printf("dropped %llu\n", static_cast<unsigned long long>(partial->dropped_count));
+    for (const DroppedSample& d : partial->dropped) {
+        std::printf("  %s of iteration %llu %s pixel %d,%d\n", d.splat ? "splat" : "camera sample",
+                    static_cast<unsigned long long>(d.iteration), d.splat ? "onto" : "of",
+                    scene->frame().crop.x0 + int(d.pixel) % width, scene->frame().crop.y0 + int(d.pixel) / width);
+    }
+    return partial->dropped_count > 0 && options.job.strict ? kDroppedSamples : kSuccess;
+}
+
+}  // namespace
+
+void add_replay_command(CLI::App& app, int* exit_code) {
+    auto options = std::make_shared<ReplayOptions>();
+    CLI::App* command = app.add_subcommand("replay", "Render one sample or one unit of a job again and print it");
+    command->footer(kFooter);
+    add_render_settings(*command, options->job);
+    auto* iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, from 0");
+    auto* pixel = command->add_option("--pixel", options->pixel, "X,Y in full-frame pixels, 0,0 at the top left");
+    auto* unit = command->add_option("--unit", options->unit, "GROUP,TILE: the whole unit instead of one sample");
+    iteration->needs(pixel);
+    pixel->excludes(unit);
+    command->add_flag("--strict", options->job.strict, "Exit with 3 if samples were dropped");
+    command->callback([options, exit_code] {
+        if (options->pixel.empty() && options->unit.empty()) throw CLI::RequiredError("--pixel or --unit");
+        *exit_code = replay(*options);
+    });
+}
+
+}  // namespace lightloom::client

@@ -1,0 +1,231 @@
+#include "client/grpc_job_port.h"
+
+#include <grpcpp/client_context.h>
+
+#include <chrono>
+#include <fstream>
+#include <thread>
+
+#include "common/work/wire.h"
+
+namespace lightloom {
+namespace {
+
+constexpr int kWatchAttempts = 20;
+constexpr int kUploadAttempts = 5;
+constexpr size_t kDigestsPerCall = 1000;
+
+void set_deadline(grpc::ClientContext& context, double seconds) {
+    context.set_deadline(std::chrono::system_clock::now() +
+                         std::chrono::duration_cast<std::chrono::system_clock::duration>(
+                             std::chrono::duration<double>(seconds)));
+}
+
+Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientContext& context) {
+    std::string bytes;
+    v1::Chunk chunk;
+    while (reader.Read(&chunk)) {
+        if (chunk.offset_bytes() != bytes.size()) {
+            context.TryCancel();
+            (void)reader.Finish();
+            return data_loss("the coordinator sent a chunk out of order");
+        }
+        bytes += chunk.data();
+    }
+    const grpc::Status status = reader.Finish();
+    if (!status.ok()) return wire::from_grpc(status);
+    return bytes;
+}
+
+}  // namespace
+
+GrpcJobPort::GrpcJobPort(const std::shared_ptr<grpc::Channel>& channel)
+    : jobs_(v1::JobService::NewStub(channel)), assets_(v1::AssetService::NewStub(channel)) {}
+
+Result<JobInfo> GrpcJobPort::submit_job(const std::string& request_id, const JobSpec& spec) {
+    grpc::ClientContext context;
+    set_deadline(context, 30);
+    v1::SubmitJobRequest request;
+    request.set_request_id(request_id);
+    wire::put(spec, request.mutable_spec());
+    v1::Job response;
+    const grpc::Status status = jobs_->SubmitJob(&context, request, &response);
+    if (!status.ok()) return wire::from_grpc(status);
+    return wire::get(response);
+}
+
+Result<JobInfo> GrpcJobPort::get_job(const std::string& job_id) {
+    grpc::ClientContext context;
+    set_deadline(context, 10);
+    v1::GetJobRequest request;
+    request.set_job_id(job_id);
+    v1::Job response;
+    const grpc::Status status = jobs_->GetJob(&context, request, &response);
+    if (!status.ok()) return wire::from_grpc(status);
+    return wire::get(response);
+}
+
+Result<std::vector<JobInfo>> GrpcJobPort::list_jobs() {
+    grpc::ClientContext context;
+    set_deadline(context, 10);
+    v1::ListJobsResponse response;
+    const grpc::Status status = jobs_->ListJobs(&context, {}, &response);
+    if (!status.ok()) return wire::from_grpc(status);
+    std::vector<JobInfo> jobs;
+    for (const v1::Job& item : response.jobs()) {
+        auto info = wire::get(item);
+        if (!info.ok()) return info.status();
+        jobs.push_back(*std::move(info));
+    }
+    return jobs;
+}
+
+Result<JobInfo> GrpcJobPort::cancel_job(const std::string& job_id) {
+    grpc::ClientContext context;
+    set_deadline(context, 10);
+    v1::CancelJobRequest request;
+    request.set_job_id(job_id);
+    v1::Job response;
+    const grpc::Status status = jobs_->CancelJob(&context, request, &response);
+    if (!status.ok()) return wire::from_grpc(status);
+    return wire::get(response);
+}
+
+Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
+                              std::stop_token stop) {
+    uint64_t seen = 0;
+    for (int attempt = 0;; ++attempt) {
+        grpc::ClientContext context;
+        const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
+        v1::WatchJobRequest request;
+        request.set_job_id(job_id);
+        request.set_after_revision(seen);
+        const auto reader = jobs_->WatchJob(&context, request);
+        v1::Job message;
+        while (reader->Read(&message)) {
+            const auto info = wire::get(message);
+            if (!info.ok()) {
+                context.TryCancel();
+                (void)reader->Finish();
+                return info.status();
+            }
+            on_change(*info);
+            seen = info->revision;
+            attempt = 0;
+        }
+        const grpc::Status status = reader->Finish();
+        if (stop.stop_requested()) return {StatusCode::kCancelled, "interrupted"};
+        if (status.error_code() != grpc::StatusCode::UNAVAILABLE || attempt >= kWatchAttempts)
+            return wire::from_grpc(status);
+        std::this_thread::sleep_for(std::chrono::milliseconds(250));
+    }
+}
+
+Result<std::string> GrpcJobPort::image(const std::string& job_id, ImageKind kind) {
+    grpc::ClientContext context;
+    set_deadline(context, 120);
+    v1::GetImageRequest request;
+    request.set_job_id(job_id);
+    request.set_kind(kind == ImageKind::kFinal ? v1::IMAGE_KIND_FINAL : v1::IMAGE_KIND_PREVIEW);
+    const auto reader = jobs_->GetImage(&context, request);
+    return collect(*reader, context);
+}
+
+Result<std::string> GrpcJobPort::manifest(const std::string& job_id) {
+    grpc::ClientContext context;
+    set_deadline(context, 60);
+    v1::GetManifestRequest request;
+    request.set_job_id(job_id);
+    const auto reader = jobs_->GetManifest(&context, request);
+    return collect(*reader, context);
+}
+
+Result<std::vector<Digest>> GrpcJobPort::find_missing(const std::vector<Digest>& digests) {
+    std::vector<Digest> missing;
+    for (size_t begin = 0; begin < digests.size(); begin += kDigestsPerCall) {
+        grpc::ClientContext context;
+        set_deadline(context, 30);
+        v1::FindMissingRequest request;
+        for (size_t i = begin; i < std::min(begin + kDigestsPerCall, digests.size()); ++i)
+            wire::put(digests[i], request.add_digests());
+        v1::FindMissingResponse response;
+        const grpc::Status status = assets_->FindMissing(&context, request, &response);
+        if (!status.ok()) return wire::from_grpc(status);
+        for (const v1::Digest& item : response.missing()) {
+            const auto digest = wire::get(item);
+            if (!digest.ok()) return digest.status();
+            missing.push_back(*digest);
+        }
+    }
+    return missing;
+}
+
+Status GrpcJobPort::send(const Digest& digest, uint64_t size,
+                         const std::function<Result<std::string_view>(uint64_t offset)>& source) {
+    Status last;
+    for (int attempt = 0; attempt < kUploadAttempts; ++attempt) {
+        if (attempt > 0) std::this_thread::sleep_for(std::chrono::milliseconds(200 * attempt));
+        v1::QueryWriteResponse present;
+        {
+            grpc::ClientContext context;
+            set_deadline(context, 10);
+            v1::QueryWriteRequest request;
+            wire::put(digest, request.mutable_digest());
+            last = wire::from_grpc(assets_->QueryWrite(&context, request, &present));
+            if (last.code() == StatusCode::kUnavailable) continue;
+            if (!last.ok()) return last;
+            if (present.complete()) return {};
+        }
+        grpc::ClientContext context;
+        set_deadline(context, 120.0 * double(1 + (size >> 26)));
+        v1::WriteResponse response;
+        const auto writer = assets_->Write(&context, &response);
+        v1::WriteRequest message;
+        wire::put(digest, message.mutable_header()->mutable_digest());
+        message.mutable_header()->set_size_bytes(size);
+        bool open = writer->Write(message);
+        uint64_t offset = present.committed_size_bytes() <= size ? present.committed_size_bytes() : 0;
+        while (open && offset < size) {
+            const auto bytes = source(offset);
+            if (!bytes.ok()) {
+                context.TryCancel();
+                (void)writer->Finish();
+                return bytes.status();
+            }
+            message.mutable_chunk()->set_offset_bytes(offset);
+            message.mutable_chunk()->set_data(bytes->data(), bytes->size());
+            open = writer->Write(message);
+            offset += bytes->size();
+        }
+        writer->WritesDone();
+        last = wire::from_grpc(writer->Finish());
+        if (last.ok()) return last;
+        const StatusCode code = last.code();
+        if (code != StatusCode::kUnavailable && code != StatusCode::kAborted && code != StatusCode::kOutOfRange &&
+            code != StatusCode::kDataLoss)
+            return last;
+    }
+    return last;
+}
+
+Status GrpcJobPort::upload(const Digest& digest, const std::filesystem::path& path) {
+    std::ifstream in(path, std::ios::binary | std::ios::ate);
+    if (!in) return not_found(path.string() + ": cannot be opened");
+    const auto size = uint64_t(in.tellg());
+    std::string buffer;
+    return send(digest, size, [&](uint64_t offset) -> Result<std::string_view> {
+        buffer.resize(std::min<uint64_t>(kMaxChunkBytes, size - offset));
+        in.seekg(std::streamoff(offset));
+        in.read(buffer.data(), std::streamsize(buffer.size()));
+        if (!in) return data_loss(path.string() + ": read failed; did the file change?");
+        return std::string_view(buffer);
+    });
+}
+
+Status GrpcJobPort::upload_bytes(const Digest& digest, std::string_view bytes) {
+    return send(digest, bytes.size(), [&](uint64_t offset) -> Result<std::string_view> {
+        return bytes.substr(offset, kMaxChunkBytes);
+    });
+}
+
+}  // namespace lightloom

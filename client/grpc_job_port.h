@@ -1,0 +1,34 @@
+#pragma once
+// JobPort over gRPC.
+
+#include <grpcpp/channel.h>
+
+#include "common/work/service.h"
+#include "lightloom/v1/asset_service.grpc.pb.h"
+#include "lightloom/v1/job_service.grpc.pb.h"
+
+namespace lightloom {
+
+class GrpcJobPort final : public JobPort {
+  public:
+    explicit GrpcJobPort(const std::shared_ptr<grpc::Channel>& channel);
+    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec) override;
+    Result<JobInfo> get_job(const std::string& job_id) override;
+    Result<std::vector<JobInfo>> list_jobs() override;
+    Result<JobInfo> cancel_job(const std::string& job_id) override;
+    Status watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
+                     std::stop_token stop) override;
+    Result<std::string> image(const std::string& job_id, ImageKind kind) override;
+    Result<std::string> manifest(const std::string& job_id) override;
+    Result<std::vector<Digest>> find_missing(const std::vector<Digest>& digests) override;
+    Status upload(const Digest& digest, const std::filesystem::path& path) override;
+    Status upload_bytes(const Digest& digest, std::string_view bytes) override;
+
+  private:
+    Status send(const Digest& digest, uint64_t size,
+                const std::function<Result<std::string_view>(uint64_t offset)>& source);
+    std::unique_ptr<v1::JobService::Stub> jobs_;
+    std::unique_ptr<v1::AssetService::Stub> assets_;
+};
+
+}  // namespace lightloom

@@ -1,0 +1,116 @@
+#include "client/job_options.h"
+
+#include <chrono>
+#include <cstdio>
+
+#include "client/commands.h"
+#include "common/transport/catalog.h"
+
+namespace lightloom::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+}  // namespace
+
+void add_render_settings(CLI::App& command, JobOptions& options) {
+    command.add_option("SCENE", options.scene, "pbrt-v4 scene file; everything that it refers to lies beside or below it")
+        ->required();
+    command.add_option("-a,--algorithm", options.algorithm, "Name from `lightloom algorithms`")->capture_default_str();
+    command.add_option("--set", options.settings, "Parameter of the algorithm, KEY=VALUE; may be repeated")->take_all()
+        ->allow_extra_args(false);
+    command.add_option("--max-depth", options.max_depth, "Bounces; paths have up to this + 1 edges (default: the scene's)")
+        ->check(CLI::Range(0, 1000));
+    command.add_option("--resolution", options.resolution, "WIDTHxHEIGHT in pixels (default: the scene's)");
+    command.add_option("--seed", options.seed, "Another seed makes another, independent image")->capture_default_str();
+}
+
+void add_output_settings(CLI::App& command, JobOptions& options) {
+    command.add_option("-o,--output", options.output, "EXR to write; the manifest goes beside it (default: SCENE's name.exr)");
+    command.add_option("--png", options.png, "Also write an 8-bit sRGB picture");
+    auto* spp = command.add_option("--spp", options.samples_per_pixel, "Samples per pixel (default: the scene's)")
+                    ->check(CLI::Range(1u, 1u << 24));
+    command.add_option("--time", options.time_seconds,
+                       "Stop after this many seconds of rendering, at a boundary that --spp can reproduce")
+        ->check(CLI::Range(0.001, 30 * 86400.0))->excludes(spp);
+    command.add_option("--json", options.json, "Write statistics to this file");
+    command.add_flag("-q,--quiet", options.quiet, "No progress; errors only");
+    command.add_flag("--strict", options.strict,
+                     "Warnings about the scene are errors, and dropped (non-finite) samples make the exit code 3");
+}
+
+Result<LocalScene> load_scene(const JobOptions& options) {
+    LocalScene scene;
+    auto begin = Clock::now();
+    auto imported = import_pbrt(options.scene, {.strict = options.strict});
+    if (!imported.ok()) return imported.status();
+    scene.imported = *std::move(imported);
+    scene.import_seconds = seconds_since(begin);
+    if (!options.quiet) {
+        for (const std::string& warning : scene.imported.description.warnings)
+            std::fprintf(stderr, "lightloom: warning: %s\n", warning.c_str());
+    }
+    begin = Clock::now();
+    scene.directory = std::filesystem::path(options.scene).parent_path();
+    auto manifest = AssetManifest::of_files(scene.directory, scene.imported.files);
+    if (!manifest.ok()) return manifest.status();
+    scene.manifest = *std::move(manifest);
+    scene.digest_seconds = seconds_since(begin);
+    return scene;
+}
+
+Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
+    JobSpec spec;
+    spec.algorithm = options.algorithm;
+    for (const std::string& setting : options.settings) {
+        const size_t equals = setting.find('=');
+        if (equals == std::string::npos || equals == 0)
+            return invalid_argument("--set takes KEY=VALUE, not \"" + setting + "\"");
+        spec.parameters[setting.substr(0, equals)] = setting.substr(equals + 1);
+    }
+    const auto algorithm = find_algorithm(spec.algorithm);
+    if (!algorithm.ok()) return invalid_argument(algorithm.status().message());
+    if (const auto parameters = parse_parameters(**algorithm, spec.parameters); !parameters.ok())
+        return parameters.status();
+    spec.seed = options.seed;
+    spec.time_limit_seconds = options.time_seconds;
+    spec.samples_per_pixel = options.samples_per_pixel;
+    if (spec.samples_per_pixel == 0 && spec.time_limit_seconds == 0)
+        spec.samples_per_pixel = uint32_t(std::max(1, scene.imported.description.samples_per_pixel));
+    spec.max_depth = options.max_depth;
+    if (!options.resolution.empty()) {
+        int used = 0;
+        const bool parsed = std::sscanf(options.resolution.c_str(), "%6dx%6d%n", &spec.width, &spec.height, &used) == 2;
+        if (!parsed || size_t(used) != options.resolution.size() || spec.width < 1 || spec.height < 1)
+            return invalid_argument("--resolution takes WIDTHxHEIGHT, for example 640x360, not \"" + options.resolution + "\"");
+    }
+    spec.scene_root = scene.manifest.root();
+    return spec;
+}
+
+std::filesystem::path output_path(const JobOptions& options) {
+    if (!options.output.empty()) return options.output;
+    return std::filesystem::path(options.scene).filename().replace_extension(".exr");
+}
+
+int exit_code_of(const Status& status) {
+    switch (status.code()) {
+        case StatusCode::kOk: return kSuccess;
+        case StatusCode::kCancelled: return kCancelled;
+        case StatusCode::kInvalidArgument:
+        case StatusCode::kNotFound:
+        case StatusCode::kUnimplemented: return kUsage;
+        case StatusCode::kUnavailable:
+        case StatusCode::kDeadlineExceeded: return kUnavailable;
+        default: return kFailure;
+    }
+}
+
+int report_error(const Status& status) {
+    std::fprintf(stderr, "lightloom: %s\n", status.message().c_str());
+    return exit_code_of(status);
+}
+
+}  // namespace lightloom::client

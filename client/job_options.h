@@ -1,0 +1,54 @@
+#pragma once
+// The options that render, submit and replay share, and what they make of a scene file.
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/import/import.h"
+#include "common/work/service.h"
+
+namespace lightloom::client {
+
+struct JobOptions {
+    std::string scene;
+    std::string output;  ///< Empty: the scene's name with .exr, in the current directory.
+    std::string png;     ///< Empty: none.
+    std::string algorithm = "path";
+    uint32_t samples_per_pixel = 0;  ///< 0: the scene's (unless there is a time limit).
+    double time_seconds = 0;
+    int max_depth = -1;
+    std::string resolution;  ///< "WxH" or empty.
+    uint64_t seed = 0;
+    std::vector<std::string> settings;  ///< "key=value"
+    std::string json;
+    bool quiet = false, strict = false;
+};
+
+/// Scene, algorithm, depth, resolution, seed and parameters.
+void add_render_settings(CLI::App& command, JobOptions& options);
+/// Output, bounds, statistics.
+void add_output_settings(CLI::App& command, JobOptions& options);
+
+/// A scene that was read on this host.
+struct LocalScene {
+    std::filesystem::path directory;
+    ImportedScene imported;
+    AssetManifest manifest;
+    double import_seconds = 0, digest_seconds = 0;
+};
+/// Imports (so that mistakes show before anything is sent) and digests the files. Prints the scene's warnings to standard
+/// error; with `strict` they are errors.
+Result<LocalScene> load_scene(const JobOptions& options);
+
+/// What the options ask for, with the scene's samples per pixel where they leave the bound open.
+Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene);
+std::filesystem::path output_path(const JobOptions& options);
+
+/// "lightloom: message" on standard error; the exit code that fits.
+int report_error(const Status& status);
+/// Tells mistakes in the command or scene (2) and an unreachable service (4) from failures (1).
+int exit_code_of(const Status& status);
+
+}  // namespace lightloom::client

@@ -1,0 +1,50 @@
+// lightloom: the client.
+
+#include <CLI/CLI.hpp>
+
+#include "client/commands.h"
+#include "common/core/log.h"
+#include "common/work/identity.h"
+
+namespace {
+
+constexpr const char* kFooter = R"(First steps:
+  lightloom render scene.pbrt --spp 16 --png quick.png        on this machine, no set-up
+  lightloom algorithms                                        what --algorithm and --set know
+  lightloom submit scene.pbrt --server HOST:PORT -o out.exr   on a service
+  lightloom COMMAND --help                                    options and examples
+
+Exit codes: 0 success; 1 the job or the comparison failed; 2 bad command line or input file; 3 --strict and non-finite
+samples were dropped; 4 the service could not be reached; 130 interrupted.)";
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    using namespace lightloom::client;
+    CLI::App app{"Lightloom: renders scenes whose light is hard to find, on one machine or many.", "lightloom"};
+    app.footer(kFooter);
+    app.set_version_flag("--version", lightloom::kBuildId);
+    app.require_subcommand(1);
+    std::string level = "warn";
+    app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
+    app.parse_complete_callback([&] {
+        if (!lightloom::set_up_logging("lightloom", level)) throw CLI::ValidationError("--log", "unknown level " + level);
+    });
+    int exit_code = kSuccess;
+    add_render_command(app, &exit_code);
+    add_service_commands(app, &exit_code);
+#ifdef LIGHTLOOM_HAS_INSPECT
+    add_inspect_command(app, &exit_code);
+#endif
+#ifdef LIGHTLOOM_HAS_COMPARE
+    add_compare_command(app, &exit_code);
+#endif
+    add_algorithms_command(app, &exit_code);
+    add_replay_command(app, &exit_code);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? kSuccess : kUsage;
+    }
+    return exit_code;
+}

@@ -1,0 +1,181 @@
+#include "client/run_job.h"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <thread>
+
+#include "client/commands.h"
+#include "client/progress.h"
+#include "common/film/atomic_file.h"
+
+namespace lightloom::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Json = nlohmann::ordered_json;
+
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+std::string random_id() {
+    std::random_device device;
+    char text[64];
+    std::snprintf(text, sizeof text, "%08x%08x%08x%08x", device(), device(), device(), device());
+    return text;
+}
+
+Status write_statistics(const std::string& path, const JobInfo& job, const ClientTimes& times) {
+    const double seconds = job.render_seconds > 0 ? job.render_seconds : 1e-9;
+    const Json json = {
+        {"job", job.job_id},
+        {"algorithm", job.spec.algorithm},
+        {"state", to_string(job.state)},
+        {"sha256", job.image_digest.hex()},
+        {"samples_per_pixel", job.samples_per_pixel_done},
+        {"width", job.spec.frame.crop.width()},
+        {"height", job.spec.frame.crop.height()},
+        {"seconds",
+         {{"import", times.import_seconds},
+          {"digest", times.digest_seconds},
+          {"upload", times.upload_seconds},
+          {"prepare", job.prepare_seconds},
+          {"render", job.render_seconds},
+          {"finish", job.finish_seconds},
+          {"submit_to_end", times.wait_seconds},
+          {"fetch", times.fetch_seconds}}},
+        {"samples", job.camera_samples},
+        {"samples_per_second", double(job.camera_samples) / seconds},
+        {"light_paths", job.light_paths},
+        {"rays", job.rays},
+        {"rays_per_second", double(job.rays) / seconds},
+        {"units", job.unit_done},
+        {"workers", job.worker_count},
+        {"dropped_samples", job.dropped_samples},
+        {"duplicates_same", job.duplicates_same},
+        {"duplicates_different", job.duplicates_different}};
+    return write_file_atomically(path, json.dump(1) + "\n");
+}
+
+void report_dropped(const JobInfo& job, const std::string& manifest) {
+    std::fprintf(stderr, "lightloom: %llu non-finite sample(s) were dropped; render the first of them again with:\n",
+                 static_cast<unsigned long long>(job.dropped_samples));
+    const Json json = Json::parse(manifest, nullptr, false);
+    if (json.is_discarded() || !json.contains("dropped")) return;
+    for (const Json& sample : json["dropped"]["first"])
+        std::fprintf(stderr, "  %s\n", sample.value("replay", std::string()).c_str());
+}
+
+}  // namespace
+
+std::stop_token interrupt_token() {
+    static std::stop_source source;
+    static const bool installed = [] {
+        sigset_t signals;
+        sigemptyset(&signals);
+        sigaddset(&signals, SIGINT);
+        sigaddset(&signals, SIGTERM);
+        pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+        std::thread([signals] {
+            int signal = 0;
+            sigwait(&signals, &signal);
+            source.request_stop();
+            sigwait(&signals, &signal);
+            _exit(kCancelled);
+        }).detach();
+        return true;
+    }();
+    (void)installed;
+    return source.get_token();
+}
+
+Status upload_scene(JobPort& port, const LocalScene& scene) {
+    const std::string text = scene.manifest.canonical_text();
+    const Digest root = sha256(text);
+    std::vector<Digest> digests{root};
+    for (const AssetEntry& entry : scene.manifest.entries) digests.push_back(entry.digest);
+    const auto missing = port.find_missing(digests);
+    if (!missing.ok()) return missing.status();
+    for (const Digest& digest : *missing) {
+        if (interrupt_token().stop_requested()) return {StatusCode::kCancelled, "interrupted"};
+        if (digest == root) {
+            LL_RETURN_IF_ERROR(port.upload_bytes(root, text));
+            continue;
+        }
+        for (const AssetEntry& entry : scene.manifest.entries) {
+            if (entry.digest != digest) continue;
+            LL_RETURN_IF_ERROR(port.upload(digest, scene.directory / entry.path));
+            break;
+        }
+    }
+    return {};
+}
+
+Result<JobInfo> submit(JobPort& port, const JobSpec& spec) {
+    // One id for all attempts: a submission whose answer was lost is not made twice.
+    const std::string request_id = random_id();
+    for (int attempt = 0;; ++attempt) {
+        auto job = port.submit_job(request_id, spec);
+        if (job.ok() || job.status().code() != StatusCode::kUnavailable || attempt == 3) return job;
+        std::this_thread::sleep_for(std::chrono::milliseconds(200 << attempt));
+    }
+}
+
+Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool cancel_on_interrupt) {
+    Progress progress(quiet);
+    const Status status =
+        port.watch_job(job_id, [&](const JobInfo& job) { progress.show(job); }, interrupt_token());
+    progress.finish();
+    if (status.code() == StatusCode::kCancelled) {
+        if (cancel_on_interrupt) {
+            const auto cancelled = port.cancel_job(job_id);
+            if (!cancelled.ok()) return cancelled.status();
+        }
+        return Status(StatusCode::kCancelled,
+                      "interrupted; job " + job_id + (cancel_on_interrupt ? " was cancelled" : " goes on"));
+    }
+    if (!status.ok()) return status;
+    auto job = port.get_job(job_id);
+    if (!job.ok()) return job.status();
+    if (job->state == JobState::kFailed) return Status(StatusCode::kAborted, "job " + job_id + " failed: " + job->message);
+    if (job->state == JobState::kCancelled) return Status(StatusCode::kCancelled, "job " + job_id + " was cancelled");
+    return job;
+}
+
+int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTimes times) {
+    const auto begin = Clock::now();
+    const auto image = port.image(job.job_id, ImageKind::kFinal);
+    if (!image.ok()) return report_error(image.status());
+    if (sha256(*image) != job.image_digest)
+        return report_error(data_loss("the image that arrived differs from the one that was written; fetch it again"));
+    const auto manifest = port.manifest(job.job_id);
+    if (!manifest.ok()) return report_error(manifest.status());
+    const std::filesystem::path output = output_path(options);
+    std::filesystem::path manifest_path = output;
+    manifest_path.replace_extension(".manifest.json");
+    Status status = write_file_atomically(output.string(), *image);
+    if (status.ok()) status = write_file_atomically(manifest_path.string(), *manifest);
+    if (status.ok() && !options.png.empty()) {
+        const auto png = port.image(job.job_id, ImageKind::kPreview);
+        status = png.ok() ? write_file_atomically(options.png, *png) : png.status();
+    }
+    times.fetch_seconds = seconds_since(begin);
+    if (status.ok() && !options.json.empty()) status = write_statistics(options.json, job, times);
+    if (!status.ok()) return report_error(status);
+    if (!options.quiet) {
+        std::printf("%s  %llu spp in %s  sha256 %s\n", output.string().c_str(),
+                    static_cast<unsigned long long>(job.samples_per_pixel_done),
+                    duration_text(job.render_seconds).c_str(), job.image_digest.hex().c_str());
+        if (!options.png.empty()) std::printf("%s\n", options.png.c_str());
+    }
+    if (job.dropped_samples > 0) {
+        report_dropped(job, *manifest);
+        if (options.strict) return kDroppedSamples;
+    }
+    return kSuccess;
+}
+
+}  // namespace lightloom::client

@@ -1,0 +1,28 @@
+#pragma once
+// From a port to a picture: upload, submit, watch, fetch, write. The same for the embedded service and for a remote one.
+
+#include <functional>
+#include <stop_token>
+
+#include "client/job_options.h"
+
+namespace lightloom::client {
+
+/// Requested by SIGINT or SIGTERM; a second one ends the process at once. The first call must come before other threads are made.
+std::stop_token interrupt_token();
+
+/// Seconds that the client measures itself.
+struct ClientTimes {
+    double import_seconds = 0, digest_seconds = 0, upload_seconds = 0, wait_seconds = 0, fetch_seconds = 0;
+};
+
+/// Sends what the coordinator lacks of the scene's files.
+Status upload_scene(JobPort& port, const LocalScene& scene);
+/// Submits under a fresh request id.
+Result<JobInfo> submit(JobPort& port, const JobSpec& spec);
+/// Watches until the end; on an interrupt, cancels the job if `cancel_on_interrupt` is set.
+Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool cancel_on_interrupt);
+/// Fetches image and manifest of a succeeded job and writes them as options ask; reports dropped samples. The exit code.
+int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTimes times);
+
+}  // namespace lightloom::client

@@ -1,0 +1,43 @@
+#include "common/transport/first_hit.h"
+
+#include <tbb/parallel_for.h>
+
+#include "common/path/camera_walk.h"
+
+namespace lightloom {
+
+std::vector<ImageLayer> first_hit_layers(const Scene& scene, uint64_t seed, int samples) {
+    const Rect crop = scene.frame().crop;
+    const size_t pixels = size_t(crop.area());
+    std::vector<ImageLayer> layers{{"albedo", "RGB", std::vector<float>(3 * pixels)},
+                                   {"normal", "XYZ", std::vector<float>(3 * pixels)},
+                                   {"depth", "Z", std::vector<float>(pixels)}};
+    tbb::parallel_for(0, crop.height(), [&](int row) {
+        for (int column = 0; column < crop.width(); ++column) {
+            const size_t pixel = size_t(row) * size_t(crop.width()) + size_t(column);
+            Rgb albedo;
+            Vec3 normal;
+            float depth = 0;
+            for (int i = 0; i < samples; ++i) {
+                CameraSampler sampler(seed, uint64_t(i), pixel);
+                const Vec2 jitter = sampler.film();
+                const Camera::CameraRay ray = scene.camera().sample_ray(
+                    {float(crop.x0 + column) + jitter.x, float(crop.y0 + row) + jitter.y}, sampler.lens());
+                SurfacePoint point;
+                if (!scene.intersect(ray.origin, ray.direction, &point)) continue;
+                albedo += scene.bsdf_at(point).albedo();
+                normal += face_forward(point.shading.n, -ray.direction);
+                depth += length(point.p - ray.origin);
+            }
+            const float scale = 1.0f / float(samples);
+            for (int c = 0; c < 3; ++c) {
+                layers[0].pixels[3 * pixel + size_t(c)] = albedo[c] * scale;
+                layers[1].pixels[3 * pixel + size_t(c)] = normal[c] * scale;
+            }
+            layers[2].pixels[pixel] = depth * scale;
+        }
+    });
+    return layers;
+}
+
+}  // namespace lightloom

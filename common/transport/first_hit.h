@@ -1,0 +1,16 @@
+#pragma once
+// First-hit layers: albedo, shading normal and depth of what the camera sees first, for denoisers and compositing.
+
+#include <vector>
+
+#include "common/film/exr_io.h"
+#include "common/scene/scene.h"
+
+namespace lightloom {
+
+/// Layers "albedo" (RGB, in [0, 1]), "normal" (XYZ, world, mean of unit normals facing the camera) and "depth" (Z, distance
+/// along the ray in scene units; 0 where nothing is hit), each the mean of `samples` rays per pixel of the crop. A pure
+/// function of scene and seed, on all threads.
+std::vector<ImageLayer> first_hit_layers(const Scene& scene, uint64_t seed, int samples = 8);
+
+}  // namespace lightloom

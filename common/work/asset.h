@@ -1,0 +1,96 @@
+#pragma once
+// Scenes as content: the list of a scene's files (its digest is the scene's root), and a directory of files by digest.
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <mutex>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/core/digest.h"
+#include "common/core/result.h"
+
+namespace lightloom {
+
+inline constexpr uint64_t kMaxChunkBytes = uint64_t(1) << 20;
+
+struct AssetEntry {
+    std::string path;  ///< Relative to the scene's directory, '/' between components.
+    Digest digest;
+    uint64_t size_bytes = 0;
+};
+
+/// The files of one scene, ascending by path, no path twice.
+struct AssetManifest {
+    std::string main;  ///< Path of the scene file; one of the entries.
+    std::vector<AssetEntry> entries;
+
+    /// The canonical text that proto/lightloom/v1/asset_service.proto describes.
+    std::string canonical_text() const;
+    /// Digest of the canonical text.
+    Digest root() const { return sha256(canonical_text()); }
+    /// Accepts canonical text only: parse(t).canonical_text() == t. kInvalidArgument names the line.
+    static Result<AssetManifest> parse(std::string_view text);
+    /// Hashes files below `directory`; the first is the main file. Fails on a name that may not travel or a file that
+    /// cannot be read.
+    static Result<AssetManifest> of_files(const std::filesystem::path& directory, const std::vector<std::string>& files);
+};
+
+/// Relative, no empty, "." or ".." component, no backslash, no control character, components up to 255 bytes.
+Status validate_asset_path(std::string_view path);
+
+/// SHA-256 of a file. kNotFound if it cannot be read.
+Result<Digest> digest_file(const std::filesystem::path& path);
+/// A directory of immutable files named by digest. Safe for any number of threads, and for several processes that share the
+/// directory: files appear by rename, complete and verified.
+class AssetStore {
+  public:
+    explicit AssetStore(std::filesystem::path directory, uint64_t max_asset_bytes = uint64_t(16) << 30);
+
+    bool contains(const Digest& digest) const;
+    std::filesystem::path path_of(const Digest& digest) const;
+    /// Bytes of an unfinished upload; the whole size if it is complete; 0 if unknown.
+    uint64_t committed_size(const Digest& digest) const;
+    Result<std::string> read(const Digest& digest) const;
+    Status put(const Digest& digest, std::string_view bytes);
+
+    /// One upload in progress. Destroyed before it is complete, it leaves its bytes for a later one to go on from.
+    class Upload {
+      public:
+        Upload(Upload&& other) noexcept;
+        Upload& operator=(Upload&&) = delete;
+        ~Upload();
+        uint64_t offset() const { return offset_; }
+        /// Appends; kInvalidArgument beyond the declared size, kResourceExhausted when the disk is full.
+        Status append(std::string_view bytes);
+        /// Verifies and publishes. kDataLoss (and the bytes are thrown away) if they do not have the digest.
+        Status finish();
+
+      private:
+        friend class AssetStore;
+        Upload(AssetStore* store, const Digest& digest, uint64_t size, uint64_t offset, int file);
+        AssetStore* store_;
+        Digest digest_;
+        uint64_t size_, offset_;
+        int file_;
+    };
+    /// kAborted while another upload of the asset runs in this process, kResourceExhausted above the size limit.
+    Result<Upload> begin_upload(const Digest& digest, uint64_t size_bytes);
+
+    /// Fills `directory` with the manifest's files (hard links, or copies across file systems). Every file is verified
+    /// against its digest first, so a damaged cache is noticed here: kDataLoss, and the damaged file is removed.
+    Status materialise(const AssetManifest& manifest, const std::filesystem::path& directory) const;
+
+  private:
+    std::filesystem::path incoming_path(const Digest& digest) const;
+
+    std::filesystem::path directory_;
+    uint64_t max_asset_bytes_;
+    mutable std::mutex mutex_;
+    std::set<Digest> uploading_;
+};
+
+}  // namespace lightloom

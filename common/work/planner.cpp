@@ -1,0 +1,100 @@
+#include <algorithm>
+#include <cmath>
+
+#include "common/work/job.h"
+
+namespace lightloom {
+namespace {
+
+constexpr int64_t kUnitSamples = int64_t(1) << 18;  // camera samples that a unit should have
+constexpr int kTileWidth = 512;                     // about; tiles are equal parts of the crop window
+constexpr int kMinTileRows = 256;
+
+int ceil_div(int64_t a, int64_t b) { return int((a + b - 1) / b); }
+
+std::vector<Rect> make_tiles(const Rect& crop, bool whole_frame) {
+    if (whole_frame || crop.area() <= kUnitSamples) return {crop};
+    const int columns = ceil_div(crop.width(), kTileWidth);
+    const int64_t rows_per_tile = std::max<int64_t>(kMinTileRows, kUnitSamples / ceil_div(crop.width(), columns));
+    const int rows = ceil_div(crop.height(), rows_per_tile);
+    std::vector<Rect> tiles;
+    for (int j = 0; j < rows; ++j) {
+        for (int i = 0; i < columns; ++i) {
+            tiles.push_back({crop.x0 + int(int64_t(crop.width()) * i / columns),
+                             crop.y0 + int(int64_t(crop.height()) * j / rows),
+                             crop.x0 + int(int64_t(crop.width()) * (i + 1) / columns),
+                             crop.y0 + int(int64_t(crop.height()) * (j + 1) / rows)});
+        }
+    }
+    return tiles;
+}
+
+/// Iterations of the group that follows `done` iterations.
+uint32_t group_size(uint64_t done, uint32_t cap) {
+    return uint32_t(std::clamp<uint64_t>(done / 20, 1, cap));
+}
+
+}  // namespace
+
+std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& tiles, double light_paths_per_pixel) {
+    int64_t area = 0;
+    for (const Rect& tile : tiles) area += tile.area();
+    const double exact = light_paths_per_pixel * double(group.iteration_count) * double(area);
+    const uint64_t total = uint64_t(std::floor(exact + 0.5));
+    // Cumulative rounding in integers: the shares differ from the exact proportion by less than one path and sum to the
+    // total whatever the tiles are.
+    std::vector<WorkUnit> units;
+    units.reserve(tiles.size());
+    int64_t pixels = 0;
+    uint64_t first = 0;
+    for (uint32_t t = 0; t < tiles.size(); ++t) {
+        pixels += tiles[t].area();
+        const uint64_t last = uint64_t((unsigned __int128)(total) * uint64_t(pixels) / uint64_t(area));
+        units.push_back({.key = {group.index, t},
+                         .first_iteration = group.first_iteration,
+                         .iteration_count = group.iteration_count,
+                         .tile = tiles[t],
+                         .first_light_path = first,
+                         .light_path_count = last - first});
+        first = last;
+    }
+    return units;
+}
+
+Plan::Plan(const FrameLayout& frame, double light_paths_per_pixel, bool whole_frame)
+    : light_paths_per_pixel_(light_paths_per_pixel), tiles_(make_tiles(frame.crop, whole_frame)) {
+    int64_t largest = 1;
+    for (const Rect& tile : tiles_) largest = std::max(largest, tile.area());
+    max_group_iterations_ = uint32_t(std::max<int64_t>(1, kUnitSamples / largest));
+}
+
+Group Plan::group(uint32_t index) const {
+    uint64_t done = 0;
+    for (uint32_t i = 0; i < index; ++i) {
+        const uint32_t size = group_size(done, max_group_iterations_);
+        // From here on every group has the largest size: no need to walk through them.
+        if (size == max_group_iterations_) {
+            done += uint64_t(index - i) * size;
+            break;
+        }
+        done += size;
+    }
+    return {index, done, group_size(done, max_group_iterations_)};
+}
+
+std::vector<Group> Plan::groups_for(uint64_t iterations) const {
+    std::vector<Group> groups;
+    uint64_t done = 0;
+    while (done < iterations) {
+        const uint64_t size = std::min<uint64_t>(group_size(done, max_group_iterations_), iterations - done);
+        groups.push_back({uint32_t(groups.size()), done, uint32_t(size)});
+        done += size;
+    }
+    return groups;
+}
+
+std::vector<WorkUnit> Plan::units(const Group& group) const {
+    return split_group(group, tiles_, light_paths_per_pixel_);
+}
+
+}  // namespace lightloom

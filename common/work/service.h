@@ -1,0 +1,132 @@
+#pragma once
+// The service as plain C++: what its parts say to one another, and the two doors (ports) to the coordinator. Each port has
+// two implementations, one over gRPC and one in process, so that a job runs through the same code in both forms.
+
+#include <cstdint>
+#include <functional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "common/core/digest.h"
+#include "common/core/result.h"
+#include "common/film/partial.h"
+#include "common/work/asset.h"
+#include "common/work/job.h"
+
+namespace lightloom {
+
+/// What must be equal on every host for the bytes of an image not to depend on the host.
+struct BuildIdentity {
+    std::string build_id;      ///< Version and digest of the sources that compute light.
+    std::string math_profile;  ///< Compiler, instruction set, ray tracer.
+    Digest golden_digest;      ///< Of what the golden units render to here.
+    friend bool operator==(const BuildIdentity&, const BuildIdentity&) = default;
+};
+
+struct WorkerHello {
+    BuildIdentity identity;
+    uint32_t thread_count = 1;
+    std::string host;
+    uint64_t process_id = 0;
+};
+
+struct WorkerGrant {
+    std::string worker_id;
+    double heartbeat_seconds = 1;
+    double lease_seconds = 10;
+};
+
+struct UnitReference {
+    std::string job_id;
+    UnitKey key;
+    friend auto operator<=>(const UnitReference&, const UnitReference&) = default;
+};
+
+struct UnitLease {
+    std::string job_id;
+    JobSpec spec;
+    WorkUnit unit;
+    UnitReference reference() const { return {job_id, unit.key}; }
+};
+
+struct RunningUnit {
+    UnitReference unit;
+    bool rendering = false;  ///< False while its scene is fetched or built, or while it waits for its turn.
+};
+
+enum class SubmitOutcome { kAccepted, kDuplicateSame, kDuplicateDifferent, kStale, kRejected };
+
+struct SubmitAck {
+    SubmitOutcome outcome = SubmitOutcome::kAccepted;
+    std::string reason;
+};
+
+enum class JobState { kPreparing, kRunning, kFinishing, kSucceeded, kFailed, kCancelled };
+bool is_terminal(JobState state);
+/// Lower-case word.
+std::string_view to_string(JobState state);
+
+/// A snapshot of a job; see the message Job in proto/lightloom/v1/job_service.proto for units and meaning.
+struct JobInfo {
+    std::string job_id;
+    JobState state = JobState::kPreparing;
+    JobSpec spec;
+    std::string message;
+    uint64_t revision = 0;
+    uint64_t unit_total = 0, unit_done = 0, unit_leased = 0;
+    uint64_t samples_per_pixel_done = 0;
+    double render_seconds = 0;
+    double eta_seconds = -1;
+    uint64_t dropped_samples = 0;
+    uint64_t camera_samples = 0, light_paths = 0, rays = 0;
+    uint32_t worker_count = 0;
+    Digest image_digest;
+    uint64_t image_size_bytes = 0;
+    uint64_t duplicates_same = 0, duplicates_different = 0;
+    double prepare_seconds = 0, finish_seconds = 0;
+};
+
+enum class ImageKind { kFinal, kPreview };
+
+/// What a client sees of a coordinator. Errors are those of JobService and AssetService.
+class JobPort {
+  public:
+    virtual ~JobPort() = default;
+    virtual Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec) = 0;
+    virtual Result<JobInfo> get_job(const std::string& job_id) = 0;
+    virtual Result<std::vector<JobInfo>> list_jobs() = 0;
+    virtual Result<JobInfo> cancel_job(const std::string& job_id) = 0;
+    /// Calls `on_change` with the present state and then on changes until a terminal state was passed; kCancelled soon after a
+    /// stop request.
+    virtual Status watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
+                             std::stop_token stop) = 0;
+    virtual Result<std::string> image(const std::string& job_id, ImageKind kind) = 0;
+    virtual Result<std::string> manifest(const std::string& job_id) = 0;
+    virtual Result<std::vector<Digest>> find_missing(const std::vector<Digest>& digests) = 0;
+    /// Sends `size_bytes` of `path` (resuming where an earlier attempt broke off); a no-op if the asset is complete there.
+    virtual Status upload(const Digest& digest, const std::filesystem::path& path) = 0;
+    virtual Status upload_bytes(const Digest& digest, std::string_view bytes) = 0;
+};
+
+/// What a worker sees of a coordinator. Errors are those of WorkerService and AssetService.
+class WorkerPort {
+  public:
+    virtual ~WorkerPort() = default;
+    virtual Result<WorkerGrant> register_worker(const WorkerHello& hello) = 0;
+    /// At most one unit; empty after `wait_seconds` without work, or soon after a stop request.
+    virtual Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds,
+                                                       std::stop_token stop) = 0;
+    /// Returns the units whose results are not wanted any more.
+    virtual Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id,
+                                                         const std::vector<RunningUnit>& running) = 0;
+    virtual Result<SubmitAck> submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial,
+                                            double render_seconds) = 0;
+    virtual Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why) = 0;
+    virtual Status goodbye(const std::string& worker_id) = 0;
+    /// Streams the asset from `offset` to its end into `sink`; stops with the sink's error.
+    virtual Status read_asset(const Digest& digest, uint64_t offset,
+                              const std::function<Status(std::string_view)>& sink) = 0;
+};
+
+}  // namespace lightloom

@@ -1,0 +1,254 @@
+#include "common/work/wire.h"
+
+#include <cmath>
+
+namespace lightloom::wire {
+namespace {
+
+void put_rect(const Rect& in, v1::Rect* out) {
+    out->set_x0(in.x0);
+    out->set_y0(in.y0);
+    out->set_x1(in.x1);
+    out->set_y1(in.y1);
+}
+
+Rect get_rect(const v1::Rect& in) { return {in.x0(), in.y0(), in.x1(), in.y1()}; }
+
+}  // namespace
+
+grpc::Status to_grpc(const Status& status) {
+    if (status.ok()) return grpc::Status::OK;
+    return {grpc::StatusCode(int(status.code())), status.message()};
+}
+
+Status from_grpc(const grpc::Status& status) {
+    if (status.ok()) return {};
+    return {StatusCode(int(status.error_code())), status.error_message()};
+}
+
+void put(const Digest& in, v1::Digest* out) { out->set_sha256(in.bytes.data(), in.bytes.size()); }
+
+Result<Digest> get(const v1::Digest& in) {
+    Digest digest;
+    if (in.sha256().size() != digest.bytes.size())
+        return invalid_argument("a digest has " + std::to_string(in.sha256().size()) + " bytes instead of 32");
+    std::copy(in.sha256().begin(), in.sha256().end(), digest.bytes.begin());
+    return digest;
+}
+
+void put(const JobSpec& in, v1::JobSpec* out) {
+    out->set_algorithm(in.algorithm);
+    for (const auto& [key, value] : in.parameters) (*out->mutable_parameters())[key] = value;
+    out->set_seed(in.seed);
+    out->set_samples_per_pixel(in.samples_per_pixel);
+    out->set_time_limit_seconds(in.time_limit_seconds);
+    out->set_max_depth(in.max_depth);
+    out->set_width(in.width);
+    out->set_height(in.height);
+    put(in.scene_root, out->mutable_scene_root());
+    out->mutable_frame()->set_width(in.frame.width);
+    out->mutable_frame()->set_height(in.frame.height);
+    put_rect(in.frame.crop, out->mutable_frame()->mutable_crop());
+    out->set_first_hit_layers(in.first_hit_layers);
+}
+
+Result<JobSpec> get(const v1::JobSpec& in) {
+    JobSpec spec;
+    spec.algorithm = in.algorithm();
+    for (const auto& [key, value] : in.parameters()) spec.parameters[key] = value;
+    spec.seed = in.seed();
+    spec.samples_per_pixel = in.samples_per_pixel();
+    spec.time_limit_seconds = in.time_limit_seconds();
+    if (!std::isfinite(spec.time_limit_seconds)) return invalid_argument("time_limit_seconds is not a finite number");
+    spec.max_depth = in.max_depth();
+    spec.width = in.width();
+    spec.height = in.height();
+    auto root = get(in.scene_root());
+    if (!root.ok()) return root.status();
+    spec.scene_root = *root;
+    spec.frame = {in.frame().width(), in.frame().height(), get_rect(in.frame().crop())};
+    spec.first_hit_layers = in.first_hit_layers();
+    return spec;
+}
+
+void put(const JobInfo& in, v1::Job* out) {
+    out->set_job_id(in.job_id);
+    out->set_state(v1::JobState(int(in.state) + 1));
+    put(in.spec, out->mutable_spec());
+    out->set_message(in.message);
+    out->set_revision(in.revision);
+    out->set_unit_total_count(in.unit_total);
+    out->set_unit_done_count(in.unit_done);
+    out->set_unit_leased_count(in.unit_leased);
+    out->set_samples_per_pixel_done(in.samples_per_pixel_done);
+    out->set_render_seconds(in.render_seconds);
+    out->set_eta_seconds(in.eta_seconds);
+    out->set_dropped_sample_count(in.dropped_samples);
+    out->set_camera_sample_count(in.camera_samples);
+    out->set_light_path_count(in.light_paths);
+    out->set_ray_count(in.rays);
+    out->set_worker_count(in.worker_count);
+    if (in.state == JobState::kSucceeded) put(in.image_digest, out->mutable_image_digest());
+    out->set_image_size_bytes(in.image_size_bytes);
+    out->set_duplicate_same_count(in.duplicates_same);
+    out->set_duplicate_different_count(in.duplicates_different);
+    out->set_prepare_seconds(in.prepare_seconds);
+    out->set_finish_seconds(in.finish_seconds);
+}
+
+Result<JobInfo> get(const v1::Job& in) {
+    JobInfo info;
+    info.job_id = in.job_id();
+    if (in.state() < v1::JOB_STATE_PREPARING || in.state() > v1::JOB_STATE_CANCELLED)
+        return invalid_argument("job " + in.job_id() + " has an unknown state; is the coordinator newer than this client?");
+    info.state = JobState(int(in.state()) - 1);
+    auto spec = get(in.spec());
+    if (!spec.ok()) return spec.status();
+    info.spec = *std::move(spec);
+    info.message = in.message();
+    info.revision = in.revision();
+    info.unit_total = in.unit_total_count();
+    info.unit_done = in.unit_done_count();
+    info.unit_leased = in.unit_leased_count();
+    info.samples_per_pixel_done = in.samples_per_pixel_done();
+    info.render_seconds = in.render_seconds();
+    info.eta_seconds = in.eta_seconds();
+    info.dropped_samples = in.dropped_sample_count();
+    info.camera_samples = in.camera_sample_count();
+    info.light_paths = in.light_path_count();
+    info.rays = in.ray_count();
+    info.worker_count = in.worker_count();
+    if (info.state == JobState::kSucceeded) {
+        auto digest = get(in.image_digest());
+        if (!digest.ok()) return digest.status();
+        info.image_digest = *digest;
+    }
+    info.image_size_bytes = in.image_size_bytes();
+    info.duplicates_same = in.duplicate_same_count();
+    info.duplicates_different = in.duplicate_different_count();
+    info.prepare_seconds = in.prepare_seconds();
+    info.finish_seconds = in.finish_seconds();
+    return info;
+}
+
+void put(const WorkUnit& in, v1::WorkUnit* out) {
+    out->mutable_key()->set_group(in.key.group);
+    out->mutable_key()->set_tile(in.key.tile);
+    out->set_first_iteration(in.first_iteration);
+    out->set_iteration_count(in.iteration_count);
+    put_rect(in.tile, out->mutable_tile());
+    out->set_first_light_path(in.first_light_path);
+    out->set_light_path_count(in.light_path_count);
+}
+
+WorkUnit get(const v1::WorkUnit& in) {
+    return {.key = {in.key().group(), in.key().tile()},
+            .first_iteration = in.first_iteration(),
+            .iteration_count = in.iteration_count(),
+            .tile = get_rect(in.tile()),
+            .first_light_path = in.first_light_path(),
+            .light_path_count = in.light_path_count()};
+}
+
+void put(const UnitReference& in, v1::UnitReference* out) {
+    out->set_job_id(in.job_id);
+    out->mutable_key()->set_group(in.key.group);
+    out->mutable_key()->set_tile(in.key.tile);
+}
+
+UnitReference get(const v1::UnitReference& in) { return {in.job_id(), {in.key().group(), in.key().tile()}}; }
+
+void put(const UnitLease& in, v1::UnitLease* out) {
+    out->set_job_id(in.job_id);
+    put(in.spec, out->mutable_spec());
+    put(in.unit, out->mutable_unit());
+}
+
+Result<UnitLease> get(const v1::UnitLease& in) {
+    auto spec = get(in.spec());
+    if (!spec.ok()) return spec.status();
+    return UnitLease{in.job_id(), *std::move(spec), get(in.unit())};
+}
+
+void put(const WorkerHello& in, v1::WorkerHello* out) {
+    out->set_build_id(in.identity.build_id);
+    out->set_math_profile(in.identity.math_profile);
+    put(in.identity.golden_digest, out->mutable_golden_digest());
+    out->set_thread_count(in.thread_count);
+    out->set_host(in.host);
+    out->set_process_id(in.process_id);
+}
+
+Result<WorkerHello> get(const v1::WorkerHello& in) {
+    auto digest = get(in.golden_digest());
+    if (!digest.ok()) return digest.status();
+    if (in.build_id().size() > 256 || in.math_profile().size() > 1024 || in.host().size() > 256)
+        return invalid_argument("a worker's build id, math profile or host name is too long");
+    return WorkerHello{.identity = {in.build_id(), in.math_profile(), *digest},
+                       .thread_count = in.thread_count(),
+                       .host = in.host(),
+                       .process_id = in.process_id()};
+}
+
+void put(const WorkerGrant& in, v1::WorkerGrant* out) {
+    out->set_worker_id(in.worker_id);
+    out->set_heartbeat_seconds(in.heartbeat_seconds);
+    out->set_lease_seconds(in.lease_seconds);
+}
+
+WorkerGrant get(const v1::WorkerGrant& in) { return {in.worker_id(), in.heartbeat_seconds(), in.lease_seconds()}; }
+
+void put(const SubmitAck& in, v1::SubmitResultResponse* out) {
+    out->set_outcome(v1::SubmitOutcome(int(in.outcome) + 1));
+    out->set_reason(in.reason);
+}
+
+Result<SubmitAck> get(const v1::SubmitResultResponse& in) {
+    if (in.outcome() < v1::SUBMIT_OUTCOME_ACCEPTED || in.outcome() > v1::SUBMIT_OUTCOME_REJECTED)
+        return invalid_argument("the coordinator answered with an unknown outcome");
+    return SubmitAck{SubmitOutcome(int(in.outcome()) - 1), in.reason()};
+}
+
+void put(const PartialDescriptor& in, v1::SubmitResultHeader* out) {
+    put(in.payload_digest, out->mutable_payload_digest());
+    out->set_payload_size_bytes(in.payload_size);
+    out->set_splat_count(in.splat_count);
+    out->set_samples_per_pixel(in.samples_per_pixel);
+    out->set_light_path_count(in.light_paths);
+    out->set_dropped_sample_count(in.dropped_count);
+    for (const DroppedSample& sample : in.dropped) {
+        v1::DroppedSample* item = out->add_dropped_samples();
+        item->set_iteration(sample.iteration);
+        item->set_pixel(sample.pixel);
+        item->set_splat(sample.splat);
+    }
+    out->set_counted_camera_sample_count(in.counters.camera_samples);
+    out->set_counted_light_path_count(in.counters.light_paths);
+    out->set_ray_count(in.counters.rays);
+    out->set_vertex_count(in.counters.vertices);
+    out->set_connection_count(in.counters.connections);
+}
+
+Result<PartialDescriptor> get(const v1::SubmitResultHeader& in) {
+    auto digest = get(in.payload_digest());
+    if (!digest.ok()) return digest.status();
+    PartialDescriptor out;
+    out.payload_digest = *digest;
+    out.payload_size = in.payload_size_bytes();
+    out.splat_count = in.splat_count();
+    out.samples_per_pixel = in.samples_per_pixel();
+    out.light_paths = in.light_path_count();
+    out.dropped_count = in.dropped_sample_count();
+    if (size_t(in.dropped_samples_size()) > Partial::kMaxDroppedRecords)
+        return invalid_argument("more than 16 records of dropped samples");
+    for (const v1::DroppedSample& sample : in.dropped_samples())
+        out.dropped.push_back({sample.iteration(), sample.pixel(), sample.splat()});
+    out.counters = {.camera_samples = in.counted_camera_sample_count(),
+                    .light_paths = in.counted_light_path_count(),
+                    .rays = in.ray_count(),
+                    .vertices = in.vertex_count(),
+                    .connections = in.connection_count()};
+    return out;
+}
+
+}  // namespace lightloom::wire

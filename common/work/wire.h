@@ -1,0 +1,41 @@
+#pragma once
+// The protocol's messages <-> the C++ types. The only place that sees both; limits of the protocol are checked here.
+
+#include <grpcpp/support/status.h>
+
+#include "common/film/partial_exr.h"
+#include "common/work/service.h"
+#include "lightloom/v1/job_service.pb.h"
+#include "lightloom/v1/types.pb.h"
+#include "lightloom/v1/worker_service.pb.h"
+
+namespace lightloom::wire {
+
+grpc::Status to_grpc(const Status& status);
+Status from_grpc(const grpc::Status& status);
+
+void put(const Digest& in, v1::Digest* out);
+void put(const JobSpec& in, v1::JobSpec* out);
+void put(const JobInfo& in, v1::Job* out);
+void put(const WorkUnit& in, v1::WorkUnit* out);
+void put(const UnitReference& in, v1::UnitReference* out);
+void put(const UnitLease& in, v1::UnitLease* out);
+void put(const WorkerHello& in, v1::WorkerHello* out);
+void put(const WorkerGrant& in, v1::WorkerGrant* out);
+void put(const SubmitAck& in, v1::SubmitResultResponse* out);
+/// Everything but worker, unit and render time.
+void put(const PartialDescriptor& in, v1::SubmitResultHeader* out);
+
+// Each fails with kInvalidArgument on what the protocol forbids (a digest of another length, an UNSPECIFIED enum).
+Result<Digest> get(const v1::Digest& in);
+Result<JobSpec> get(const v1::JobSpec& in);
+Result<JobInfo> get(const v1::Job& in);
+WorkUnit get(const v1::WorkUnit& in);
+UnitReference get(const v1::UnitReference& in);
+Result<UnitLease> get(const v1::UnitLease& in);
+Result<WorkerHello> get(const v1::WorkerHello& in);
+WorkerGrant get(const v1::WorkerGrant& in);
+Result<SubmitAck> get(const v1::SubmitResultResponse& in);
+Result<PartialDescriptor> get(const v1::SubmitResultHeader& in);
+
+}  // namespace lightloom::wire

@@ -1,0 +1,88 @@
+#include "server/asset_service.h"
+
+#include <fstream>
+
+#include "common/work/wire.h"
+
+namespace lightloom {
+namespace {
+
+constexpr int kMaxDigestsPerCall = 10000;
+
+grpc::Status invalid(const char* what) { return {grpc::StatusCode::INVALID_ARGUMENT, what}; }
+
+}  // namespace
+
+grpc::Status AssetServiceImpl::FindMissing(grpc::ServerContext*, const v1::FindMissingRequest* request,
+                                           v1::FindMissingResponse* response) {
+    if (request->digests_size() > kMaxDigestsPerCall) return invalid("at most 10000 digests per call");
+    for (const v1::Digest& item : request->digests()) {
+        const auto digest = wire::get(item);
+        if (!digest.ok()) return wire::to_grpc(digest.status());
+        if (!store_.contains(*digest)) wire::put(*digest, response->add_missing());
+    }
+    return grpc::Status::OK;
+}
+
+grpc::Status AssetServiceImpl::Write(grpc::ServerContext* context, grpc::ServerReader<v1::WriteRequest>* reader,
+                                     v1::WriteResponse* response) {
+    v1::WriteRequest message;
+    if (!reader->Read(&message) || !message.has_header()) return invalid("an upload begins with a header");
+    const auto digest = wire::get(message.header().digest());
+    if (!digest.ok()) return wire::to_grpc(digest.status());
+    const uint64_t size = message.header().size_bytes();
+    if (store_.contains(*digest)) {
+        response->set_committed_size_bytes(size);
+        return grpc::Status::OK;
+    }
+    auto upload = store_.begin_upload(*digest, size);
+    if (!upload.ok()) return wire::to_grpc(upload.status());
+    while (reader->Read(&message)) {
+        if (closing_) return {grpc::StatusCode::UNAVAILABLE, "the coordinator is going down"};
+        if (!message.has_chunk()) return invalid("only the first message is a header");
+        const v1::Chunk& chunk = message.chunk();
+        if (chunk.data().size() > kMaxChunkBytes) return invalid("a chunk holds at most 1 MiB");
+        if (chunk.offset_bytes() != upload->offset())
+            return {grpc::StatusCode::OUT_OF_RANGE, "go on at offset " + std::to_string(upload->offset())};
+        if (const Status status = upload->append(chunk.data()); !status.ok()) return wire::to_grpc(status);
+    }
+    if (context->IsCancelled()) return {grpc::StatusCode::CANCELLED, "the upload was broken off; resume it"};
+    const Status status = upload->finish();
+    response->set_committed_size_bytes(upload->offset());
+    return wire::to_grpc(status);
+}
+
+grpc::Status AssetServiceImpl::QueryWrite(grpc::ServerContext*, const v1::QueryWriteRequest* request,
+                                          v1::QueryWriteResponse* response) {
+    const auto digest = wire::get(request->digest());
+    if (!digest.ok()) return wire::to_grpc(digest.status());
+    response->set_committed_size_bytes(store_.committed_size(*digest));
+    response->set_complete(store_.contains(*digest));
+    return grpc::Status::OK;
+}
+
+grpc::Status AssetServiceImpl::Read(grpc::ServerContext* context, const v1::ReadRequest* request,
+                                    grpc::ServerWriter<v1::Chunk>* writer) {
+    const auto digest = wire::get(request->digest());
+    if (!digest.ok()) return wire::to_grpc(digest.status());
+    std::ifstream in(store_.path_of(*digest), std::ios::binary | std::ios::ate);
+    if (!in) return {grpc::StatusCode::NOT_FOUND, "asset " + digest->hex() + " is not here"};
+    const uint64_t size = uint64_t(in.tellg());
+    uint64_t offset = request->offset_bytes();
+    if (offset > size) return {grpc::StatusCode::OUT_OF_RANGE, "the asset has " + std::to_string(size) + " bytes"};
+    in.seekg(std::streamoff(offset));
+    v1::Chunk chunk;
+    while (offset < size && !closing_ && !context->IsCancelled()) {
+        std::string* data = chunk.mutable_data();
+        data->resize(std::min<uint64_t>(kMaxChunkBytes, size - offset));
+        in.read(data->data(), std::streamsize(data->size()));
+        if (!in) return {grpc::StatusCode::DATA_LOSS, "asset " + digest->hex() + " cannot be read"};
+        chunk.set_offset_bytes(offset);
+        if (!writer->Write(chunk)) break;
+        offset += data->size();
+    }
+    if (offset < size) return {grpc::StatusCode::UNAVAILABLE, "broken off; read on from there"};
+    return grpc::Status::OK;
+}
+
+}  // namespace lightloom

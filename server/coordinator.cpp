@@ -1,0 +1,309 @@
+#include "server/coordinator.h"
+
+#include <spdlog/spdlog.h>
+
+#include <cmath>
+#include <ctime>
+#include <random>
+
+#include "common/film/atomic_file.h"
+#include "common/transport/catalog.h"
+#include "server/job_record.h"
+#include "server/results.h"
+
+namespace lightloom {
+namespace {
+
+constexpr std::chrono::milliseconds kTick(20);
+
+std::string utc_now() {
+    const std::time_t now = std::time(nullptr);
+    std::tm parts{};
+    gmtime_r(&now, &parts);
+    char text[32];
+    std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
+    return text;
+}
+
+/// Ids need only be unique, also across restarts of the coordinator.
+std::string new_id(const char* prefix) {
+    std::random_device device;
+    const uint64_t bits = (uint64_t(device()) << 32) ^ device();
+    char text[48];
+    std::snprintf(text, sizeof text, "%s-%012llx", prefix, static_cast<unsigned long long>(bits >> 16));
+    return text;
+}
+
+bool same_request(const JobSpec& a, const JobSpec& b) {
+    return a.algorithm == b.algorithm && a.parameters == b.parameters && a.seed == b.seed &&
+           a.samples_per_pixel == b.samples_per_pixel && a.time_limit_seconds == b.time_limit_seconds &&
+           a.max_depth == b.max_depth && a.width == b.width && a.height == b.height && a.scene_root == b.scene_root &&
+           a.first_hit_layers == b.first_hit_layers;
+}
+
+Status no_job(const std::string& id) { return not_found("no job " + id + "; `lightloom list` shows those that exist"); }
+
+}  // namespace
+
+Coordinator::Coordinator(CoordinatorOptions options)
+    : options_(std::move(options)), assets_(options_.directory / "assets"),
+      ticker_([this](std::stop_token stop) { tick(stop); }) {}
+
+Coordinator::~Coordinator() {
+    {
+        const std::lock_guard lock(mutex_);
+        closing_ = true;
+        for (const auto& job : jobs_) job->prepare_task.request_stop();
+    }
+    work_changed_.notify_all();
+    job_changed_.notify_all();
+    ticker_ = {};
+    jobs_.clear();  // joins their tasks; these may still take the mutex
+}
+
+TimePoint Coordinator::after(double seconds) const {
+    return options_.clock() + std::chrono::duration_cast<TimePoint::duration>(std::chrono::duration<double>(seconds));
+}
+
+Coordinator::JobRecord* Coordinator::find_job(const std::string& job_id) const {
+    for (const auto& job : jobs_) {
+        if (job->id == job_id) return job.get();
+    }
+    return nullptr;
+}
+
+void Coordinator::changed(JobRecord& job) {
+    ++job.revision;
+    job_changed_.notify_all();
+}
+
+Result<JobSpec> Coordinator::canonical_spec(const JobSpec& spec) const {
+    JobSpec out = spec;
+    out.frame = {};
+    const auto algorithm = find_algorithm(spec.algorithm);
+    if (!algorithm.ok()) return invalid_argument(algorithm.status().message());
+    const auto parameters = parse_parameters(**algorithm, spec.parameters);
+    if (!parameters.ok()) return parameters.status();
+    if ((spec.samples_per_pixel > 0) == (spec.time_limit_seconds > 0))
+        return invalid_argument("a job needs either a number of samples per pixel or a time limit");
+    if (spec.samples_per_pixel > (1u << 24)) return invalid_argument("at most 16777216 samples per pixel");
+    if (!(spec.time_limit_seconds >= 0 && spec.time_limit_seconds <= 30 * 86400.0))
+        return invalid_argument("the time limit must lie between 0 and 30 days");
+    if (spec.max_depth < -1 || spec.max_depth > 1000) return invalid_argument("max depth must lie between 0 and 1000");
+    if (spec.width < 0 || spec.height < 0 || spec.width > 65536 || spec.height > 65536 ||
+        (spec.width == 0) != (spec.height == 0))
+        return invalid_argument("a resolution needs a width and a height between 1 and 65536");
+    return out;
+}
+
+Status Coordinator::check_assets(const JobSpec& spec) const {
+    const Digest& root = spec.scene_root;
+    if (!options_.read_scene) return internal_error("this coordinator has no scene reader");
+    if (!assets_.contains(root))
+        return failed_precondition("the scene's file list " + root.hex() + " was not uploaded");
+    const auto text = assets_.read(root);
+    if (!text.ok()) return text.status();
+    const auto manifest = AssetManifest::parse(*text);
+    if (!manifest.ok()) return manifest.status();
+    for (const AssetEntry& entry : manifest->entries) {
+        if (options_.scene_files_needed && !assets_.contains(entry.digest))
+            return failed_precondition("\"" + entry.path + "\" of the scene was not uploaded");
+    }
+    return {};
+}
+
+Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const JobSpec& spec) {
+    if (request_id.empty() || request_id.size() > 128) return invalid_argument("a request id has 1 to 128 characters");
+    const auto repeated = [&]() -> std::optional<Result<JobInfo>> {
+        const auto known = requests_.find(request_id);
+        if (known == requests_.end()) return std::nullopt;
+        if (same_request(known->second->submitted, spec)) return Result<JobInfo>(snapshot(*known->second));
+        return Result<JobInfo>(
+            Status(StatusCode::kAlreadyExists, "request " + request_id + " was used for another job; use a new id"));
+    };
+    {
+        const std::lock_guard lock(mutex_);
+        if (auto answer = repeated()) return *answer;
+    }
+    const auto canonical = canonical_spec(spec);
+    if (!canonical.ok()) return canonical.status();
+    LL_RETURN_IF_ERROR(check_assets(spec));
+
+    const std::lock_guard lock(mutex_);
+    if (auto answer = repeated()) return *answer;
+    if (jobs_.size() >= options_.max_jobs)
+        return Status(StatusCode::kResourceExhausted, "the coordinator holds as many jobs as it may");
+    auto record = std::make_unique<JobRecord>();
+    JobRecord& job = *record;
+    job.id = new_id("job");
+    job.request_id = request_id;
+    job.submitted = spec;
+    job.spec = *canonical;
+    job.created = options_.clock();
+    job.created_at = utc_now();
+    job.directory = options_.directory / "jobs" / job.id;
+    jobs_.push_back(std::move(record));
+    requests_[request_id] = &job;
+    spdlog::info("{}: accepted, {} {}", job.id, spec.algorithm, job.spec.scene_root.hex().substr(0, 12));
+    job.prepare_task = std::jthread([this, &job](std::stop_token stop) { prepare(job, stop); });
+    return snapshot(job);
+}
+
+Result<JobInfo> Coordinator::get_job(const std::string& job_id) const {
+    const std::lock_guard lock(mutex_);
+    const JobRecord* job = find_job(job_id);
+    return job ? Result<JobInfo>(snapshot(*job)) : no_job(job_id);
+}
+
+std::vector<JobInfo> Coordinator::list_jobs() const {
+    const std::lock_guard lock(mutex_);
+    std::vector<JobInfo> out;
+    for (const auto& job : jobs_) out.push_back(snapshot(*job));
+    return out;
+}
+
+Result<JobInfo> Coordinator::cancel_job(const std::string& job_id) {
+    const std::lock_guard lock(mutex_);
+    JobRecord* job = find_job(job_id);
+    if (!job) return no_job(job_id);
+    if (!is_terminal(job->state)) {
+        job->prepare_task.request_stop();
+        end_job(*job, JobState::kCancelled);
+    }
+    return snapshot(*job);
+}
+
+Result<JobInfo> Coordinator::wait_job(const std::string& job_id, uint64_t after_revision, double timeout_seconds) const {
+    std::unique_lock lock(mutex_);
+    const JobRecord* job = find_job(job_id);
+    if (!job) return no_job(job_id);
+    job_changed_.wait_for(lock, std::chrono::duration<double>(timeout_seconds),
+                          [&] { return closing_ || job->revision > after_revision; });
+    if (closing_) return Status(StatusCode::kUnavailable, "the coordinator is going down");
+    return snapshot(*job);
+}
+
+Result<std::string> Coordinator::image(const std::string& job_id, ImageKind kind) const {
+    std::shared_ptr<Reducer> reducer;
+    std::filesystem::path directory;
+    float scale = 1;
+    {
+        const std::lock_guard lock(mutex_);
+        const JobRecord* job = find_job(job_id);
+        if (!job) return no_job(job_id);
+        if (kind == ImageKind::kFinal && job->state != JobState::kSucceeded)
+            return failed_precondition("job " + job_id + " is " + std::string(to_string(job->state)) +
+                                       "; its image exists once it has succeeded");
+        if (kind == ImageKind::kPreview && !job->reducer && job->state != JobState::kSucceeded)
+            return failed_precondition("job " + job_id + " has no image to preview");
+        reducer = job->reducer;
+        directory = job->directory;
+        scale = job->exposure_scale;
+    }
+    if (kind == ImageKind::kFinal) return read_image(directory);
+    return preview_png(directory, reducer.get(), scale);
+}
+
+Result<std::string> Coordinator::manifest(const std::string& job_id) const {
+    std::filesystem::path directory;
+    {
+        const std::lock_guard lock(mutex_);
+        const JobRecord* job = find_job(job_id);
+        if (!job) return no_job(job_id);
+        if (job->state != JobState::kSucceeded)
+            return failed_precondition("job " + job_id + " is " + std::string(to_string(job->state)) +
+                                       "; its manifest exists once it has succeeded");
+        directory = job->directory;
+    }
+    return read_file((directory / "manifest.json").string());
+}
+
+JobInfo Coordinator::snapshot(const JobRecord& job) const {
+    JobInfo info;
+    info.job_id = job.id;
+    info.state = job.state;
+    info.spec = job.spec;
+    info.message = job.message;
+    info.revision = job.revision;
+    const TimePoint now = options_.clock();
+    if (job.units) {
+        info.unit_total = job.units->unit_total();
+        info.unit_done = job.units->done_count();
+        info.unit_leased = job.units->leased_count();
+    }
+    info.samples_per_pixel_done = job.merged_iterations;
+    const bool ended = is_terminal(job.state);
+    if (job.state != JobState::kPreparing && !(ended && !job.units))
+        info.prepare_seconds = seconds_between(job.created, job.prepared);
+    if (job.rendering) {
+        const bool over = ended || job.state == JobState::kFinishing;
+        info.render_seconds = seconds_between(job.first_render, over ? job.finishing : now);
+        if (over) {
+            info.eta_seconds = 0;
+        } else if (job.spec.time_limit_seconds > 0) {
+            info.eta_seconds = std::max(0.0, job.spec.time_limit_seconds - info.render_seconds);
+        } else if (info.unit_done > 0) {
+            info.eta_seconds = info.render_seconds * double(info.unit_total - info.unit_done) / double(info.unit_done);
+        }
+    }
+    if (ended && job.rendering) info.finish_seconds = seconds_between(job.finishing, job.ended);
+    info.dropped_samples = job.dropped;
+    info.camera_samples = job.counters.camera_samples;
+    info.light_paths = job.counters.light_paths;
+    info.rays = job.counters.rays;
+    info.worker_count = uint32_t(job.workers.size());
+    info.image_digest = job.image_digest;
+    info.image_size_bytes = job.image_size;
+    info.duplicates_same = job.duplicates_same;
+    info.duplicates_different = job.duplicates_different;
+    return info;
+}
+
+void Coordinator::end_job(JobRecord& job, JobState state) {
+    if (job.state == JobState::kPreparing || job.state == JobState::kRunning) job.finishing = options_.clock();
+    job.state = state;
+    job.ended = options_.clock();
+    if (job.units) job.units->close();
+    if (state != JobState::kSucceeded) job.reducer.reset();
+    spdlog::info("{}: {}{}{}", job.id, to_string(state), job.message.empty() ? "" : ": ", job.message);
+    changed(job);
+}
+
+void Coordinator::fail_job(JobRecord& job, const Status& why) {
+    if (is_terminal(job.state)) return;
+    job.message = why.message();
+    end_job(job, JobState::kFailed);
+}
+
+void Coordinator::unit_failed(JobRecord& job, const UnitKey& key, int failures, const Status& why) {
+    const std::string unit = std::to_string(key.group) + "/" + std::to_string(key.tile);
+    spdlog::warn("{}: unit {} failed ({}): {}", job.id, unit, failures, why.message());
+    // Units are pure functions: what is wrong with the request is wrong on every worker.
+    if (failures >= kMaxUnitFailures || why.code() == StatusCode::kInvalidArgument)
+        fail_job(job, {why.code(), "unit " + unit + ": " + why.message()});
+    work_changed_.notify_all();
+}
+
+void Coordinator::tick(std::stop_token stop) {
+    std::unique_lock lock(mutex_);
+    while (!stop.stop_requested()) {
+        work_changed_.wait_for(lock, kTick);
+        const TimePoint now = options_.clock();
+        for (const auto& job : jobs_) {
+            if (job->state != JobState::kRunning) continue;
+            const size_t expired = job->units->expire(now);
+            if (expired > 0) {
+                job->expired_leases += expired;
+                spdlog::warn("{}: {} lease(s) ran out; the units go to other workers", job->id, expired);
+                work_changed_.notify_all();
+            }
+            const double limit = job->spec.time_limit_seconds;
+            if (limit > 0 && job->rendering && !job->closed && seconds_between(job->first_render, now) >= limit) {
+                job->closed = true;
+                finish_if_complete(*job);
+            }
+        }
+    }
+}
+
+}  // namespace lightloom

@@ -1,0 +1,119 @@
+#pragma once
+// Coordinator: accepts jobs, leases their units to workers, merges what comes back exactly once, and writes the image. It knows
+// neither gRPC nor light transport; time comes from an injected clock. Safe for any number of threads.
+
+#include <condition_variable>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "common/film/partial_exr.h"
+#include "common/work/service.h"
+#include "server/reducer.h"
+#include "server/unit_table.h"
+
+namespace lightloom {
+
+/// What a job needs to know of its scene before units can be planned.
+struct SceneFacts {
+    FrameLayout frame;         ///< With the job's resolution.
+    float exposure_scale = 1;  ///< Multiplies the developed image.
+    int max_depth = 5;         ///< Bounces, if the job leaves them to the scene.
+};
+
+using SceneReader = std::function<Result<SceneFacts>(const AssetStore& assets, const JobSpec& spec, std::stop_token stop)>;
+
+struct CoordinatorOptions {
+    std::filesystem::path directory;  ///< Assets and finished images; made if need be.
+    BuildIdentity identity;           ///< What a worker must be equal to.
+    SceneReader read_scene;
+    bool scene_files_needed = true;   ///< False where read_scene and the workers have the files by other means.
+    double lease_seconds = 10;
+    double heartbeat_seconds = 1;
+    std::optional<uint64_t> shuffle_seed;          ///< Lease units in a random order (tests).
+    std::function<TimePoint()> clock = [] { return std::chrono::steady_clock::now(); };
+    uint64_t waiting_bytes = uint64_t(512) << 20;  ///< Room for partials that wait for earlier groups.
+    size_t max_jobs = 10000;
+};
+
+struct WorkerStatus {
+    std::string worker_id, host;
+    uint64_t process_id = 0;
+    uint32_t thread_count = 0;
+    uint64_t units_merged = 0, units_held = 0;
+    double seconds_since_heard = 0;
+    bool lost = false;  ///< Not heard of for longer than a lease, or said goodbye.
+};
+
+class Coordinator {
+  public:
+    explicit Coordinator(CoordinatorOptions options);
+    ~Coordinator();
+
+    AssetStore& assets() { return assets_; }
+
+    // Jobs; see JobService for the errors.
+    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec);
+    Result<JobInfo> get_job(const std::string& job_id) const;
+    std::vector<JobInfo> list_jobs() const;
+    Result<JobInfo> cancel_job(const std::string& job_id);
+    /// The job once its revision is above `after`, or as it is after `timeout_seconds`.
+    Result<JobInfo> wait_job(const std::string& job_id, uint64_t after, double timeout_seconds) const;
+    Result<std::string> image(const std::string& job_id, ImageKind kind) const;
+    Result<std::string> manifest(const std::string& job_id) const;
+
+    // Workers; see WorkerService for the errors.
+    Result<WorkerGrant> register_worker(const WorkerHello& hello);
+    Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds,
+                                               const std::function<bool()>& cancelled);
+    Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id,
+                                                 const std::vector<RunningUnit>& running);
+    Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why);
+    Status goodbye(const std::string& worker_id);
+    /// What the payload of a unit must be; kNotFound if the job or unit is not open. For limits before bytes are taken in.
+    Result<PartialExpectation> expected_partial(const UnitReference& unit) const;
+    /// A partial that came over the wire: checked against the unit before anything reads it.
+    Result<SubmitAck> submit_payload(const std::string& worker_id, const UnitReference& unit,
+                                     const PartialDescriptor& descriptor, std::string_view payload);
+    /// A partial of this process. `digest` is its payload's.
+    Result<SubmitAck> submit_partial(const std::string& worker_id, const UnitReference& unit, const Digest& digest,
+                                     Partial partial);
+    std::vector<WorkerStatus> workers() const;
+
+  private:
+    struct WorkerRecord;
+    struct JobRecord;
+
+    JobRecord* find_job(const std::string& job_id) const;
+    WorkerRecord* find_worker(const std::string& worker_id) const;
+    TimePoint after(double seconds) const;
+    static double seconds_between(TimePoint a, TimePoint b) { return std::chrono::duration<double>(b - a).count(); }
+    void changed(JobRecord& job);
+    JobInfo snapshot(const JobRecord& job) const;
+    Result<JobSpec> canonical_spec(const JobSpec& spec) const;
+    Status check_assets(const JobSpec& spec) const;
+    void fail_job(JobRecord& job, const Status& why);
+    void end_job(JobRecord& job, JobState state);
+    void prepare(JobRecord& job, std::stop_token stop);
+    void finish(JobRecord& job);
+    void finish_if_complete(JobRecord& job);
+    void unit_failed(JobRecord& job, const UnitKey& key, int failures, const Status& why);
+    void tick(std::stop_token stop);
+    std::optional<UnitLease> next_unit(WorkerRecord& worker);
+
+    const CoordinatorOptions options_;
+    AssetStore assets_;
+    mutable std::mutex mutex_;
+    mutable std::condition_variable work_changed_, job_changed_;
+    std::vector<std::unique_ptr<JobRecord>> jobs_;            // oldest first
+    std::map<std::string, JobRecord*> requests_;              // by request id
+    std::vector<std::unique_ptr<WorkerRecord>> workers_;      // never removed: units refer to them by index
+    bool closing_ = false;
+    std::jthread ticker_;  // last: stops before anything that it uses goes away
+};
+
+}  // namespace lightloom

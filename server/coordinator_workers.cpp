@@ -1,0 +1,266 @@
+// The coordinator's side of a worker's life: registration, leases, heartbeats and results.
+
+#include <spdlog/spdlog.h>
+
+#include "server/job_record.h"
+
+namespace lightloom {
+namespace {
+
+/// A worker may hold one unit beside the one that it renders, so that it does not idle between two.
+constexpr size_t kMaxHeld = 2;
+
+Status no_worker(const std::string& id) { return not_found("unknown worker " + id + "; register again"); }
+
+std::string describe(const BuildIdentity& identity) {
+    return "build " + identity.build_id + ", math profile \"" + identity.math_profile + "\", golden unit " +
+           identity.golden_digest.hex().substr(0, 16);
+}
+
+}  // namespace
+
+Coordinator::WorkerRecord* Coordinator::find_worker(const std::string& worker_id) const {
+    for (const auto& worker : workers_) {
+        if (worker->id == worker_id) return worker->left ? nullptr : worker.get();
+    }
+    return nullptr;
+}
+
+Result<WorkerGrant> Coordinator::register_worker(const WorkerHello& hello) {
+    if (hello.thread_count == 0) return invalid_argument("a worker needs at least one thread");
+    if (hello.identity != options_.identity) {
+        const Status refusal = failed_precondition(
+            "this worker could render other pixels than the coordinator and is refused: worker has " +
+            describe(hello.identity) + "; coordinator has " + describe(options_.identity) +
+            "; install the same build on both hosts");
+        spdlog::error("worker on {} (process {}): {}", hello.host, hello.process_id, refusal.message());
+        return refusal;
+    }
+    const std::lock_guard lock(mutex_);
+    auto worker = std::make_unique<WorkerRecord>();
+    worker->id = "worker-" + std::to_string(workers_.size() + 1) + "-" + hello.host + "-" + std::to_string(hello.process_id);
+    worker->index = uint32_t(workers_.size());
+    worker->hello = hello;
+    worker->last_heard = options_.clock();
+    spdlog::info("{}: registered, {} thread(s)", worker->id, hello.thread_count);
+    const WorkerGrant grant{worker->id, options_.heartbeat_seconds, options_.lease_seconds};
+    workers_.push_back(std::move(worker));
+    return grant;
+}
+
+std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
+    if (worker.held.size() >= kMaxHeld) return std::nullopt;
+    // A second unit only if enough are left for those workers that have none: a unit must not wait behind another one
+    // while somebody idles.
+    size_t idle = 0;
+    if (!worker.held.empty()) {
+        for (const auto& other : workers_) idle += other->held.empty() && other->waiting > 0;
+    }
+    for (const auto& job : jobs_) {
+        if (job->state != JobState::kRunning) continue;
+        if (!worker.held.empty() && !job->units->has_more_than(idle)) continue;
+        const auto unit = job->units->lease(worker.index, after(options_.lease_seconds));
+        if (!unit) continue;
+        worker.held.insert({job->id, unit->key});
+        return UnitLease{job->id, job->spec, *unit};
+    }
+    return std::nullopt;
+}
+
+Result<std::vector<UnitLease>> Coordinator::lease_units(const std::string& worker_id, double wait_seconds,
+                                                        const std::function<bool()>& cancelled) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(std::min(wait_seconds, 5.0));
+    std::unique_lock lock(mutex_);
+    WorkerRecord* worker = find_worker(worker_id);
+    if (!worker) return no_worker(worker_id);
+    ++worker->waiting;
+    std::vector<UnitLease> leases;
+    while (!closing_ && !worker->left && !cancelled()) {
+        worker->last_heard = options_.clock();
+        if (auto unit = next_unit(*worker)) {
+            leases.push_back(*std::move(unit));
+            break;
+        }
+        const auto now = std::chrono::steady_clock::now();
+        if (now >= deadline) break;
+        work_changed_.wait_for(lock, std::min<std::chrono::duration<double>>(deadline - now, std::chrono::milliseconds(100)));
+    }
+    --worker->waiting;
+    if (closing_) return Status(StatusCode::kUnavailable, "the coordinator is going down");
+    return leases;
+}
+
+Result<std::vector<UnitReference>> Coordinator::heartbeat(const std::string& worker_id,
+                                                          const std::vector<RunningUnit>& running) {
+    const std::lock_guard lock(mutex_);
+    WorkerRecord* worker = find_worker(worker_id);
+    if (!worker) return no_worker(worker_id);
+    worker->last_heard = options_.clock();
+    std::vector<UnitReference> revoked;
+    std::set<UnitReference> held;
+    for (const RunningUnit& item : running) {
+        JobRecord* job = find_job(item.unit.job_id);
+        if (!job || job->state != JobState::kRunning ||
+            !job->units->renew(item.unit.key, worker->index, after(options_.lease_seconds))) {
+            revoked.push_back(item.unit);
+            continue;
+        }
+        held.insert(item.unit);
+        if (item.rendering && !job->rendering) {
+            job->rendering = true;
+            job->first_render = options_.clock();
+            changed(*job);
+        }
+    }
+    // A lease whose answer was lost on the way is not in `running`; it runs out by itself.
+    worker->held = std::move(held);
+    return revoked;
+}
+
+Status Coordinator::release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why) {
+    const std::lock_guard lock(mutex_);
+    WorkerRecord* worker = find_worker(worker_id);
+    if (!worker) return no_worker(worker_id);
+    worker->held.erase(unit);
+    JobRecord* job = find_job(unit.job_id);
+    if (!job || job->state != JobState::kRunning) return {};
+    if (why.ok() || why.code() == StatusCode::kCancelled) {
+        job->units->release(unit.key, worker->index);
+    } else {
+        const int failures = job->units->fail(unit.key, worker->index);
+        unit_failed(*job, unit.key, failures, why);
+    }
+    work_changed_.notify_all();
+    return {};
+}
+
+Status Coordinator::goodbye(const std::string& worker_id) {
+    const std::lock_guard lock(mutex_);
+    WorkerRecord* worker = find_worker(worker_id);
+    if (!worker) return no_worker(worker_id);
+    for (const auto& job : jobs_) {
+        if (job->units) job->units->release_all(worker->index);
+    }
+    worker->held.clear();
+    worker->left = true;
+    spdlog::info("{}: left", worker_id);
+    work_changed_.notify_all();
+    return {};
+}
+
+Result<PartialExpectation> Coordinator::expected_partial(const UnitReference& reference) const {
+    const std::lock_guard lock(mutex_);
+    const JobRecord* job = find_job(reference.job_id);
+    if (!job || job->state != JobState::kRunning)
+        return not_found("job " + reference.job_id + " is not running (any more)");
+    const WorkUnit* unit = job->units->find(reference.key);
+    if (!unit) return invalid_argument("job " + reference.job_id + " has leased no such unit");
+    return PartialExpectation{job->spec.frame, unit->tile, unit->iteration_count, unit->light_path_count};
+}
+
+Result<SubmitAck> Coordinator::submit_payload(const std::string& worker_id, const UnitReference& unit,
+                                              const PartialDescriptor& descriptor, std::string_view payload) {
+    const auto expected = expected_partial(unit);
+    if (!expected.ok()) {
+        const bool stale = expected.status().code() == StatusCode::kNotFound;
+        return SubmitAck{stale ? SubmitOutcome::kStale : SubmitOutcome::kRejected, expected.status().message()};
+    }
+    auto partial = decode_partial(*expected, descriptor, payload);
+    if (partial.ok()) return submit_partial(worker_id, unit, descriptor.payload_digest, *std::move(partial));
+
+    const std::lock_guard lock(mutex_);
+    WorkerRecord* worker = find_worker(worker_id);
+    if (!worker) return no_worker(worker_id);
+    worker->held.erase(unit);
+    if (JobRecord* job = find_job(unit.job_id); job && job->state == JobState::kRunning) {
+        ++job->rejected;
+        unit_failed(*job, unit.key, job->units->fail(unit.key, worker->index), partial.status());
+    }
+    return SubmitAck{SubmitOutcome::kRejected, partial.status().message()};
+}
+
+Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, const UnitReference& reference,
+                                              const Digest& digest, Partial partial) {
+    std::shared_ptr<Reducer> reducer;
+    JobRecord* job = nullptr;
+    uint32_t index = 0;
+    WorkUnit unit;
+    {
+        const std::lock_guard lock(mutex_);
+        WorkerRecord* worker = find_worker(worker_id);
+        if (!worker) return no_worker(worker_id);
+        worker->last_heard = options_.clock();
+        worker->held.erase(reference);
+        job = find_job(reference.job_id);
+        if (!job || job->state != JobState::kRunning)
+            return SubmitAck{SubmitOutcome::kStale, "job " + reference.job_id + " is not running (any more)"};
+        index = worker->index;
+        const WorkUnit* known = job->units->find(reference.key);
+        switch (job->units->complete(reference.key, index, digest)) {
+            case UnitTable::Completion::kUnknown:
+                return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};
+            case UnitTable::Completion::kDuplicateSame:
+                ++job->duplicates_same;
+                changed(*job);
+                return SubmitAck{SubmitOutcome::kDuplicateSame, {}};
+            case UnitTable::Completion::kDuplicateDifferent:
+                ++job->duplicates_different;
+                changed(*job);
+                spdlog::error("{}: unit {}/{} from {} differs from the bytes merged before; one of two workers computes "
+                              "wrongly: compare their hosts and builds", job->id, reference.key.group,
+                              reference.key.tile, worker_id);
+                return SubmitAck{SubmitOutcome::kDuplicateDifferent, "the unit was merged before with other bytes"};
+            case UnitTable::Completion::kFirst: break;
+        }
+        unit = *known;
+        reducer = job->reducer;
+    }
+    const UnitCounters counters = partial.counters;
+    const uint64_t dropped = partial.dropped_count;
+    const std::vector<DroppedSample> samples = partial.dropped;
+    const Status merged = reducer->add(unit, std::move(partial));
+
+    const std::lock_guard lock(mutex_);
+    if (job->state != JobState::kRunning) return SubmitAck{SubmitOutcome::kStale, "the job ended meanwhile"};
+    if (!merged.ok()) {
+        ++job->rejected;
+        unit_failed(*job, unit.key, job->units->reopen(unit.key), merged);
+        return SubmitAck{SubmitOutcome::kRejected, merged.message()};
+    }
+    ++workers_[index]->merged;
+    job->workers.insert(index);
+    job->counters.camera_samples += counters.camera_samples;
+    job->counters.light_paths += counters.light_paths;
+    job->counters.rays += counters.rays;
+    job->counters.vertices += counters.vertices;
+    job->counters.connections += counters.connections;
+    job->dropped += dropped;
+    for (const DroppedSample& sample : samples) {
+        if (job->dropped_samples.size() >= kMaxDroppedPerJob) break;
+        job->dropped_samples.push_back({unit.key, sample});
+    }
+    const uint32_t groups = reducer->folded_groups();
+    if (groups > job->merged_groups) {
+        job->merged_groups = groups;
+        job->merged_iterations = reducer->iterations();
+        job->units->advance(groups);
+    }
+    changed(*job);
+    work_changed_.notify_all();
+    finish_if_complete(*job);
+    return SubmitAck{SubmitOutcome::kAccepted, {}};
+}
+
+std::vector<WorkerStatus> Coordinator::workers() const {
+    const std::lock_guard lock(mutex_);
+    const TimePoint now = options_.clock();
+    std::vector<WorkerStatus> out;
+    for (const auto& w : workers_) {
+        const double silent = seconds_between(w->last_heard, now);
+        out.push_back({w->id, w->hello.host, w->hello.process_id, w->hello.thread_count, w->merged, w->held.size(),
+                       silent, w->left || silent > options_.lease_seconds});
+    }
+    return out;
+}
+
+}  // namespace lightloom

@@ -1,0 +1,53 @@
+#include "server/grpc_services.h"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/server_builder.h>
+
+#include "server/asset_service.h"
+#include "server/job_service.h"
+#include "server/worker_service.h"
+
+namespace lightloom {
+
+struct GrpcServer::Services {
+    explicit Services(Coordinator& coordinator)
+        : job(coordinator, closing), asset(coordinator, closing), worker(coordinator, closing) {}
+    std::atomic<bool> closing{false};
+    JobServiceImpl job;
+    AssetServiceImpl asset;
+    WorkerServiceImpl worker;
+};
+
+GrpcServer::GrpcServer() = default;
+
+Result<std::unique_ptr<GrpcServer>> GrpcServer::start(Coordinator& coordinator, const std::string& address) {
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    std::unique_ptr<GrpcServer> server(new GrpcServer);
+    server->services_ = std::make_unique<Services>(coordinator);
+    grpc::ServerBuilder builder;
+    // One coordinator per port: without this a second one would share it silently.
+    builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 20000);
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
+    builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5000);
+    builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 64);
+    builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &server->port_);
+    builder.RegisterService(&server->services_->job);
+    builder.RegisterService(&server->services_->asset);
+    builder.RegisterService(&server->services_->worker);
+    server->server_ = builder.BuildAndStart();
+    if (!server->server_ || server->port_ == 0)
+        return Status(StatusCode::kUnavailable, "cannot listen on " + address + "; is another coordinator running there?");
+    return server;
+}
+
+GrpcServer::~GrpcServer() {
+    if (!server_) return;
+    services_->closing = true;
+    // Handlers that wait look at `closing` several times a second; what does not end by itself is cut off.
+    server_->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(3));
+}
+
+}  // namespace lightloom

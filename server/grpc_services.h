@@ -1,0 +1,34 @@
+#pragma once
+// The services of proto/lightloom/v1 as thin adapters around a Coordinator: convert, call, convert.
+//
+// The synchronous API is deliberate: a handler is a plain function, there are two or three calls in flight per worker and client,
+// and rendering, not the number of connections, bounds a coordinator of this design.
+
+#include <grpcpp/server.h>
+
+#include <atomic>
+#include <memory>
+#include <string>
+
+#include "common/core/result.h"
+#include "server/coordinator.h"
+
+namespace lightloom {
+
+class GrpcServer {
+  public:
+    /// `address`: HOST:PORT, port 0 picks a free one. Reflection and health checking are on. kUnavailable when the port cannot
+    /// be bound.
+    static Result<std::unique_ptr<GrpcServer>> start(Coordinator& coordinator, const std::string& address);
+    ~GrpcServer();
+    int port() const { return port_; }
+
+  private:
+    struct Services;
+    GrpcServer();
+    std::unique_ptr<Services> services_;
+    std::unique_ptr<grpc::Server> server_;
+    int port_ = 0;
+};
+
+}  // namespace lightloom

@@ -1,0 +1,57 @@
+#pragma once
+// The coordinator's own records. Private to server/coordinator*.cpp; every field is guarded by the coordinator's mutex unless
+// it says otherwise.
+
+#include <set>
+
+#include "server/coordinator.h"
+
+namespace lightloom {
+
+struct Coordinator::WorkerRecord {
+    std::string id;
+    uint32_t index = 0;  ///< In workers_.
+    WorkerHello hello;
+    TimePoint last_heard;
+    bool left = false;
+    uint32_t waiting = 0;  ///< lease_units calls that wait now.
+    uint64_t merged = 0;
+    std::set<UnitReference> held;
+};
+
+struct Coordinator::JobRecord {
+    std::string id, request_id;
+    JobSpec submitted;  ///< As it came, to recognise a repeated submission.
+    JobSpec spec;       ///< Canonical, completed from the scene.
+    JobState state = JobState::kPreparing;
+    std::string message;
+    uint64_t revision = 1;
+    TimePoint created, prepared, first_render, finishing, ended;
+    bool rendering = false;  ///< first_render is set.
+    bool closed = false;     ///< The time limit has passed.
+    std::string created_at;  ///< UTC, for the manifest only.
+    float exposure_scale = 1;
+    std::optional<UnitTable> units;
+    std::shared_ptr<Reducer> reducer;  ///< Has its own lock; used without ours.
+    uint32_t merged_groups = 0;        ///< Complete groups merged so far.
+    uint64_t merged_iterations = 0;    ///< Iterations of these.
+    std::set<uint32_t> workers;        ///< Indices of those whose units were merged.
+    UnitCounters counters;
+    uint64_t dropped = 0;
+    struct Dropped {
+        UnitKey unit;
+        DroppedSample sample;
+    };
+    std::vector<Dropped> dropped_samples;  ///< The first few.
+    uint64_t duplicates_same = 0, duplicates_different = 0, expired_leases = 0, rejected = 0;
+    Digest image_digest;
+    uint64_t image_size = 0;
+    std::filesystem::path directory;
+    std::jthread prepare_task, finish_task;
+};
+
+inline constexpr size_t kMaxDroppedPerJob = 64;
+/// A unit that failed this often, on whatever workers, fails its job: it is the unit, not the workers.
+inline constexpr int kMaxUnitFailures = 3;
+
+}  // namespace lightloom

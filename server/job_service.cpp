@@ -1,0 +1,84 @@
+#include "server/job_service.h"
+
+#include <thread>
+
+#include "common/work/wire.h"
+
+namespace lightloom {
+namespace {
+
+constexpr auto kWatchInterval = std::chrono::milliseconds(100);
+
+grpc::Status answer(const Result<JobInfo>& info, v1::Job* response) {
+    if (!info.ok()) return wire::to_grpc(info.status());
+    wire::put(*info, response);
+    return grpc::Status::OK;
+}
+
+grpc::Status send(const Result<std::string>& bytes, grpc::ServerWriter<v1::Chunk>* writer) {
+    if (!bytes.ok()) return wire::to_grpc(bytes.status());
+    v1::Chunk chunk;
+    for (size_t offset = 0; offset < bytes->size(); offset += kMaxChunkBytes) {
+        chunk.set_offset_bytes(offset);
+        chunk.set_data(bytes->data() + offset, std::min<size_t>(kMaxChunkBytes, bytes->size() - offset));
+        if (!writer->Write(chunk)) return {grpc::StatusCode::CANCELLED, "the client went away"};
+    }
+    return grpc::Status::OK;
+}
+
+}  // namespace
+
+grpc::Status JobServiceImpl::SubmitJob(grpc::ServerContext*, const v1::SubmitJobRequest* request, v1::Job* response) {
+    const auto spec = wire::get(request->spec());
+    if (!spec.ok()) return wire::to_grpc(spec.status());
+    return answer(coordinator_.submit_job(request->request_id(), *spec), response);
+}
+
+grpc::Status JobServiceImpl::GetJob(grpc::ServerContext*, const v1::GetJobRequest* request, v1::Job* response) {
+    return answer(coordinator_.get_job(request->job_id()), response);
+}
+
+grpc::Status JobServiceImpl::ListJobs(grpc::ServerContext*, const v1::ListJobsRequest*, v1::ListJobsResponse* response) {
+    for (const JobInfo& info : coordinator_.list_jobs()) wire::put(info, response->add_jobs());
+    return grpc::Status::OK;
+}
+
+grpc::Status JobServiceImpl::CancelJob(grpc::ServerContext*, const v1::CancelJobRequest* request, v1::Job* response) {
+    return answer(coordinator_.cancel_job(request->job_id()), response);
+}
+
+grpc::Status JobServiceImpl::WatchJob(grpc::ServerContext* context, const v1::WatchJobRequest* request,
+                                      grpc::ServerWriter<v1::Job>* writer) {
+    uint64_t seen = request->after_revision();
+    while (!context->IsCancelled() && !closing_) {
+        const auto info = coordinator_.wait_job(request->job_id(), seen, 0.2);
+        if (!info.ok()) return wire::to_grpc(info.status());
+        if (info->revision > seen) {
+            seen = info->revision;
+            v1::Job message;
+            wire::put(*info, &message);
+            if (!writer->Write(message)) break;
+            if (is_terminal(info->state)) return grpc::Status::OK;
+            std::this_thread::sleep_for(kWatchInterval);
+        } else if (is_terminal(info->state)) {
+            return grpc::Status::OK;
+        }
+    }
+    return {grpc::StatusCode::UNAVAILABLE, "the coordinator is going down"};
+}
+
+grpc::Status JobServiceImpl::GetImage(grpc::ServerContext*, const v1::GetImageRequest* request,
+                                      grpc::ServerWriter<v1::Chunk>* writer) {
+    switch (request->kind()) {
+        case v1::IMAGE_KIND_FINAL: return send(coordinator_.image(request->job_id(), ImageKind::kFinal), writer);
+        case v1::IMAGE_KIND_PREVIEW: return send(coordinator_.image(request->job_id(), ImageKind::kPreview), writer);
+        default: return {grpc::StatusCode::INVALID_ARGUMENT, "an image is FINAL or PREVIEW"};
+    }
+}
+
+grpc::Status JobServiceImpl::GetManifest(grpc::ServerContext*, const v1::GetManifestRequest* request,
+                                         grpc::ServerWriter<v1::Chunk>* writer) {
+    return send(coordinator_.manifest(request->job_id()), writer);
+}
+
+}  // namespace lightloom

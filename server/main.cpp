@@ -1,0 +1,120 @@
+// lightloom-server: the coordinator as a process.
+
+#include <signal.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iostream>
+
+#include "common/core/log.h"
+#include "common/film/atomic_file.h"
+#include "common/work/identity.h"
+#include "server/grpc_services.h"
+#include "server/scene_reader.h"
+#include "server/status_http.h"
+
+namespace {
+
+constexpr const char* kFooter = R"(Start a coordinator, then workers that point to it, then submit:
+
+  lightloom-server --data /var/lib/lightloom
+  lightloom-worker --server 127.0.0.1:50051
+  lightloom submit scene.pbrt --server 127.0.0.1:50051 -o scene.exr
+
+Connections are plain text without authentication, so other than loopback addresses need --allow-plaintext: use it only
+in a network in which everybody may render.
+
+Exit codes: 0 stopped as asked, 1 failed to start, 2 bad command line.)";
+
+bool is_loopback(const std::string& address) {
+    return address.starts_with("127.") || address.starts_with("localhost:") || address.starts_with("[::1]:") ||
+           address.starts_with("unix:");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    using namespace lightloom;
+    CLI::App app{"The coordinator of Lightloom: accepts jobs, leases their units to workers and merges the results.",
+                 "lightloom-server"};
+    app.footer(kFooter);
+    std::string listen = "127.0.0.1:50051", data = "lightloom-data", status = "127.0.0.1:9464", level = "info", port_file;
+    double lease = 10;
+    bool plaintext = false;
+    std::optional<uint64_t> shuffle;
+    app.add_option("--listen", listen, "HOST:PORT for clients and workers; port 0 picks a free one")->capture_default_str();
+    app.add_option("--data", data, "Directory for scene files and images")->capture_default_str();
+    app.add_option("--status", status, "HOST:PORT of the status page (/healthz, /api/v1/status), or off")->capture_default_str();
+    app.add_option("--lease", lease, "Seconds without a heartbeat after which a unit goes to another worker")
+        ->check(CLI::Range(0.2, 3600.0))->capture_default_str();
+    app.add_option("--port-file", port_file, "Write \"GRPC_PORT STATUS_PORT\" here once both listen");
+    app.add_flag("--allow-plaintext", plaintext, "Listen on other than loopback addresses");
+    app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
+    app.add_option("--shuffle-leases", shuffle, "")->group("");  // tests: lease units in a random order
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? 0 : 2;
+    }
+    if (!set_up_logging("lightloom-server", level)) {
+        std::cerr << "unknown log level \"" << level << "\"\n";
+        return 2;
+    }
+    if (!plaintext && !(is_loopback(listen) && (status == "off" || is_loopback(status)))) {
+        std::cerr << "refusing to listen beyond loopback without --allow-plaintext: connections have no protection\n";
+        return 2;
+    }
+    sigset_t signals;
+    sigemptyset(&signals);
+    sigaddset(&signals, SIGINT);
+    sigaddset(&signals, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+
+    const auto identity = build_identity();
+    if (!identity.ok()) {
+        spdlog::error("the golden unit failed on this host: {}", identity.status().message());
+        return 1;
+    }
+    CoordinatorOptions options;
+    options.directory = data;
+    options.identity = *identity;
+    options.read_scene = make_scene_reader(std::filesystem::path(data) / "scratch");
+    options.lease_seconds = lease;
+    options.heartbeat_seconds = std::min(1.0, lease / 4);
+    options.shuffle_seed = shuffle;
+    std::error_code error;
+    std::filesystem::create_directories(data, error);
+    if (error) {
+        spdlog::error("{}: {}", data, error.message());
+        return 1;
+    }
+    Coordinator coordinator(std::move(options));
+    auto server = GrpcServer::start(coordinator, listen);
+    if (!server.ok()) {
+        spdlog::error("{}", server.status().message());
+        return 1;
+    }
+    std::unique_ptr<StatusHttp> http;
+    if (status != "off") {
+        auto started = StatusHttp::start(coordinator, status);
+        if (!started.ok()) {
+            spdlog::error("{}", started.status().message());
+            return 1;
+        }
+        http = std::move(started).value();
+    }
+    spdlog::info("build {}, listening on port {}, status on port {}", identity->build_id, (*server)->port(),
+                 http ? http->port() : 0);
+    if (!port_file.empty()) {
+        const std::string ports = std::to_string((*server)->port()) + " " + std::to_string(http ? http->port() : 0) + "\n";
+        if (const Status written = write_file_atomically(port_file, ports); !written.ok()) {
+            spdlog::error("{}", written.message());
+            return 1;
+        }
+    }
+    int signal = 0;
+    sigwait(&signals, &signal);
+    spdlog::info("stopping");
+    return 0;
+}

@@ -1,0 +1,46 @@
+#pragma once
+// Reducer: merges the partials of one job. Partials come in any order; groups are folded in ascending order, so that the
+// result has the same bytes whatever the order was. Exactly-once by unit key is the caller's duty.
+
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "common/film/accumulation.h"
+#include "common/work/job.h"
+
+namespace lightloom {
+
+class Reducer {
+  public:
+    Reducer(const FrameLayout& frame, uint32_t tile_count);
+
+    /// Takes the partial of `unit` in. kDataLoss (and nothing was merged) if it is not one; kCancelled after freeze().
+    Status add(const WorkUnit& unit, Partial partial);
+    /// Nothing is merged any more.
+    void freeze();
+
+    /// Complete groups merged so far: always a prefix of the plan.
+    uint32_t folded_groups() const;
+    uint64_t iterations() const;
+    /// Developed complete groups; kFailedPrecondition before the first.
+    Result<RgbImage> image(float scale) const;
+    Result<RgbImage> variance(float scale) const;
+
+  private:
+    Status add_to_current(const WorkUnit& unit, const Partial& partial);
+
+    const FrameLayout frame_;
+    const uint32_t tile_count_;
+    mutable std::mutex mutex_;
+    Accumulation accumulation_;
+    GroupSum current_;
+    uint32_t current_units_ = 0;
+    bool frozen_ = false;
+    /// Partials of later groups wait as they are: a group's sums take four times their room.
+    std::map<uint32_t, std::vector<std::pair<WorkUnit, Partial>>> waiting_;
+};
+
+}  // namespace lightloom

@@ -1,0 +1,127 @@
+#include "server/results.h"
+
+#include <nlohmann/json.hpp>
+
+#include "common/film/atomic_file.h"
+#include "common/film/exr_io.h"
+#include "common/film/png.h"
+
+namespace lightloom {
+
+using Json = nlohmann::ordered_json;
+
+std::string replay_command(const JobSpec& spec, const std::string& scene, const DroppedSample& sample) {
+    const int width = spec.frame.crop.width();
+    const int x = spec.frame.crop.x0 + int(sample.pixel) % width, y = spec.frame.crop.y0 + int(sample.pixel) / width;
+    std::string command = "lightloom replay " + scene + " --algorithm " + spec.algorithm;
+    for (const auto& [key, value] : spec.parameters) command += " --set " + key + "=" + value;
+    command += " --seed " + std::to_string(spec.seed) + " --max-depth " + std::to_string(spec.max_depth);
+    if (spec.width > 0) command += " --resolution " + std::to_string(spec.width) + "x" + std::to_string(spec.height);
+    return command + " --iteration " + std::to_string(sample.iteration) + " --pixel " + std::to_string(x) + "," +
+           std::to_string(y);
+}
+
+std::string to_json(const Manifest& m) {
+    const JobSpec& spec = m.job.spec;
+    Json json;
+    json["format"] = "lightloom-manifest 1";
+    json["job"] = m.job.job_id;
+    json["image"] = {{"sha256", m.job.image_digest.hex()},
+                     {"size_bytes", m.job.image_size_bytes},
+                     {"samples_per_pixel", m.iterations},
+                     {"groups", m.groups},
+                     {"spec_digest", spec.image_digest().hex()}};
+    const Rect& crop = spec.frame.crop;
+    json["spec"] = {{"algorithm", spec.algorithm},
+                    {"parameters", spec.parameters},
+                    {"seed", spec.seed},
+                    {"max_depth", spec.max_depth},
+                    {"requested_samples_per_pixel", spec.samples_per_pixel},
+                    {"time_limit_seconds", spec.time_limit_seconds},
+                    {"scene", m.scene_main},
+                    {"scene_root", spec.scene_root.hex()},
+                    {"frame",
+                     {{"width", spec.frame.width},
+                      {"height", spec.frame.height},
+                      {"crop", {crop.x0, crop.y0, crop.x1, crop.y1}}}}};
+    json["build"] = {{"build_id", m.identity.build_id},
+                     {"math_profile", m.identity.math_profile},
+                     {"golden_digest", m.identity.golden_digest.hex()}};
+    json["times"] = {{"created", m.created_at},
+                     {"finished", m.finished_at},
+                     {"prepare_seconds", m.job.prepare_seconds},
+                     {"render_seconds", m.job.render_seconds}};
+    json["work"] = {{"camera_samples", m.job.camera_samples},
+                    {"light_paths", m.job.light_paths},
+                    {"rays", m.job.rays},
+                    {"units", m.units.size()},
+                    {"expired_leases", m.expired_leases},
+                    {"rejected_results", m.rejected_results},
+                    {"duplicates_same", m.job.duplicates_same},
+                    {"duplicates_different", m.job.duplicates_different}};
+    Json dropped = Json::array();
+    for (const ManifestDropped& d : m.dropped) {
+        dropped.push_back({{"unit", {d.unit.group, d.unit.tile}},
+                           {"iteration", d.sample.iteration},
+                           {"pixel", d.sample.pixel},
+                           {"splat", d.sample.splat},
+                           {"replay", replay_command(spec, m.scene_main, d.sample)}});
+    }
+    json["dropped"] = {{"count", m.job.dropped_samples}, {"first", std::move(dropped)}};
+    Json workers = Json::array();
+    for (const ManifestWorker& w : m.workers) {
+        Json units = Json::array();  // pairs [group, tile]
+        for (const UnitTable::Merged& u : m.units) {
+            if (u.worker == w.index) units.push_back({u.unit.key.group, u.unit.key.tile});
+        }
+        workers.push_back({{"worker", w.worker_id},
+                           {"host", w.host},
+                           {"process_id", w.process_id},
+                           {"threads", w.thread_count},
+                           {"units", std::move(units)}});
+    }
+    json["workers"] = std::move(workers);
+    return json.dump(1) + "\n";
+}
+
+Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, float exposure_scale) {
+    auto color = reducer.image(exposure_scale);
+    if (!color.ok()) return color.status();
+    auto variance = reducer.variance(exposure_scale);
+    if (!variance.ok()) return variance.status();
+    std::string parameters;
+    for (const auto& [key, value] : spec.parameters) parameters += (parameters.empty() ? "" : " ") + key + "=" + value;
+    ExrImage image;
+    image.frame = spec.frame;
+    image.color = *std::move(color);
+    image.layers.push_back({"variance", "RGB", std::move(variance->pixels)});
+    image.attributes = {{"lightloom.algorithm", spec.algorithm},
+                        {"lightloom.parameters", parameters},
+                        {"lightloom.seed", std::to_string(spec.seed)},
+                        {"lightloom.maxDepth", std::to_string(spec.max_depth)},
+                        {"lightloom.samplesPerPixel", std::to_string(reducer.iterations())},
+                        {"lightloom.groups", std::to_string(reducer.folded_groups())},
+                        {"lightloom.sceneRoot", spec.scene_root.hex()},
+                        {"lightloom.specDigest", spec.image_digest().hex()}};
+    return encode_exr(image);
+}
+
+Result<std::string> read_image(const std::filesystem::path& job_directory) {
+    return read_file((job_directory / "image.exr").string());
+}
+
+Result<std::string> preview_png(const std::filesystem::path& job_directory, const Reducer* reducer,
+                                float exposure_scale) {
+    if (reducer) {
+        const auto image = reducer->image(exposure_scale);
+        if (!image.ok()) return image.status();
+        return encode_png(*image);
+    }
+    const auto bytes = read_image(job_directory);
+    if (!bytes.ok()) return bytes.status();
+    const auto image = decode_exr(*bytes, "the finished image");
+    if (!image.ok()) return image.status();
+    return encode_png(image->color);
+}
+
+}  // namespace lightloom

@@ -1,0 +1,51 @@
+#pragma once
+// What a finished job leaves behind: the EXR, which holds only what any rendering of the same job would reproduce, and beside
+// it the manifest, which also holds when, where and by whom it was rendered.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/work/service.h"
+#include "server/reducer.h"
+#include "server/unit_table.h"
+
+namespace lightloom {
+
+struct ManifestWorker {
+    uint32_t index = 0;  ///< In Manifest::units.
+    std::string worker_id, host;
+    uint64_t process_id = 0;
+    uint32_t thread_count = 0;
+};
+
+struct ManifestDropped {
+    UnitKey unit;
+    DroppedSample sample;
+};
+
+struct Manifest {
+    JobInfo job;
+    BuildIdentity identity;
+    std::string scene_main;  ///< Path of the scene file in its list.
+    std::string created_at, finished_at;  ///< UTC.
+    uint32_t groups = 0;
+    uint64_t iterations = 0;
+    std::vector<UnitTable::Merged> units;
+    std::vector<ManifestWorker> workers;
+    std::vector<ManifestDropped> dropped;  ///< The first few.
+    uint64_t expired_leases = 0, rejected_results = 0;
+};
+
+/// Command line that renders one dropped sample again.
+std::string replay_command(const JobSpec& spec, const std::string& scene, const DroppedSample& sample);
+/// The manifest as JSON text.
+std::string to_json(const Manifest& manifest);
+
+/// The EXR's bytes for the merged groups of `reducer`.
+Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, float exposure_scale);
+Result<std::string> read_image(const std::filesystem::path& job_directory);
+/// PNG of the groups merged so far, or of the finished image when there is no reducer any more.
+Result<std::string> preview_png(const std::filesystem::path& job_directory, const Reducer* reducer, float exposure_scale);
+
+}  // namespace lightloom

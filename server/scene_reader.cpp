@@ -1,0 +1,35 @@
+#include "server/scene_reader.h"
+
+#include <unistd.h>
+
+#include "common/scene/scene.h"
+
+namespace lightloom {
+
+Result<SceneFacts> scene_facts(const SceneDescription& description, const JobSpec& spec) {
+    const auto frame = frame_layout(description.film, {.width = spec.width, .height = spec.height});
+    if (!frame.ok()) return frame.status();
+    return SceneFacts{*frame, description.film.exposure_scale, description.max_depth};
+}
+
+SceneReader make_scene_reader(std::filesystem::path scratch) {
+    return [scratch = std::move(scratch)](const AssetStore& assets, const JobSpec& spec,
+                                          std::stop_token) -> Result<SceneFacts> {
+        const auto text = assets.read(spec.scene_root);
+        if (!text.ok()) return text.status();
+        const auto manifest = AssetManifest::parse(*text);
+        if (!manifest.ok()) return manifest.status();
+        std::string directory = (scratch / "scene-XXXXXX").string();
+        std::error_code error;
+        std::filesystem::create_directories(scratch, error);
+        if (!::mkdtemp(directory.data())) return internal_error(directory + ": cannot be made");
+        const Status status = assets.materialise(*manifest, directory);
+        auto scene = status.ok() ? import_pbrt((std::filesystem::path(directory) / manifest->main).string())
+                                 : Result<ImportedScene>(status);
+        std::filesystem::remove_all(directory, error);
+        if (!scene.ok()) return scene.status();
+        return scene_facts(scene->description, spec);
+    };
+}
+
+}  // namespace lightloom

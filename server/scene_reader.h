@@ -1,0 +1,16 @@
+#pragma once
+// Reads what a job needs to know of its scene from the asset store.
+
+#include "common/import/import.h"
+#include "server/coordinator.h"
+
+namespace lightloom {
+
+/// The facts of an imported scene at the resolution of `spec`.
+Result<SceneFacts> scene_facts(const SceneDescription& description, const JobSpec& spec);
+
+/// A reader that lays the scene's files out below `scratch` and imports them, so that a scene with an error fails its job
+/// before any worker sees it.
+SceneReader make_scene_reader(std::filesystem::path scratch);
+
+}  // namespace lightloom

@@ -1,0 +1,170 @@
+#include "server/status_http.h"
+
+#include <boost/asio/dispatch.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+namespace lightloom {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using tcp = asio::ip::tcp;
+using Json = nlohmann::ordered_json;
+
+constexpr int kMaxConnections = 64;
+constexpr uint32_t kMaxHeaderBytes = 8 * 1024;
+constexpr auto kTimeout = std::chrono::seconds(5);
+
+std::string status_json(const Coordinator& coordinator) {
+    Json jobs = Json::array();
+    for (const JobInfo& j : coordinator.list_jobs()) {
+        jobs.push_back({{"job", j.job_id},
+                        {"state", to_string(j.state)},
+                        {"message", j.message},
+                        {"algorithm", j.spec.algorithm},
+                        {"units_done", j.unit_done},
+                        {"units_total", j.unit_total > 0 ? Json(j.unit_total) : Json(nullptr)},
+                        {"units_leased", j.unit_leased},
+                        {"samples_per_pixel_done", j.samples_per_pixel_done},
+                        {"render_seconds", j.render_seconds},
+                        {"eta_seconds", j.eta_seconds >= 0 ? Json(j.eta_seconds) : Json(nullptr)},
+                        {"dropped_samples", j.dropped_samples},
+                        {"workers", j.worker_count},
+                        {"duplicates_different", j.duplicates_different}});
+    }
+    Json workers = Json::array();
+    for (const WorkerStatus& w : coordinator.workers()) {
+        workers.push_back({{"worker", w.worker_id},
+                           {"host", w.host},
+                           {"process_id", w.process_id},
+                           {"threads", w.thread_count},
+                           {"units_merged", w.units_merged},
+                           {"units_held", w.units_held},
+                           {"seconds_since_heard", w.seconds_since_heard},
+                           {"lost", w.lost}});
+    }
+    return Json{{"jobs", std::move(jobs)}, {"workers", std::move(workers)}}.dump(1) + "\n";
+}
+
+http::response<http::string_body> respond(const Coordinator& coordinator, const http::request<http::empty_body>& request) {
+    http::response<http::string_body> response;
+    response.version(request.version());
+    response.keep_alive(false);
+    response.set(http::field::cache_control, "no-store");
+    response.set(http::field::content_type, "text/plain; charset=utf-8");
+    const beast::string_view target = request.target();
+    if (request.method() != http::verb::get) {
+        response.result(http::status::method_not_allowed);
+        response.set(http::field::allow, "GET");
+        response.body() = "GET only\n";
+    } else if (target == "/healthz") {
+        response.body() = "ok\n";
+    } else if (target == "/api/v1/status") {
+        response.set(http::field::content_type, "application/json");
+        response.body() = status_json(coordinator);
+    } else {
+        response.result(http::status::not_found);
+        response.body() = "not found; there are /healthz and /api/v1/status\n";
+    }
+    response.prepare_payload();
+    return response;
+}
+
+/// One connection: one request, one answer.
+class Session : public std::enable_shared_from_this<Session> {
+  public:
+    Session(tcp::socket socket, const Coordinator& coordinator, int& connections)
+        : stream_(std::move(socket)), coordinator_(coordinator), connections_(connections) {
+        ++connections_;
+        parser_.header_limit(kMaxHeaderBytes);
+        parser_.body_limit(0);
+    }
+    ~Session() { --connections_; }
+
+    void start() {
+        stream_.expires_after(kTimeout);
+        http::async_read(stream_, buffer_, parser_, [self = shared_from_this()](beast::error_code error, size_t) {
+            if (!error) self->answer();
+        });
+    }
+
+  private:
+    void answer() {
+        response_ = respond(coordinator_, parser_.get());
+        stream_.expires_after(kTimeout);
+        http::async_write(stream_, response_, [self = shared_from_this()](beast::error_code, size_t) {
+            beast::error_code ignored;
+            self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+        });
+    }
+
+    beast::tcp_stream stream_;
+    beast::flat_buffer buffer_{kMaxHeaderBytes + 1024};
+    http::request_parser<http::empty_body> parser_;
+    http::response<http::string_body> response_;
+    const Coordinator& coordinator_;
+    int& connections_;
+};
+
+}  // namespace
+
+struct StatusHttp::Impl {
+    explicit Impl(const Coordinator& c) : coordinator(c), acceptor(context) {}
+
+    void accept() {
+        acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
+            if (error == asio::error::operation_aborted) return;
+            // Above the limit a connection is closed unanswered: this endpoint must never starve the renderer.
+            if (!error && connections < kMaxConnections)
+                std::make_shared<Session>(std::move(socket), coordinator, connections)->start();
+            accept();
+        });
+    }
+
+    const Coordinator& coordinator;
+    int connections = 0;  // of the one thread; before `context`, whose end destroys the sessions
+    asio::io_context context{1};
+    tcp::acceptor acceptor;
+    std::thread thread;
+};
+
+StatusHttp::StatusHttp(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+StatusHttp::~StatusHttp() {
+    impl_->context.stop();
+    if (impl_->thread.joinable()) impl_->thread.join();
+}
+
+int StatusHttp::port() const { return impl_->acceptor.local_endpoint().port(); }
+
+Result<std::unique_ptr<StatusHttp>> StatusHttp::start(const Coordinator& coordinator, const std::string& address) {
+    const size_t colon = address.rfind(':');
+    if (colon == std::string::npos) return invalid_argument("a status address is HOST:PORT, not \"" + address + "\"");
+    std::string host = address.substr(0, colon);
+    if (host == "localhost") host = "127.0.0.1";
+    if (host.size() > 1 && host.front() == '[') host = host.substr(1, host.size() - 2);
+    auto impl = std::make_unique<Impl>(coordinator);
+    beast::error_code error;
+    const auto ip = asio::ip::make_address(host, error);
+    const int port = std::atoi(address.c_str() + colon + 1);
+    if (error || port < 0 || port > 65535)
+        return invalid_argument("a status address is a literal address and a port, not \"" + address + "\"");
+    const tcp::endpoint endpoint(ip, uint16_t(port));
+    impl->acceptor.open(endpoint.protocol(), error);
+    if (!error) impl->acceptor.set_option(asio::socket_base::reuse_address(true), error);
+    if (!error) impl->acceptor.bind(endpoint, error);
+    if (!error) impl->acceptor.listen(kMaxConnections, error);
+    if (error)
+        return Status(StatusCode::kUnavailable, "the status page cannot listen on " + address + ": " + error.message() +
+                                                    "; choose another with --status, or off");
+    impl->accept();
+    impl->thread = std::thread([raw = impl.get()] { raw->context.run(); });
+    return std::unique_ptr<StatusHttp>(new StatusHttp(std::move(impl)));
+}
+
+}  // namespace lightloom

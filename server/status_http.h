@@ -1,0 +1,25 @@
+#pragma once
+// The status endpoint: GET /healthz and /api/v1/status over HTTP, for people and monitors. One thread, bounded everything.
+
+#include <memory>
+#include <string>
+
+#include "server/coordinator.h"
+
+namespace lightloom {
+
+class StatusHttp {
+  public:
+    /// `address`: HOST:PORT of a literal address or "localhost"; port 0 picks a free one. kUnavailable when it cannot be
+    /// bound.
+    static Result<std::unique_ptr<StatusHttp>> start(const Coordinator& coordinator, const std::string& address);
+    ~StatusHttp();
+    int port() const;
+
+  private:
+    struct Impl;
+    explicit StatusHttp(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace lightloom

@@ -1,0 +1,96 @@
+#pragma once
+// UnitTable: which units of one job are pending, leased or merged. No locks, no clock of its own: the caller passes the time.
+// Leases only save work; correctness rests on complete() answering "first" exactly once per unit.
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "common/core/digest.h"
+#include "common/work/job.h"
+
+namespace lightloom {
+
+using TimePoint = std::chrono::steady_clock::time_point;
+
+class UnitTable {
+  public:
+    /// `iterations` 0: unbounded, until close(). At most `window` groups are open at a time: partials of later groups have
+    /// to wait in memory for a straggler of an earlier one. `shuffle_seed` hands units out in a random order (tests).
+    UnitTable(Plan plan, uint64_t iterations, uint32_t window, std::optional<uint64_t> shuffle_seed);
+
+    /// The next unit for `worker` (an index of the caller's choice), or nothing for now.
+    std::optional<WorkUnit> lease(uint32_t worker, TimePoint expiry);
+    /// Whether more than `n` units could be leased now.
+    bool has_more_than(size_t n);
+    /// True if the unit is not merged yet; then `worker` holds it until `expiry` (unless someone else does already).
+    bool renew(const UnitKey& key, uint32_t worker, TimePoint expiry);
+    /// Gives the unit back if `worker` holds it.
+    void release(const UnitKey& key, uint32_t worker);
+    void release_all(uint32_t worker);
+    /// Puts units back whose lease ended before `now`; their number.
+    size_t expire(TimePoint now);
+
+    enum class Completion { kFirst, kDuplicateSame, kDuplicateDifferent, kUnknown };
+    /// A result arrived. kFirst: the caller merges it and is the only one to be told so, unless it calls reopen().
+    Completion complete(const UnitKey& key, uint32_t worker, const Digest& digest);
+    /// The result could not be merged after all; leases the unit again. Returns how often that happened to it.
+    int reopen(const UnitKey& key);
+    /// The same for a unit that a worker could not render.
+    int fail(const UnitKey& key, uint32_t worker);
+
+    /// The unit of an opened group.
+    const WorkUnit* find(const UnitKey& key) const;
+    /// Groups below `count` are merged: the window moves on.
+    void advance(uint32_t count) { merged_groups_ = count; }
+    /// Leases nothing more.
+    void close() { closed_ = true; }
+    /// Leases units of the first `count` groups only.
+    void limit_groups(uint32_t count) { group_limit_ = count; }
+
+    uint64_t unit_total() const { return unit_total_; }  ///< 0 when unbounded.
+    uint32_t group_total() const { return group_total_; }
+    uint64_t done_count() const { return done_count_; }
+    uint64_t leased_count() const { return leased_count_; }
+    uint32_t tile_count() const { return plan_.tile_count(); }
+
+    struct Merged {
+        WorkUnit unit;
+        uint32_t worker = 0;
+    };
+    /// Who rendered what, over the first `groups` groups.
+    std::vector<Merged> merged(uint32_t groups) const;
+
+  private:
+    enum class State : uint8_t { kPending, kLeased, kDone };
+    struct Entry {
+        WorkUnit unit;
+        State state = State::kPending;
+        uint32_t worker = 0;
+        int failures = 0;
+        TimePoint expiry;
+        Digest digest;
+    };
+    Entry* entry(const UnitKey& key);
+    bool open_group();
+    void make_pending(Entry& e);
+
+    Plan plan_;
+    uint64_t iterations_;
+    uint32_t window_;
+    std::optional<uint64_t> shuffle_;
+    std::deque<std::vector<Entry>> groups_;  // opened so far, by index
+    std::set<UnitKey> pending_, leased_;
+    uint64_t opened_iterations_ = 0;
+    uint64_t unit_total_ = 0;
+    uint32_t group_total_ = 0;
+    uint64_t done_count_ = 0, leased_count_ = 0;
+    uint32_t merged_groups_ = 0;
+    uint32_t group_limit_ = UINT32_MAX;
+    bool closed_ = false;
+};
+
+}  // namespace lightloom

@@ -1,0 +1,190 @@
+// The programs as a user runs them: coordinator, workers and client as processes on loopback, real light.
+
+#include <grpcpp/create_channel.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "client/grpc_job_port.h"
+#include "common/film/atomic_file.h"
+#include "tests/service/fake.h"
+#include "tests/service/process.h"
+
+namespace lightloom {
+namespace {
+
+using testing::Process;
+using testing::TempDirectory;
+using testing::wait_until;
+using Json = nlohmann::json;
+
+const std::string kScene = std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/cornell.pbrt";
+
+/// A coordinator and the files around it.
+struct Service {
+    explicit Service(std::vector<std::string> more = {}) {
+        std::vector<std::string> arguments{"--listen", "127.0.0.1:0", "--status", "127.0.0.1:0", "--data",
+                                           path("data"), "--port-file", path("ports"), "--lease", "1"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        server = std::make_unique<Process>("lightloom-server", arguments, path("server.log"));
+        EXPECT_TRUE(wait_until(60, [&] { return std::filesystem::exists(path("ports")); })) << log("server");
+        std::ifstream(path("ports")) >> port >> status_port;
+    }
+    std::string path(const std::string& name) const { return (directory.path / name).string(); }
+    std::string address() const { return "127.0.0.1:" + std::to_string(port); }
+    std::string log(const std::string& name) const {
+        const auto text = read_file(path(name + ".log"));
+        return text.ok() ? *text : std::string();
+    }
+    std::unique_ptr<Process> worker(const std::string& name, int threads, std::vector<std::string> more = {}) const {
+        std::vector<std::string> arguments{"--server", address(), "--threads", std::to_string(threads), "--cache", path("cache")};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return std::make_unique<Process>("lightloom-worker", arguments, path(name + ".log"));
+    }
+    std::unique_ptr<Process> submit(const std::string& name, std::vector<std::string> more) const {
+        std::vector<std::string> arguments{"submit", kScene, "--server", address(), "-o", path(name + ".exr"), "-q"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return std::make_unique<Process>("lightloom", arguments, path(name + ".log"));
+    }
+    GrpcJobPort jobs() const {
+        return GrpcJobPort(grpc::CreateChannel(address(), grpc::InsecureChannelCredentials()));
+    }
+    Digest digest(const std::string& name) const { return *digest_file(path(name + ".exr")); }
+    Json manifest(const std::string& name) const { return Json::parse(*read_file(path(name + ".manifest.json"))); }
+
+    TempDirectory directory;
+    std::unique_ptr<Process> server;
+    int port = 0, status_port = 0;
+};
+
+const std::vector<std::string> kJob{"--algorithm", "bdpt", "--spp", "24", "--resolution", "48x36", "--max-depth", "4"};
+
+Digest embedded(const Service& service, int workers, int threads, const std::vector<std::string>& job) {
+    const std::string name = "embedded" + std::to_string(workers) + "x" + std::to_string(threads);
+    std::vector<std::string> arguments{"render", kScene, "-q", "-o", service.path(name + ".exr"), "--workers",
+                                       std::to_string(workers), "--threads", std::to_string(threads)};
+    arguments.insert(arguments.end(), job.begin(), job.end());
+    EXPECT_EQ(Process("lightloom", arguments, service.path(name + ".log")).wait(), 0) << service.log(name);
+    return service.digest(name);
+}
+
+TEST(Processes, BytesAreTheSameHoweverAJobIsRun) {
+    const Service service({"--shuffle-leases", "11"});
+    const Digest reference = embedded(service, 1, 1, kJob);
+    EXPECT_EQ(embedded(service, 1, 2, kJob), reference);
+    EXPECT_EQ(embedded(service, 3, 1, kJob), reference);
+    EXPECT_EQ(embedded(service, 8, 2, kJob), reference);
+    std::vector<std::unique_ptr<Process>> workers;
+    for (const size_t count : {1, 2, 3, 8}) {
+        while (workers.size() < count)
+            workers.push_back(service.worker("worker" + std::to_string(workers.size()), 1 + int(workers.size()) % 2));
+        const std::string name = "submitted" + std::to_string(count);
+        ASSERT_EQ(service.submit(name, kJob)->wait(), 0) << service.log(name) << service.log("server");
+        EXPECT_EQ(service.digest(name), reference) << count << " workers";
+    }
+}
+
+TEST(Processes, TwoProcessesRenderDisjointUnits) {
+    const Service service;
+    const auto first = service.worker("first", 1), second = service.worker("second", 1);
+    ASSERT_TRUE(wait_until(60, [&] { return service.log("server").find("worker-2") != std::string::npos; }));
+    std::vector<std::string> job = kJob;
+    job[3] = "60";
+    ASSERT_EQ(service.submit("image", job)->wait(), 0) << service.log("image");
+    const Json manifest = service.manifest("image");
+    std::set<int64_t> processes;
+    std::map<std::pair<int, int>, int> rendered;
+    for (const Json& worker : manifest["workers"]) {
+        processes.insert(worker["process_id"].get<int64_t>());
+        EXPECT_FALSE(worker["units"].empty());
+        for (const Json& unit : worker["units"]) ++rendered[{unit[0].get<int>(), unit[1].get<int>()}];
+    }
+    EXPECT_EQ(processes, (std::set<int64_t>{first->pid(), second->pid()}));
+    EXPECT_EQ(rendered.size(), manifest["work"]["units"].get<size_t>());
+    for (const auto& [unit, times] : rendered) EXPECT_EQ(times, 1);
+    EXPECT_EQ(manifest["image"]["sha256"].get<std::string>(), service.digest("image").hex());
+}
+
+TEST(Processes, AWorkerKilledMidUnitCostsTimeOnly) {
+    const Service service;
+    std::vector<std::string> job{"--algorithm", "bdpt", "--spp", "12", "--resolution", "256x256"};
+    const Digest reference = embedded(service, 1, 2, job);
+    auto victim = service.worker("victim", 1);
+    auto client = service.submit("image", job);
+    GrpcJobPort jobs = service.jobs();
+    ASSERT_TRUE(wait_until(60, [&] {
+        const auto list = jobs.list_jobs();
+        return list.ok() && !list->empty() && list->front().unit_leased > 0 && list->front().unit_done > 0;
+    }));
+    victim->signal(SIGKILL);
+    EXPECT_EQ(victim->wait(), 128 + SIGKILL);
+    const auto survivor = service.worker("survivor", 2);
+    ASSERT_EQ(client->wait(), 0) << service.log("image");
+    EXPECT_EQ(service.digest("image"), reference);
+    const Json manifest = service.manifest("image");
+    EXPECT_EQ(manifest["workers"].size(), 2u);
+    EXPECT_GE(manifest["work"]["expired_leases"].get<int>(), 1);
+}
+
+TEST(Processes, ATimeLimitedImageCanBeRenderedAgain) {
+    const Service service;
+    const auto worker = service.worker("worker", 2);
+    ASSERT_EQ(service.submit("timed", {"--algorithm", "bdpt", "--time", "1.5", "--resolution", "64x48"})->wait(), 0)
+        << service.log("timed");
+    const Json manifest = service.manifest("timed");
+    const auto spp = manifest["image"]["samples_per_pixel"].get<uint64_t>();
+    ASSERT_GE(spp, 1u);
+    EXPECT_EQ(embedded(service, 2, 1, {"--algorithm", "bdpt", "--spp", std::to_string(spp), "--resolution", "64x48"}),
+              service.digest("timed"));
+}
+
+TEST(Processes, AWorkerWithAnotherGoldenUnitIsRefusedByName) {
+    const Service service;
+    const std::string fake(64, 'a');
+    EXPECT_EQ(service.worker("liar", 1, {"--pretend-golden-digest", fake})->wait(), 1);
+    EXPECT_NE(service.log("liar").find("golden unit " + fake.substr(0, 16)), std::string::npos) << service.log("liar");
+}
+
+TEST(Processes, SigtermEndsWorkerAndServerCleanly) {
+    Service service;
+    const auto worker = service.worker("worker", 1);
+    ASSERT_TRUE(wait_until(60, [&] { return service.log("worker").find("registered as") != std::string::npos; }));
+    const auto client = service.submit("image", {"--spp", "100000", "--resolution", "128x128"});
+    GrpcJobPort jobs = service.jobs();
+    ASSERT_TRUE(wait_until(60, [&] {
+        const auto list = jobs.list_jobs();
+        return list.ok() && !list->empty() && list->front().unit_done > 0;
+    }));
+    worker->signal(SIGTERM);
+    EXPECT_EQ(worker->wait(), 0) << service.log("worker");
+    EXPECT_EQ(jobs.list_jobs()->front().unit_leased, 0u);
+    client->signal(SIGINT);
+    EXPECT_EQ(client->wait(), 130) << service.log("image");
+    EXPECT_EQ(jobs.list_jobs()->front().state, JobState::kCancelled);
+    EXPECT_FALSE(std::filesystem::exists(service.path("image.exr")));
+    service.server->signal(SIGTERM);
+    EXPECT_EQ(service.server->wait(), 0) << service.log("server");
+}
+
+TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
+    const TempDirectory directory;
+    const std::string log = (directory.path / "log").string();
+    const auto run = [&](std::vector<std::string> arguments) { return Process("lightloom", arguments, log).wait(); };
+    EXPECT_EQ(run({"render", "no-such-scene.pbrt"}), 2);
+    EXPECT_EQ(run({"render", kScene, "--algorithm", "no-such"}), 2);
+    EXPECT_EQ(run({"render", kScene, "--set", "no-such=1"}), 2);
+    EXPECT_EQ(run({"render", kScene, "--resolution", "12"}), 2);
+    EXPECT_EQ(run({"render", kScene, "--spp", "1", "--time", "1"}), 2);
+    EXPECT_EQ(run({"no-such-command"}), 2);
+    EXPECT_EQ(run({"list", "--server", "127.0.0.1:1"}), 4);
+    EXPECT_EQ(run({"--help"}), 0);
+    EXPECT_EQ(run({"algorithms"}), 0);
+    EXPECT_EQ(run({"replay", kScene, "--algorithm", "bdpt", "--iteration", "3", "--pixel", "10,10"}), 0);
+    EXPECT_FALSE(std::filesystem::exists("cornell.exr"));
+}
+
+}  // namespace
+}  // namespace lightloom

@@ -1,0 +1,327 @@
+// Materials, textures, lights, spectra and images.
+
+#include <cmath>
+
+#include "common/import/images.h"
+#include "common/import/spectra.h"
+#include "common/scene/texture.h"
+#include "import_testing.h"
+
+namespace lightloom {
+namespace {
+
+using testing::expect_error;
+using testing::expect_warning;
+using testing::import_world;
+using testing::world;
+
+const std::string kShape = " Shape \"sphere\" ";
+
+/// The material of the first shape.
+Material material_of(const SceneDescription& d) { return d.materials.at(size_t(d.spheres.at(0).attributes.material)); }
+
+Rgb value(const SceneDescription& d, TextureId id, Vec2 uv = {0.3f, 0.3f}) {
+    return evaluate_texture({d.textures, d.images, d.materials}, id, uv);
+}
+
+/// An uncompressed 24-bit TGA; `bgr` holds rows from the bottom.
+std::string tga(int width, int height, const std::string& bgr) {
+    std::string out(18, '\0');
+    out[2] = 2;
+    out[12] = char(width);
+    out[14] = char(height);
+    out[16] = 24;
+    return out + bgr;
+}
+
+TEST(ImportMaterial, DefaultsAreThoseOfPbrt) {
+    SceneDescription d = world(kShape);
+    EXPECT_EQ(material_of(d).kind, MaterialKind::kDiffuse);
+    EXPECT_EQ(value(d, material_of(d).reflectance), Rgb(0.5f));
+    d = world("Material \"diffusetransmission\"" + kShape);
+    EXPECT_EQ(value(d, material_of(d).reflectance), Rgb(0.25f));
+    EXPECT_EQ(value(d, material_of(d).transmittance), Rgb(0.25f));
+    d = world("Material \"diffusetransmission\" \"float scale\" 2" + kShape);
+    EXPECT_EQ(value(d, material_of(d).transmittance), Rgb(0.5f));
+    d = world("Material \"conductor\"" + kShape);
+    EXPECT_EQ(value(d, material_of(d).eta), import::named_metal("metal-Cu")->eta);
+    EXPECT_EQ(value(d, material_of(d).k), import::named_metal("metal-Cu")->k);
+    EXPECT_EQ(value(d, material_of(d).roughness_u), Rgb(0.0f));
+    EXPECT_TRUE(material_of(d).remap_roughness);
+    d = world("Material \"dielectric\" \"float vroughness\" 0.3 \"float roughness\" 0.1 \"bool remaproughness\" false" +
+              kShape);
+    EXPECT_EQ(material_of(d).ior, 1.5f);
+    EXPECT_EQ(value(d, material_of(d).roughness_u), Rgb(0.1f));
+    EXPECT_EQ(value(d, material_of(d).roughness_v), Rgb(0.3f));
+    EXPECT_FALSE(material_of(d).remap_roughness);
+    d = world("Material \"coateddiffuse\"" + kShape);
+    EXPECT_EQ(value(d, material_of(d).reflectance), Rgb(0.5f));
+    EXPECT_EQ(value(d, material_of(d).roughness_u), Rgb(0.0f));
+    EXPECT_EQ(material_of(d).ior, 1.5f);
+    d = world(
+        "Material \"coatedconductor\" \"float interface.roughness\" 0.1 \"float conductor.roughness\" 0.2 \"rgb "
+        "reflectance\" [0.1 0.2 0.3]" +
+        kShape);
+    EXPECT_EQ(value(d, material_of(d).roughness_u), Rgb(0.1f));
+    EXPECT_EQ(value(d, material_of(d).base_roughness_v), Rgb(0.2f));
+    EXPECT_EQ(value(d, material_of(d).reflectance), Rgb(0.1f, 0.2f, 0.3f));
+}
+
+TEST(ImportMaterial, NamedOnesMayComeLaterAndMix) {
+    const SceneDescription d = world(
+        "NamedMaterial \"m\"" + kShape +
+        "MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"a\" \"b\"] \"float amount\" 0.25\n"
+        "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" MakeNamedMaterial \"b\" \"string type\" \"dielectric\"");
+    const Material m = material_of(d);
+    EXPECT_EQ(m.kind, MaterialKind::kMix);
+    EXPECT_EQ(m.name, "m");
+    EXPECT_EQ(d.materials[size_t(m.mix_b)].kind, MaterialKind::kDielectric);
+    EXPECT_EQ(value(d, m.mix_amount), Rgb(0.25f));
+    expect_error("MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"m\" \"m\"]", {"itself"});
+    expect_error("NamedMaterial \"x\"" + kShape, {"scene.pbrt:3", "\"x\""});
+    expect_error("MakeNamedMaterial \"x\"", {"type"});
+    expect_error(
+        "MakeNamedMaterial \"x\" \"string type\" \"diffuse\" MakeNamedMaterial \"x\" \"string type\" \"diffuse\"",
+        {"twice"});
+    std::string chain = "MakeNamedMaterial \"m0\" \"string type\" \"diffuse\"";
+    for (int i = 1; i < 40; ++i) {
+        const std::string previous = "\"m" + std::to_string(i - 1) + "\"";
+        chain += " NamedMaterial " + previous + kShape + "MakeNamedMaterial \"m" + std::to_string(i) +
+                 "\" \"string type\" \"mix\" \"string materials\" [" + previous + previous + "]";
+    }
+    expect_error(chain, {"32 levels"});
+}
+
+TEST(ImportMaterial, InterfaceShapesDoNotExist) {
+    const SceneDescription d = world("Material \"interface\"" + kShape);
+    EXPECT_TRUE(d.spheres.empty() && d.warnings.empty());
+    expect_warning("AreaLightSource \"diffuse\" Material \"interface\"" + kShape, "ignored, as in pbrt");
+}
+
+TEST(ImportMaterial, WhatIsNotModelledIsNamed) {
+    expect_error("Material \"hair\"", {"hair", "not supported"});
+    expect_error("Material \"diffuse\" \"string normalmap\" \"n.png\"", {"normal maps"});
+    expect_error("Material \"diffuse\" \"texture displacement\" \"d\"", {"bump"});
+    expect_error("Material \"diffuse\" \"rgb reflectance\" [1.5 0 0]", {"above 1"});
+    expect_error("Material \"diffuse\" \"rgb reflectance\" [-1 0 0]", {"negative"});
+    expect_error("Material \"diffuse\" \"float reflectance\" 0.5", {"wrong type"});
+    expect_error("Material \"diffuse\" \"float sheen\" 1", {"unknown parameter", "sheen"});
+    expect_error("Material \"conductor\" \"rgb reflectance\" [1 1 1] \"rgb eta\" [1 1 1]", {"not both"});
+    expect_error("Material \"conductor\" \"spectrum eta\" \"metal-Xx-eta\"", {"metal-Xx"});
+    expect_error("Material \"dielectric\" \"float roughness\" 2", {"[0, 1]"});
+    expect_error("Material \"dielectric\" \"float eta\" 0", {"index"});
+    expect_warning("Material \"coateddiffuse\" \"float g\" 0.1", "medium");
+    const Material coat = material_of(world("Material \"coateddiffuse\" \"float thickness\" 0.1 \"integer maxdepth\" 7" + kShape));
+    EXPECT_EQ(coat.thickness, 0.1f);
+    EXPECT_EQ(coat.layer_events, 7);
+    expect_warning("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"" + kShape, "dispersion");
+    EXPECT_NEAR(material_of(world("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"" + kShape)).ior, 1.5168,
+                1e-4);
+}
+
+TEST(ImportTexture, KindsAndNesting) {
+    const SceneDescription d = world(
+        "Texture \"c\" \"spectrum\" \"checkerboard\" \"rgb tex1\" [1 0 0] \"rgb tex2\" [0 1 0] \"float uscale\" 2 "
+        "\"float vscale\" 2\n"
+        "Texture \"h\" \"float\" \"constant\" \"float value\" 0.5\n"
+        "Texture \"s\" \"spectrum\" \"scale\" \"texture tex\" \"c\" \"texture scale\" \"h\"\n"
+        "Texture \"m\" \"spectrum\" \"mix\" \"texture tex1\" \"s\" \"rgb tex2\" [0 0 1] \"float amount\" 0.25\n"
+        "Material \"diffuse\" \"texture reflectance\" \"m\" Shape \"sphere\" \"texture alpha\" \"h\"");
+    const TextureId id = material_of(d).reflectance;
+    EXPECT_EQ(value(d, id, {0.1f, 0.1f}), Rgb(0.375f, 0, 0.25f));
+    EXPECT_EQ(value(d, id, {0.6f, 0.1f}), Rgb(0, 0.375f, 0.25f));
+    EXPECT_EQ(value(d, id, {-0.1f, 0.1f}), Rgb(0, 0.375f, 0.25f));
+    EXPECT_EQ(value(d, d.spheres[0].attributes.alpha), Rgb(0.5f));
+}
+
+TEST(ImportTexture, ImagesAreLookedUpAsInPbrt) {
+    // Bottom row: red, green; top row: blue, white.
+    const testing::FileMap files{{"t.tga", tga(2, 2,
+                                               std::string("\0\0\xff"
+                                                           "\0\xff\0"
+                                                           "\xff\0\0"
+                                                           "\xff\xff\xff",
+                                                           12))}};
+    const auto look = [&](const std::string& options, Vec2 uv) {
+        const SceneDescription d = world("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"t.tga\" " +
+                                             options + " Material \"diffuse\" \"texture reflectance\" \"t\"" + kShape,
+                                         files);
+        return value(d, material_of(d).reflectance, uv);
+    };
+    const std::string point = "\"string filter\" \"point\" ";
+    EXPECT_EQ(look(point, {0.25f, 0.25f}), Rgb(1, 0, 0));
+    EXPECT_EQ(look(point, {0.75f, 0.25f}), Rgb(0, 1, 0));
+    EXPECT_EQ(look(point, {0.25f, 0.75f}), Rgb(0, 0, 1));
+    EXPECT_EQ(look(point, {1.25f, -0.75f}), Rgb(1, 0, 0));
+    EXPECT_EQ(look(point + "\"string wrap\" \"black\"", {1.25f, 0.25f}), Rgb(0, 0, 0));
+    EXPECT_EQ(look(point + "\"string wrap\" \"clamp\"", {5, 0.25f}), Rgb(0, 1, 0));
+    EXPECT_EQ(look(point + "\"bool invert\" true \"float scale\" 0.5", {0.25f, 0.25f}), Rgb(0.5f, 1, 1));
+    EXPECT_EQ(look("\"string wrap\" \"clamp\"", {0.5f, 0.25f}), Rgb(0.5f, 0.5f, 0));
+    EXPECT_EQ(look("", {0.5f, 0.5f}), Rgb(0.5f, 0.5f, 0.5f));
+}
+
+TEST(ImportTexture, EncodingsAndFloats) {
+    const testing::FileMap files{{"g.tga", tga(1, 1, "\x80\x80\x80")},
+                                 {"c.tga", tga(1, 1, std::string("\x30\x60\x90", 3))}};
+    const auto grey = [&](const std::string& options) {
+        const SceneDescription d = world("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"g.tga\" " +
+                                             options + " Shape \"sphere\" \"texture alpha\" \"t\"",
+                                         files);
+        return value(d, d.spheres.at(0).attributes.alpha).g;
+    };
+    EXPECT_NEAR(grey(""), 0.21586, 1e-4);
+    EXPECT_NEAR(grey("\"string encoding\" \"linear\""), 128 / 255.0, 1e-6);
+    EXPECT_NEAR(grey("\"string encoding\" \"gamma 2.2\""), std::pow(128 / 255.0, 2.2), 1e-5);
+    const SceneDescription d = world(
+        "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"c.tga\" \"string encoding\" \"linear\""
+        " Shape \"sphere\" \"texture alpha\" \"t\"",
+        files);
+    EXPECT_NEAR(value(d, d.spheres[0].attributes.alpha).r, 96 / 255.0, 1e-6);
+}
+
+TEST(ImportTexture, Errors) {
+    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.png\"", {"scene.pbrt:3", "no.png"});
+    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.bmp\"", {"bmp", "png"},
+                 {{"no.bmp", "BM"}});
+    for (const char* name : {"a.png", "a.jpg", "a.hdr", "a.tga", "a.exr"})
+        expect_error(std::string("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"") + name + "\"",
+                     {name}, {{name, "rubbish"}});
+    std::string huge = tga(1, 1, "");
+    huge[12] = huge[13] = huge[14] = huge[15] = '\x3f';
+    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.tga\"", {"cannot hold"},
+                 {{"a.tga", huge}});
+    expect_error("Texture \"t\" \"spectrum\" \"marble\"", {"marble", "not supported"});
+    expect_error("Texture \"t\" \"spectrum\" \"checkerboard\" \"string mapping\" \"planar\"", {"mapping", "uv"});
+    expect_error("Texture \"t\" \"spectrum\" \"checkerboard\" \"integer dimension\" 3", {"dimension"});
+    expect_error("Texture \"t\" \"spectrum\" \"scale\" \"texture tex\" \"t\"", {"itself"});
+    expect_error("Texture \"t\" \"colour\" \"constant\"", {"float or spectrum"});
+    expect_error("Texture \"t\" \"float\" \"constant\" Texture \"t\" \"float\" \"constant\"", {"twice"});
+    expect_error("Texture \"t\" \"float\" \"constant\" Material \"diffuse\" \"texture reflectance\" \"t\"",
+                 {"other type"});
+    expect_warning("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"t.tga\" \"string filter\" \"trilinear\"",
+                   "bilinear", {{"t.tga", tga(1, 1, "abc")}});
+    std::string chain = "Texture \"t0\" \"float\" \"checkerboard\"", wide = chain;
+    for (int i = 1; i < 40; ++i) {
+        const std::string name = "\"t" + std::to_string(i) + "\"", previous = "\"t" + std::to_string(i - 1) + "\"";
+        chain += " Shape \"sphere\" \"texture alpha\" " + previous + " Texture " + name +
+                 " \"float\" \"scale\" \"texture tex\" " + previous;
+        if (i < 20)
+            wide += " Texture " + name + " \"float\" \"scale\" \"texture tex\" " + previous + " \"texture scale\" " +
+                    previous;
+    }
+    expect_error(chain, {"31 levels"});
+    expect_error(wide, {"4096"});
+}
+
+TEST(ImportLight, AreaLights) {
+    SceneDescription d =
+        world("AreaLightSource \"diffuse\" \"rgb L\" [1 2 3] \"float scale\" 2 \"bool twosided\" true" + kShape);
+    ASSERT_EQ(d.emissions.size(), 1u);
+    EXPECT_EQ(d.emissions[0].radiance, Rgb(2, 4, 6));
+    EXPECT_TRUE(d.emissions[0].two_sided);
+    EXPECT_EQ(d.spheres[0].attributes.emission, 0);
+    // A sphere of radius 1: flux = pi * area * radiance.
+    d = world("AreaLightSource \"diffuse\" \"float power\" 10" + kShape);
+    EXPECT_NEAR(d.emissions[0].radiance.g, 10 / (3.14159265 * 4 * 3.14159265), 1e-5);
+    // As in pbrt, the power is each triangle's: a 1 x 3 rectangle of two triangles gets one radiance for its area
+    // of 1.5.
+    const std::string quad =
+        "Shape \"trianglemesh\" \"point3 P\" [0 0 0 3 0 0 3 1 0 0 1 0] \"integer indices\" [0 1 2 0 2 3]";
+    d = world("AreaLightSource \"diffuse\" \"float power\" 10 " + quad);
+    ASSERT_EQ(d.meshes.size(), 1u);
+    EXPECT_NEAR(d.emissions.at(0).radiance.g, 10 / (3.14159265 * 1.5), 1e-5);
+    EXPECT_NE(d.warnings.at(0).find("each of the 2 triangles"), std::string::npos);
+    const std::string uneven =
+        "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 0 9 9] \"integer indices\" [0 1 2 1 2 3]";
+    d = world("AreaLightSource \"diffuse\" \"float power\" 10 " + uneven);
+    EXPECT_EQ(d.meshes.size(), 2u);
+    EXPECT_EQ(d.emissions.size(), 2u);
+    expect_error("AreaLightSource \"diffuse\" \"string filename\" \"a.png\"" + kShape, {"images on area lights"});
+    expect_error("AreaLightSource \"diffuse\" \"float strength\" 2" + kShape, {"strength"});
+    expect_error("AreaLightSource \"sphere\"", {"diffuse"});
+    expect_error("AreaLightSource \"diffuse\" Shape \"sphere\" \"float alpha\" 0", {"alpha 0"});
+    expect_error("AreaLightSource \"diffuse\" \"rgb L\" [1e30 1 1] \"float scale\" 1e30" + kShape, {"finite"});
+}
+
+TEST(ImportLight, PointSpotAndDistant) {
+    SceneDescription d =
+        world("Translate 1 0 0 LightSource \"point\" \"rgb I\" [1 2 3] \"point3 from\" [0 1 0] \"float power\" 8");
+    EXPECT_EQ(d.point_lights.at(0).position, (Vec3{1, 1, 0}));
+    EXPECT_NEAR(d.point_lights[0].intensity.g, 2 * 8 / (4 * 3.14159265), 1e-5);
+    d = world(
+        "LightSource \"spot\" \"point3 from\" [0 0 5] \"point3 to\" [0 0 0] \"float coneangle\" 60 \"float "
+        "conedeltaangle\" 60");
+    EXPECT_EQ(d.spot_lights.at(0).axes.n, (Vec3{0, 0, -1}));
+    EXPECT_NEAR(d.spot_lights[0].cos_total, 0.5, 1e-6);
+    EXPECT_NEAR(d.spot_lights[0].cos_falloff, 1, 1e-6);
+    EXPECT_EQ(d.spot_lights[0].intensity, Rgb(1.0f));
+    d = world("LightSource \"spot\" \"float coneangle\" 60 \"float conedeltaangle\" 60 \"float power\" 2");
+    EXPECT_NEAR(d.spot_lights.at(0).intensity.r, 2 / (2 * 3.14159265 * 0.25), 1e-5);
+    d = world("Rotate 90 1 0 0 LightSource \"distant\" \"float illuminance\" 3 \"rgb L\" [1 1 2]");
+    EXPECT_NEAR(d.distant_lights.at(0).direction.y, -1, 1e-6);
+    EXPECT_EQ(d.distant_lights[0].irradiance, Rgb(3, 3, 6));
+    expect_error("LightSource \"distant\" \"point3 from\" [1 1 1] \"point3 to\" [1 1 1]", {"same point"});
+    expect_error("Scale 1 2 1 LightSource \"spot\"", {"similarity"});
+    expect_error("LightSource \"goniometric\"", {"goniometric"});
+    expect_error("LightSource \"point\" \"rgb L\" [1 1 1]", {"unknown parameter"});
+    expect_error("LightSource \"point\" \"float scale\" -1", {"negative"});
+}
+
+TEST(ImportLight, Infinite) {
+    SceneDescription d = world("Rotate 90 0 0 1 LightSource \"infinite\" \"rgb L\" [1 2 3] \"float illuminance\" 5");
+    EXPECT_NEAR(d.infinite_lights.at(0).radiance.b, 3 * 5 / 3.14159265, 1e-5);
+    EXPECT_NEAR(d.infinite_lights[0].light_to_world.m[1][0], 1, 1e-9);
+    const testing::FileMap files{{"e.tga", tga(2, 2, std::string(12, '\xff'))}, {"wide.tga", tga(2, 1, "abcdef")}};
+    d = world("LightSource \"infinite\" \"string filename\" \"e.tga\" \"float scale\" 3", files);
+    EXPECT_EQ(d.infinite_lights.at(0).radiance, Rgb(3.0f));
+    EXPECT_EQ(d.images.at(size_t(d.infinite_lights[0].image)).width, 2);
+    expect_error("LightSource \"infinite\" \"string filename\" \"wide.tga\"", {"square"}, files);
+    expect_error("LightSource \"infinite\" \"string filename\" \"e.tga\" \"rgb L\" [1 1 1]", {"not both"}, files);
+    expect_error("LightSource \"infinite\" \"point3 portal\" [0 0 0 1 0 0 1 1 0 0 1 0]", {"portal"});
+}
+
+TEST(ImportSpectra, Reductions) {
+    // White light is white, whatever names it.
+    bool clipped = false;
+    const Rgb d65 = *import::named_illuminant_rgb("stdillum-D65", &clipped);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(d65[c], 1, 1e-3);
+    const Rgb warm = import::blackbody_rgb(2856, &clipped), a = *import::named_illuminant_rgb("stdillum-A", &clipped);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(warm[c], a[c], 0.01);
+    EXPECT_FALSE(clipped);
+    for (const double kelvin : {150.0, 1000.0, 6500.0, 1e6})
+        EXPECT_NEAR(import::blackbody_rgb(kelvin, &clipped).luminance(), 1, 1e-3) << kelvin;
+    EXPECT_TRUE(clipped);
+    const import::Spectrum flat{{300, 0.4}, {900, 0.4}};
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(import::reflectance_rgb(flat)[c], 0.4, 1e-6);
+    EXPECT_NEAR(import::illuminant_rgb(flat, &clipped)->luminance(), 1, 1e-3);
+    // A conductor's colour at normal incidence is that of its spectral reflectance.
+    const import::ConductorRgb constant = import::conductor_rgb({{300, 0.3}, {900, 0.3}}, {{300, 2.5}, {900, 2.5}});
+    for (int c = 0; c < 3; ++c) {
+        EXPECT_NEAR(constant.eta[c], 0.3, 1e-6);
+        EXPECT_NEAR(constant.k[c], 2.5, 1e-4);
+    }
+    EXPECT_FALSE(import::spectrum_from_pairs({400, 1, 400, 2}).has_value());
+    EXPECT_FALSE(import::spectrum_from_pairs({400, 1, 500}).has_value());
+}
+
+TEST(ImportSpectra, InScenes) {
+    SceneDescription d = world("LightSource \"point\" \"blackbody I\" 3000 \"float scale\" 4");
+    EXPECT_NEAR(d.point_lights.at(0).intensity.luminance(), 4, 0.01);
+    EXPECT_GT(d.point_lights[0].intensity.r, d.point_lights[0].intensity.b);
+    d = world("Material \"diffuse\" \"spectrum reflectance\" \"r.spd\"" + kShape,
+              {{"r.spd", "# grey\n300 0.25\n900 0.25\n"}});
+    EXPECT_NEAR(value(d, material_of(d).reflectance).g, 0.25, 1e-6);
+    d = world("Material \"conductor\" \"spectrum eta\" \"metal-Au-eta\" \"spectrum k\" \"metal-Au-k\"" + kShape);
+    EXPECT_EQ(value(d, material_of(d).eta), import::named_metal("metal-Au")->eta);
+    d = world("Material \"conductor\" \"spectrum eta\" [300 0.2 900 0.2] \"spectrum k\" [300 3 900 3]" + kShape);
+    EXPECT_NEAR(value(d, material_of(d).k).r, 3, 1e-3);
+    expect_warning("LightSource \"point\" \"blackbody I\" 500", "gamut");
+    expect_error("LightSource \"point\" \"spectrum I\" \"stdillum-Z\"", {"stdillum-Z"});
+    expect_error("LightSource \"point\" \"blackbody I\" -3", {"kelvin"});
+    expect_error("Material \"diffuse\" \"spectrum reflectance\" [400 1 300 1]", {"increasing"});
+    expect_error("Material \"diffuse\" \"spectrum reflectance\" \"r.spd\"", {"not a spectrum"}, {{"r.spd", "400 one"}});
+    expect_error("LightSource \"point\" \"spectrum I\" [100 1 200 1]", {"luminance"});
+}
+
+}  // namespace
+}  // namespace lightloom

@@ -1,0 +1,1 @@
+lightloom_test(work_test LINK lt_work)

@@ -1,0 +1,265 @@
+// The plan, the spec's digest, file lists and the asset store.
+
+#include "common/work/job.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "common/work/asset.h"
+#include "common/work/wire.h"
+
+namespace lightloom {
+namespace {
+
+namespace fs = std::filesystem;
+
+FrameLayout frame(int width, int height) { return {width, height, {0, 0, width, height}}; }
+
+/// A columns x rows cut of a window, uneven on purpose.
+std::vector<Rect> cut(const Rect& crop, int columns, int rows) {
+    std::vector<Rect> tiles;
+    for (int j = 0; j < rows; ++j) {
+        for (int i = 0; i < columns; ++i) {
+            tiles.push_back({crop.x0 + crop.width() * i / columns, crop.y0 + crop.height() * j / rows,
+                             crop.x0 + crop.width() * (i + 1) / columns, crop.y0 + crop.height() * (j + 1) / rows});
+        }
+    }
+    return tiles;
+}
+
+class TempDirectory {
+  public:
+    TempDirectory() {
+        std::string name = (fs::temp_directory_path() / "lightloom-test-XXXXXX").string();
+        path = ::mkdtemp(name.data());
+    }
+    ~TempDirectory() { fs::remove_all(path); }
+    fs::path path;
+};
+
+TEST(Plan, TilesCoverTheCropExactlyOnce) {
+    for (const FrameLayout& f : {frame(64, 64), frame(512, 512), frame(1280, 720), frame(1921, 1083), frame(3, 5000),
+                                 frame(5000, 3), FrameLayout{1920, 1080, {100, 200, 1333, 1007}}}) {
+        const Plan plan(f, 1);
+        int64_t area = 0;
+        std::vector<Rect> seen;
+        for (const WorkUnit& unit : plan.units(plan.group(0))) {
+            EXPECT_FALSE(unit.tile.empty());
+            for (const Rect& other : seen) {
+                const bool apart = unit.tile.x1 <= other.x0 || other.x1 <= unit.tile.x0 || unit.tile.y1 <= other.y0 ||
+                                   other.y1 <= unit.tile.y0;
+                EXPECT_TRUE(apart);
+            }
+            seen.push_back(unit.tile);
+            area += unit.tile.area();
+        }
+        EXPECT_EQ(area, f.crop.area());
+        EXPECT_EQ(seen.size(), plan.tile_count());
+    }
+}
+
+TEST(Plan, SmallFramesAreOneTileAndLargeTilesAreLarge) {
+    EXPECT_EQ(Plan(frame(512, 512), 1).tile_count(), 1u);
+    EXPECT_EQ(Plan(frame(1920, 1080), 1, true).tile_count(), 1u);
+    const Plan plan(frame(1920, 1080), 1);
+    for (const WorkUnit& unit : plan.units(plan.group(0))) {
+        EXPECT_GE(unit.tile.width(), 256);
+        EXPECT_GE(unit.tile.height(), 256);
+        EXPECT_LE(unit.tile.area(), 3 << 17);
+    }
+}
+
+TEST(Plan, GroupsGrowByAtMostFivePercentUpToTheCap) {
+    const Plan plan(frame(64, 64), 1);
+    uint64_t done = 0;
+    for (uint32_t i = 0; i < 2000; ++i) {
+        const Group group = plan.group(i);
+        ASSERT_EQ(group.index, i);
+        ASSERT_EQ(group.first_iteration, done);
+        ASSERT_GE(group.iteration_count, 1u);
+        ASSERT_LE(group.iteration_count, std::max<uint64_t>(1, done / 20));
+        ASSERT_LE(int64_t(group.iteration_count) * 64 * 64, int64_t(1) << 18);
+        done += group.iteration_count;
+    }
+    EXPECT_EQ(plan.group(1999).iteration_count, plan.max_group_iterations());
+}
+
+TEST(Plan, BoundedGroupsAreAPrefixOfTheUnboundedOnes) {
+    const Plan plan(frame(100, 80), 0.5);
+    for (const uint64_t iterations : {1, 2, 19, 20, 21, 57, 400, 4001}) {
+        const std::vector<Group> groups = plan.groups_for(iterations);
+        uint64_t sum = 0;
+        for (size_t i = 0; i < groups.size(); ++i) {
+            const Group open = plan.group(uint32_t(i));
+            EXPECT_EQ(groups[i].first_iteration, open.first_iteration);
+            if (i + 1 < groups.size()) EXPECT_EQ(groups[i].iteration_count, open.iteration_count);
+            else EXPECT_LE(groups[i].iteration_count, open.iteration_count);
+            sum += groups[i].iteration_count;
+        }
+        EXPECT_EQ(sum, iterations);
+    }
+    // What a time-limited job keeps is a number of whole groups: asking for that many iterations makes the same groups.
+    uint64_t prefix = 0;
+    for (uint32_t i = 0; i < 60; ++i) {
+        prefix += plan.group(i).iteration_count;
+        const std::vector<Group> again = plan.groups_for(prefix);
+        ASSERT_EQ(again.size(), i + 1);
+        EXPECT_EQ(again.back().iteration_count, plan.group(i).iteration_count);
+    }
+}
+
+TEST(Plan, LightPathSharesSumToTheTotalAndFollowTheArea) {
+    for (const Rect& crop : {Rect{0, 0, 1234, 777}, Rect{13, 57, 640, 481}, Rect{0, 0, 7, 5}}) {
+        const std::vector<Rect> tiles = cut(crop, 7, 5);
+        for (const double per_pixel : {0.0, 0.001, 0.37, 1.0, 2.5, 20.0}) {
+            for (const uint32_t iterations : {1u, 3u, 64u}) {
+                const auto units = split_group({4, 100, iterations}, tiles, per_pixel);
+                ASSERT_EQ(units.size(), 35u);
+                const double exact = per_pixel * iterations * double(crop.area());
+                uint64_t next = 0;
+                for (const WorkUnit& unit : units) {
+                    EXPECT_EQ(unit.first_light_path, next);
+                    next += unit.light_path_count;
+                    const double share = exact * double(unit.tile.area()) / double(crop.area());
+                    EXPECT_NEAR(double(unit.light_path_count), share, 1.5);
+                }
+                EXPECT_EQ(next, uint64_t(exact + 0.5));
+            }
+        }
+    }
+}
+
+TEST(Plan, OneLightPathPerPixelGivesEveryTileItsArea) {
+    for (const WorkUnit& unit : split_group({0, 0, 3}, cut({5, 5, 700, 400}, 7, 5), 1.0))
+        EXPECT_EQ(unit.light_path_count, uint64_t(3 * unit.tile.area()));
+}
+
+TEST(JobSpec, DigestChangesWithEverythingThatChangesTheImageAndOnlyThat) {
+    JobSpec spec;
+    spec.frame = frame(64, 48);
+    spec.max_depth = 5;
+    const Digest base = spec.image_digest();
+    JobSpec other = spec;
+    other.samples_per_pixel = 99;
+    other.time_limit_seconds = 3;
+    EXPECT_EQ(other.image_digest(), base);
+    const auto differs = [&](auto change) {
+        JobSpec changed = spec;
+        change(changed);
+        EXPECT_NE(changed.image_digest(), base);
+    };
+    differs([](JobSpec& s) { s.algorithm = "bdpt"; });
+    differs([](JobSpec& s) { s.parameters["a"] = "1"; });
+    differs([](JobSpec& s) { s.seed = 1; });
+    differs([](JobSpec& s) { s.max_depth = 6; });
+    differs([](JobSpec& s) { s.scene_root.bytes[3] = 1; });
+    differs([](JobSpec& s) { s.frame.crop.x1 = 63; });
+    differs([](JobSpec& s) { s.frame.width = 65; });
+}
+
+TEST(AssetPath, OnlyPlainRelativePathsTravel) {
+    for (const char* good : {"a", "a/b.ply", "a b/c", "..a/b..", "\xc3\xa4/x"}) EXPECT_TRUE(validate_asset_path(good).ok()) << good;
+    for (const char* bad : {"", "/a", "../a", "a/../b", "a/./b", "a//b", "a/", ".", "..", "a\\b", "a\nb", "a\x7f"})
+        EXPECT_FALSE(validate_asset_path(bad).ok()) << bad;
+    EXPECT_FALSE(validate_asset_path(std::string(300, 'x')).ok());
+    EXPECT_FALSE(validate_asset_path(std::string_view("a\0b", 3)).ok());
+}
+
+TEST(AssetManifest, CanonicalTextIsTheOnlyOneAccepted) {
+    const TempDirectory directory;
+    fs::create_directories(directory.path / "meshes");
+    std::ofstream(directory.path / "scene.pbrt") << "Camera";
+    std::ofstream(directory.path / "meshes/a.ply") << "ply";
+    const auto manifest = AssetManifest::of_files(directory.path, {"scene.pbrt", "meshes/a.ply", "scene.pbrt"});
+    ASSERT_TRUE(manifest.ok());
+    ASSERT_EQ(manifest->entries.size(), 2u);
+    EXPECT_EQ(manifest->main, "scene.pbrt");
+    const std::string text = manifest->canonical_text();
+    const auto again = AssetManifest::parse(text);
+    ASSERT_TRUE(again.ok()) << again.status().message();
+    EXPECT_EQ(again->root(), manifest->root());
+    EXPECT_FALSE(AssetManifest::parse(text + "x").ok());
+    EXPECT_FALSE(AssetManifest::parse(text.substr(0, text.size() - 1)).ok());
+    for (size_t i = 0; i < text.size(); ++i) {
+        std::string changed = text;
+        changed[i] = changed[i] == '/' ? '\n' : '/';
+        const auto parsed = AssetManifest::parse(changed);
+        if (parsed.ok()) EXPECT_EQ(parsed->canonical_text(), changed);
+    }
+    EXPECT_FALSE(AssetManifest::of_files(directory.path, {"../x"}).ok());
+    EXPECT_EQ(AssetManifest::of_files(directory.path, {"none"}).status().code(), StatusCode::kNotFound);
+}
+
+TEST(AssetStore, UploadsResumeAndAreVerified) {
+    const TempDirectory directory;
+    AssetStore store(directory.path, 1 << 20);
+    const std::string bytes(100000, 'q');
+    const Digest digest = sha256(bytes);
+    {
+        auto upload = store.begin_upload(digest, bytes.size());
+        ASSERT_TRUE(upload.ok());
+        ASSERT_TRUE(upload->append(std::string_view(bytes).substr(0, 40000)).ok());
+        EXPECT_EQ(store.begin_upload(digest, bytes.size()).status().code(), StatusCode::kAborted);
+    }
+    EXPECT_FALSE(store.contains(digest));
+    EXPECT_EQ(store.committed_size(digest), 40000u);
+    auto upload = store.begin_upload(digest, bytes.size());
+    ASSERT_TRUE(upload.ok());
+    ASSERT_EQ(upload->offset(), 40000u);
+    ASSERT_TRUE(upload->append(std::string_view(bytes).substr(40000)).ok());
+    EXPECT_EQ(upload->append("x").code(), StatusCode::kInvalidArgument);
+    ASSERT_TRUE(upload->finish().ok());
+    ASSERT_TRUE(store.contains(digest));
+    EXPECT_EQ(*store.read(digest), bytes);
+
+    const Digest wrong = sha256("something else");
+    EXPECT_EQ(store.put(wrong, "not it").code(), StatusCode::kDataLoss);
+    EXPECT_FALSE(store.contains(wrong));
+    EXPECT_EQ(store.committed_size(wrong), 0u);
+    EXPECT_EQ(store.begin_upload(wrong, 2 << 20).status().code(), StatusCode::kResourceExhausted);
+}
+
+TEST(AssetStore, DamageIsNoticedBeforeUse) {
+    const TempDirectory directory;
+    AssetStore store(directory.path / "store");
+    const Digest digest = sha256("content");
+    ASSERT_TRUE(store.put(digest, "content").ok());
+    AssetManifest manifest{"a", {{"a", digest, 7}}};
+    ASSERT_TRUE(store.materialise(manifest, directory.path / "out").ok());
+    std::ofstream(store.path_of(digest)) << "c0ntent";
+    EXPECT_EQ(store.materialise(manifest, directory.path / "out2").code(), StatusCode::kDataLoss);
+    EXPECT_FALSE(store.contains(digest));
+}
+
+TEST(Wire, SpecAndUnitsSurviveTheRoundTrip) {
+    JobSpec spec;
+    spec.algorithm = "bdpt";
+    spec.parameters = {{"a", "1"}, {"b", "2"}};
+    spec.seed = ~0ull;
+    spec.samples_per_pixel = 7;
+    spec.max_depth = -1;
+    spec.width = 640;
+    spec.height = 480;
+    spec.scene_root = sha256("x");
+    spec.frame = {640, 480, {1, 2, 3, 4}};
+    const UnitLease lease{"job-1", spec, {.key = {3, 4}, .first_iteration = 5, .iteration_count = 6, .tile = {1, 2, 3, 4},
+                                          .first_light_path = 7, .light_path_count = 8}};
+    v1::UnitLease message;
+    wire::put(lease, &message);
+    const auto back = wire::get(message);
+    ASSERT_TRUE(back.ok());
+    EXPECT_EQ(back->spec.image_digest(), spec.image_digest());
+    EXPECT_EQ(back->spec.max_depth, -1);
+    EXPECT_EQ(back->unit.key, lease.unit.key);
+    EXPECT_EQ(back->unit.tile, lease.unit.tile);
+    EXPECT_EQ(back->unit.light_path_count, 8u);
+    message.mutable_spec()->mutable_scene_root()->set_sha256("short");
+    EXPECT_EQ(wire::get(message).status().code(), StatusCode::kInvalidArgument);
+    EXPECT_FALSE(wire::get(v1::SubmitResultResponse()).ok()) << "UNSPECIFIED must be refused";
+}
+
+}  // namespace
+}  // namespace lightloom

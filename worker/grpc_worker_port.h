@@ -1,0 +1,32 @@
+#pragma once
+// WorkerPort over gRPC.
+
+#include <grpcpp/channel.h>
+
+#include "common/work/service.h"
+#include "lightloom/v1/asset_service.grpc.pb.h"
+#include "lightloom/v1/worker_service.grpc.pb.h"
+
+namespace lightloom {
+
+class GrpcWorkerPort final : public WorkerPort {
+  public:
+    explicit GrpcWorkerPort(const std::shared_ptr<grpc::Channel>& channel);
+    Result<WorkerGrant> register_worker(const WorkerHello& hello) override;
+    Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds,
+                                               std::stop_token stop) override;
+    Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id,
+                                                 const std::vector<RunningUnit>& running) override;
+    Result<SubmitAck> submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial,
+                                    double render_seconds) override;
+    Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why) override;
+    Status goodbye(const std::string& worker_id) override;
+    Status read_asset(const Digest& digest, uint64_t offset,
+                      const std::function<Status(std::string_view)>& sink) override;
+
+  private:
+    std::unique_ptr<v1::WorkerService::Stub> worker_;
+    std::unique_ptr<v1::AssetService::Stub> assets_;
+};
+
+}  // namespace lightloom

@@ -1,0 +1,108 @@
+// lightloom-worker: renders units for a coordinator.
+
+#include <grpcpp/create_channel.h>
+#include <signal.h>
+#include <spdlog/spdlog.h>
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <thread>
+
+#include "common/core/log.h"
+#include "common/work/identity.h"
+#include "worker/grpc_worker_port.h"
+#include "worker/scene_cache.h"
+
+namespace {
+
+std::filesystem::path default_cache() {
+    if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache) return std::filesystem::path(cache) / "lightloom";
+    if (const char* home = std::getenv("HOME"); home && *home) return std::filesystem::path(home) / ".cache" / "lightloom";
+    return std::filesystem::temp_directory_path() / "lightloom-cache";
+}
+
+std::string host_name() {
+    char name[256] = {};
+    return ::gethostname(name, sizeof name - 1) == 0 ? name : "unknown";
+}
+
+constexpr const char* kFooter = R"(A worker calls its coordinator and listens on no port, so start as many as you like, wherever you like:
+
+  lightloom-worker --server render1:50051
+  lightloom-worker --server render1:50051 --threads 8
+
+It must be the same build as the coordinator's; a worker that would render other bytes is refused and says why. SIGTERM
+or Ctrl-C finishes the unit in work, then leaves.
+
+Exit codes: 0 stopped as asked, 1 refused by the coordinator or failed, 2 bad command line.)";
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    using namespace lightloom;
+    CLI::App app{"Renders work units for a Lightloom coordinator.", "lightloom-worker"};
+    app.footer(kFooter);
+    std::string server = "127.0.0.1:50051", level = "info", golden_override;
+    std::string cache = default_cache().string();
+    uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
+    app.add_option("--server", server, "HOST:PORT of the coordinator")->capture_default_str();
+    app.add_option("--threads", threads, "Threads to render with")->check(CLI::Range(1, 1024))->capture_default_str();
+    app.add_option("--cache", cache, "Directory for scene files; may be shared by the workers of a host")->capture_default_str();
+    app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
+    app.add_option("--pretend-golden-digest", golden_override, "")->group("");  // tests of the refusal
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? 0 : 2;
+    }
+    if (!set_up_logging("lightloom-worker", level)) {
+        std::cerr << "unknown log level \"" << level << "\"\n";
+        return 2;
+    }
+    // Signals are taken by one thread of their own; all others inherit the blocked mask.
+    sigset_t signals;
+    sigemptyset(&signals);
+    sigaddset(&signals, SIGINT);
+    sigaddset(&signals, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+    std::stop_source stop;
+    std::thread([signals, stop]() mutable {
+        int signal = 0;
+        sigwait(&signals, &signal);
+        spdlog::info("stopping: no new units, the running one is finished");
+        stop.request_stop();
+        sigwait(&signals, &signal);
+        _exit(1);  // asked twice
+    }).detach();
+
+    const tbb::global_control parallelism(tbb::global_control::max_allowed_parallelism, threads);
+    auto identity = build_identity();
+    if (!identity.ok()) {
+        spdlog::error("the golden unit failed on this host: {}", identity.status().message());
+        return 1;
+    }
+    if (!golden_override.empty()) {
+        const auto digest = Digest::from_hex(golden_override);
+        if (!digest.ok()) return 2;
+        identity->golden_digest = *digest;
+    }
+    grpc::ChannelArguments arguments;
+    arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 20000);
+    arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
+    arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2000);
+    GrpcWorkerPort port(grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments));
+    SceneFetcher fetcher(port, cache);
+    RendererCache renderers([&](const JobSpec& spec, std::stop_token s) { return fetcher.scene(spec, s); });
+    Worker worker(port, {.identity = *identity, .thread_count = threads, .host = host_name(), .process_id = uint64_t(::getpid())},
+                  [&](const JobSpec& spec, std::stop_token s) { return renderers.renderer(spec, s); });
+    const Status status = worker.run(stop.get_token());
+    if (!status.ok()) {
+        spdlog::error("{}", status.message());
+        return 1;
+    }
+    return 0;
+}

@@ -1,0 +1,233 @@
+#include "worker/worker.h"
+
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <random>
+#include <thread>
+
+namespace lightloom {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Full-jitter exponential back-off: workers that lost the same coordinator must not come back all at once.
+class Backoff {
+  public:
+    double next() {
+        const double limit = std::min(5.0, 0.1 * double(1u << std::min(attempt_++, 6u)));
+        return std::uniform_real_distribution<double>(0.02, limit)(engine_);
+    }
+    void reset() { attempt_ = 0; }
+
+  private:
+    unsigned attempt_ = 0;
+    std::minstd_rand engine_{std::random_device{}()};
+};
+
+constexpr double kLeaseWaitSeconds = 1;
+constexpr int kSubmitAttempts = 40;
+
+}  // namespace
+
+Worker::Worker(WorkerPort& port, WorkerOptions options, RendererSource renderers)
+    : port_(port), options_(std::move(options)), renderers_(std::move(renderers)), arena_(int(options_.thread_count)) {}
+
+std::string Worker::id() {
+    const std::lock_guard lock(mutex_);
+    return grant_.worker_id;
+}
+
+void Worker::wait(double seconds, std::stop_token stop) {
+    std::unique_lock lock(mutex_);
+    wake_.wait_for(lock, stop, std::chrono::duration<double>(seconds), [] { return false; });
+}
+
+Status Worker::sign_in(std::stop_token stop, const std::string& stale_id) {
+    const std::lock_guard only_one(sign_in_mutex_);
+    if (id() != stale_id) return {};  // another lane was faster
+    const WorkerHello hello{options_.identity, options_.thread_count, options_.host, options_.process_id};
+    Backoff backoff;
+    bool complained = false;
+    while (!stop.stop_requested()) {
+        const auto grant = port_.register_worker(hello);
+        if (grant.ok()) {
+            spdlog::info("registered as {}", grant->worker_id);
+            const std::lock_guard lock(mutex_);
+            grant_ = *grant;
+            return {};
+        }
+        const StatusCode code = grant.status().code();
+        if (code != StatusCode::kUnavailable && code != StatusCode::kDeadlineExceeded) {
+            const std::lock_guard lock(mutex_);
+            refusal_ = grant.status();
+            return grant.status();
+        }
+        if (!complained) spdlog::warn("waiting for the coordinator: {}", grant.status().message());
+        complained = true;
+        wait(backoff.next(), stop);
+    }
+    return {StatusCode::kCancelled, "stopped"};
+}
+
+Status Worker::run(std::stop_token stop) {
+    if (Status s = sign_in(stop, {}); !s.ok()) return s.code() == StatusCode::kCancelled ? Status() : s;
+    std::stop_source internal;  // also ends the worker when a later registration is refused
+    const std::stop_callback forward(stop, [&] { internal.request_stop(); });
+    {
+        std::jthread beats([this](std::stop_token beat_stop) { heartbeats(beat_stop); });
+        const auto drain_guard = [&](std::stop_token guard_stop) {
+            // Waits for the stop, then grants the running unit its time.
+            std::unique_lock lock(mutex_);
+            wake_.wait(lock, guard_stop, [&] { return internal.stop_requested(); });
+            if (guard_stop.stop_requested()) return;
+            wake_.wait_for(lock, guard_stop, std::chrono::duration<double>(options_.drain_seconds), [] { return false; });
+            for (auto& [unit, running] : running_) running.stop.request_stop();
+        };
+        std::jthread guard(drain_guard);
+        const std::stop_callback wake_guard(internal.get_token(), [&] {
+            const std::lock_guard lock(mutex_);
+            wake_.notify_all();
+        });
+        const auto work = [&] {
+            lane(internal.get_token());
+            bool refused = false;
+            {
+                const std::lock_guard lock(mutex_);
+                refused = !refusal_.ok();
+            }
+            if (refused) internal.request_stop();
+        };
+        // Two lanes: while one renders, the other submits its partial and leases the next unit.
+        std::jthread first(work), second(work);
+        first.join();
+        second.join();
+    }
+    (void)port_.goodbye(id());
+    const std::lock_guard lock(mutex_);
+    return refusal_;
+}
+
+void Worker::lane(std::stop_token stop) {
+    Backoff backoff;
+    while (!stop.stop_requested()) {
+        const std::string worker_id = id();
+        const auto leases = port_.lease_units(worker_id, kLeaseWaitSeconds, stop);
+        if (leases.ok()) {
+            backoff.reset();
+            for (const UnitLease& lease : *leases) run_unit(lease, stop);
+        } else if (leases.status().code() == StatusCode::kNotFound) {
+            if (!sign_in(stop, worker_id).ok()) return;
+        } else if (!stop.stop_requested()) {
+            spdlog::debug("lease: {}", leases.status().message());
+            wait(backoff.next(), stop);
+        }
+    }
+}
+
+void Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
+    const UnitReference reference = lease.reference();
+    std::stop_token unit_stop;
+    {
+        const std::lock_guard lock(mutex_);
+        const auto [item, fresh] = running_.try_emplace(reference);
+        if (!fresh) return;  // the other lane has it: its lease ran out and came back to us
+        unit_stop = item->second.stop.get_token();
+    }
+    double seconds = 0;
+    auto partial = render(lease, unit_stop, stop, &seconds);
+    if (partial.ok()) {
+        submit(lease, *std::move(partial), seconds, stop);
+    } else {
+        const Status status = port_.release_unit(id(), reference, partial.status());
+        if (!status.ok()) spdlog::debug("release: {}", status.message());
+        if (partial.status().code() != StatusCode::kCancelled)
+            spdlog::error("{} unit {}/{}: {}", reference.job_id, reference.key.group, reference.key.tile,
+                          partial.status().message());
+    }
+    const std::lock_guard lock(mutex_);
+    running_.erase(reference);
+}
+
+Result<Partial> Worker::render(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain, double* seconds) {
+    const auto renderer = renderers_(lease.spec, unit_stop);
+    if (!renderer.ok()) return renderer.status();
+    const std::lock_guard only_one(render_mutex_);
+    if (unit_stop.stop_requested() || drain.stop_requested()) return Status(StatusCode::kCancelled, "given back");
+    announce_rendering(lease.reference());
+    const UnitWork work = unit_work(lease.unit);
+    const auto begin = Clock::now();
+    auto partial = arena_.execute([&] { return (*renderer)->render(work, unit_stop); });
+    *seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+    return partial;
+}
+
+void Worker::submit(const UnitLease& lease, Partial partial, double seconds, std::stop_token stop) {
+    Backoff backoff;
+    for (int attempt = 0; attempt < kSubmitAttempts; ++attempt) {
+        const std::string worker_id = id();
+        const auto ack = port_.submit_result(worker_id, lease, partial, seconds);
+        const WorkUnit& unit = lease.unit;
+        if (ack.ok()) {
+            if (ack->outcome == SubmitOutcome::kRejected || ack->outcome == SubmitOutcome::kDuplicateDifferent)
+                spdlog::error("{} unit {}/{}: {}", lease.job_id, unit.key.group, unit.key.tile, ack->reason);
+            return;
+        }
+        const StatusCode code = ack.status().code();
+        if (code == StatusCode::kNotFound) {
+            if (!sign_in(stop, worker_id).ok()) return;
+        } else if (code == StatusCode::kUnavailable || code == StatusCode::kDeadlineExceeded) {
+            wait(backoff.next(), stop);
+            if (stop.stop_requested() && attempt > 2) return;  // the unit will be leased again
+        } else {
+            spdlog::error("{} unit {}/{}: {}", lease.job_id, unit.key.group, unit.key.tile, ack.status().message());
+            (void)port_.release_unit(worker_id, lease.reference(), ack.status());
+            return;
+        }
+    }
+}
+
+void Worker::announce_rendering(const UnitReference& unit) {
+    bool first = false;
+    {
+        const std::lock_guard lock(mutex_);
+        running_[unit].rendering = true;
+        first = announced_jobs_.insert(unit.job_id).second;
+    }
+    // The clock of a time-limited job starts here: the coordinator must hear of it at once.
+    if (first) send_heartbeat();
+}
+
+void Worker::send_heartbeat() {
+    std::vector<RunningUnit> running;
+    std::string worker_id;
+    {
+        const std::lock_guard lock(mutex_);
+        worker_id = grant_.worker_id;
+        for (const auto& [unit, state] : running_) running.push_back({unit, state.rendering});
+    }
+    const auto revoked = port_.heartbeat(worker_id, running);
+    if (!revoked.ok()) {
+        spdlog::debug("heartbeat: {}", revoked.status().message());
+        return;
+    }
+    const std::lock_guard lock(mutex_);
+    for (const UnitReference& unit : *revoked) {
+        const auto item = running_.find(unit);
+        if (item != running_.end()) item->second.stop.request_stop();
+    }
+}
+
+void Worker::heartbeats(std::stop_token stop) {
+    while (!stop.stop_requested()) {
+        double interval = 1;
+        {
+            const std::lock_guard lock(mutex_);
+            interval = grant_.heartbeat_seconds;
+        }
+        send_heartbeat();
+        wait(interval, stop);
+    }
+}
+
+}  // namespace lightloom

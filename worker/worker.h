@@ -1,0 +1,71 @@
+#pragma once
+// Worker: leases units from a coordinator, renders them one at a time on all of its threads, and submits the partials. Knows
+// neither gRPC (that is the port) nor light transport (that is the renderer source).
+
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <stop_token>
+#include <string>
+
+#include <tbb/task_arena.h>
+
+#include "common/transport/renderer.h"
+#include "common/work/service.h"
+
+namespace lightloom {
+
+/// The renderer of a job; fetches and builds what it needs, and may keep it for the next call. Called from several threads.
+using RendererSource = std::function<Result<std::shared_ptr<const Renderer>>(const JobSpec& spec, std::stop_token stop)>;
+
+struct WorkerOptions {
+    BuildIdentity identity;
+    uint32_t thread_count = 1;
+    std::string host;          ///< For people.
+    uint64_t process_id = 0;   ///< For people.
+    double drain_seconds = 20; ///< How long a stopping worker may take to finish the unit that it renders.
+};
+
+class Worker {
+  public:
+    Worker(WorkerPort& port, WorkerOptions options, RendererSource renderers);
+
+    /// Works until a stop is requested: then takes no new unit, finishes the one that it renders (or gives it back after
+    /// drain_seconds), and returns OK. An unreachable coordinator is waited for; a refused registration is returned.
+    Status run(std::stop_token stop);
+
+  private:
+    struct Running {
+        std::stop_source stop;
+        bool rendering = false;
+    };
+
+    Status sign_in(std::stop_token stop, const std::string& stale_id);
+    std::string id();
+    void lane(std::stop_token stop);
+    void run_unit(const UnitLease& lease, std::stop_token stop);
+    Result<Partial> render(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain, double* seconds);
+    void submit(const UnitLease& lease, Partial partial, double seconds, std::stop_token stop);
+    void heartbeats(std::stop_token stop);
+    void send_heartbeat();
+    void announce_rendering(const UnitReference& unit);
+    void wait(double seconds, std::stop_token stop);
+
+    WorkerPort& port_;
+    const WorkerOptions options_;
+    const RendererSource renderers_;
+    tbb::task_arena arena_;
+    std::mutex render_mutex_;  ///< One unit renders at a time, on all threads.
+    std::mutex sign_in_mutex_;
+    std::mutex mutex_;         ///< Guards what follows.
+    std::condition_variable_any wake_;
+    WorkerGrant grant_;
+    std::map<UnitReference, Running> running_;
+    std::set<std::string> announced_jobs_;
+    Status refusal_;
+};
+
+}  // namespace lightloom
