@@ -19,6 +19,9 @@
 #define STBI_ONLY_HDR
 #define STBI_NO_STDIO
 #define STBI_MAX_DIMENSIONS 16384
+// Its conversions between 8-bit and floating-point pixels take a power: ours, because libm's depends on the host. (The
+// standard header is included above already, so that only the decoder sees the macro.)
+#define pow(base, exponent) ::lightloom::math::pow(double(base), double(exponent))
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-function"
 #pragma GCC diagnostic ignored "-Wunused-parameter"
@@ -27,6 +30,7 @@
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 #include <stb/stb_image.h>
 #pragma GCC diagnostic pop
+#undef pow
 
 namespace lightloom::import {
 namespace {
