@@ -55,16 +55,16 @@ TEST(Furnace, BoxTruncatedAtEveryDepth) {
     family.check();
 }
 
-/// The same for every subset of bdpt's techniques: each samples all paths of two edges or more here.
+/// The same for every subset of bdpt's techniques that contains hits. (Next event and connections alone have no finite
+/// variance in the corners of the box, where 1 / d^2 has no bound, and a test of their means would mean nothing.)
 TEST(Furnace, BoxWithAnyTechniqueSubset) {
     TestFamily family;
     const auto scene = furnace_box(0.5f);
-    for (int mask = 1; mask < 16; ++mask) {
+    for (int mask = 0; mask < 8; ++mask) {
         MaskedSelection subset{testing::bdpt_selection(*scene)};
         subset.min_k = 2;
-        subset.hits = mask & 1, subset.next_event = mask & 2, subset.connections = mask & 4, subset.light_tracing = mask & 8;
-        // Connections alone begin with three edges.
-        const double shortest = mask == 4 ? 0.25 : 0.5, expected = (shortest - std::pow(0.5, 5)) / (1 - 0.5);
+        subset.next_event = mask & 1, subset.connections = mask & 2, subset.light_tracing = mask & 4;
+        const double expected = (0.5 - std::pow(0.5, 5)) / (1 - 0.5);
         const auto image = testing::algorithm_image(scene, BdptAlgorithm<MaskedSelection>{subset}, 4, 32);
         expect_constant(testing::replicate(image, scene->frame().crop, kSeeds, 5000 + 100 * uint64_t(mask)), expected,
                         "techniques " + std::to_string(mask), &family);
@@ -106,11 +106,16 @@ TEST(Analytic, FacingSquares) {
     b.look({0, 0, d / 2}, {0, 0, d}, float(2 * std::atan(0.5 / (d / 2)) * 180 / kPiD));
     const auto scene = b.build();
     const double expected = 3 * 0.8 * facing_squares(d);
-    for (const char* algorithm : kAlgorithms) {
-        const RegionMeans means =
-            testing::replicate(testing::catalog_image(scene, algorithm, 1, 32), scene->frame().crop, kSeeds, 8000);
-        EXPECT_LT(means.frame().relative_error(), 0.002) << algorithm;
-        family.add(testing::one_sample_p_value(means.frame(), expected), algorithm);
+    const auto expect = [&](const testing::ImageOfSeed& image, const std::string& what) {
+        const RegionMeans means = testing::replicate(image, scene->frame().crop, kSeeds, 8000);
+        EXPECT_LT(means.frame().relative_error(), 0.005) << what;
+        family.add(testing::one_sample_p_value(means.frame(), expected), what);
+    };
+    for (const char* algorithm : kAlgorithms) expect(testing::catalog_image(scene, algorithm, 1, 128), algorithm);
+    for (int s = 0; s <= 2; ++s) {
+        MaskedSelection only{testing::bdpt_selection(*scene)};
+        only.only_s = s;
+        expect(testing::algorithm_image(scene, BdptAlgorithm<MaskedSelection>{only}, 1, 128), "s = " + std::to_string(s));
     }
     family.check();
 }
@@ -137,8 +142,8 @@ TEST(Analytic, SphereOverPlane) {
         }
     for (const char* algorithm : kAlgorithms) {
         const RegionMeans means =
-            testing::replicate(testing::catalog_image(scene, algorithm, 1, 32), scene->frame().crop, kSeeds, 9000);
-        EXPECT_LT(means.frame().relative_error(), 0.002) << algorithm;
+            testing::replicate(testing::catalog_image(scene, algorithm, 1, 128), scene->frame().crop, kSeeds, 9000);
+        EXPECT_LT(means.frame().relative_error(), 0.005) << algorithm;
         family.add(testing::one_sample_p_value(means.frame(), expected), algorithm);
     }
     family.check();
