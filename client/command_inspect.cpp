@@ -22,8 +22,9 @@ struct Options {
 };
 
 const char* name_of(MaterialKind kind) {
-    constexpr std::array<const char*, 8> kNames{"diffuse",        "diffusetransmission", "conductor",       "dielectric",
-                                                "thindielectric", "coateddiffuse",       "coatedconductor", "mix"};
+    constexpr std::array<const char*, 8> kNames{
+        "diffuse",        "diffusetransmission", "conductor",       "dielectric",
+        "thindielectric", "coateddiffuse",       "coatedconductor", "mix"};
     return kNames[size_t(kind)];
 }
 
@@ -47,41 +48,52 @@ std::map<std::string, size_t> count_kinds(const Items& items) {
     return counts;
 }
 
-nlohmann::json describe(const SceneDescription& d, const SceneSummary& s, const std::vector<std::string>& files, double import_seconds) {
+nlohmann::json describe(const SceneDescription& d, const SceneSummary& s, const std::vector<std::string>& files,
+                        double import_seconds) {
     nlohmann::json out;
     out["triangles"] = s.triangle_count;
     out["triangles_instanced"] = s.instanced_triangle_count;
     out["triangles_emissive"] = s.emissive_triangle_count;
     out["spheres"] = s.sphere_count;
     out["instances"] = s.instance_count;
-    out["camera"] = {{"kind", "perspective"}, {"fov_degrees", d.camera.fov_degrees}, {"lens_radius", d.camera.lens_radius}};
+    out["camera"] = {
+        {"kind", "perspective"}, {"fov_degrees", d.camera.fov_degrees}, {"lens_radius", d.camera.lens_radius}};
     out["film"] = {{"width", d.film.width}, {"height", d.film.height}, {"exposure_scale", d.film.exposure_scale}};
     out["max_depth"] = d.max_depth;
     out["samples_per_pixel"] = d.samples_per_pixel;
     out["lights"] = nlohmann::json::array();
     for (const SceneSummary::Light& l : s.lights)
-        out["lights"].push_back({{"kind", l.kind}, {"where", l.where}, {"power", l.power}, {"primitives", l.primitives}});
+        out["lights"].push_back(
+            {{"kind", l.kind}, {"where", l.where}, {"power", l.power}, {"primitives", l.primitives}});
     out["materials"] = nlohmann::json::array();
     for (const Material& m : d.materials) out["materials"].push_back({{"name", m.name}, {"kind", name_of(m.kind)}});
     out["textures"] = count_kinds(d.textures);
     out["images"] = nlohmann::json::array();
     for (const Image& i : d.images)
-        out["images"].push_back({{"file", i.name}, {"width", i.width}, {"height", i.height}, {"channels", i.channels}, {"bytes", i.memory_bytes()}});
-    out["memory_bytes"] = {{"geometry", s.geometry_bytes}, {"acceleration", s.acceleration_bytes}, {"images", s.image_bytes}};
+        out["images"].push_back({{"file", i.name},
+                                 {"width", i.width},
+                                 {"height", i.height},
+                                 {"channels", i.channels},
+                                 {"bytes", i.memory_bytes()}});
+    out["memory_bytes"] = {
+        {"geometry", s.geometry_bytes}, {"acceleration", s.acceleration_bytes}, {"images", s.image_bytes}};
     out["seconds"] = {{"import", import_seconds}, {"build", s.build_seconds}};
     out["files"] = files;
     out["ignored"] = d.warnings;
     return out;
 }
 
-void print(const SceneDescription& d, const SceneSummary& s, const std::string& path, size_t file_count, double import_seconds) {
+void print(const SceneDescription& d, const SceneSummary& s, const std::string& path, size_t file_count,
+           double import_seconds) {
     std::printf("%s (%zu file%s)\n", path.c_str(), file_count, file_count == 1 ? "" : "s");
     std::printf("  geometry   %" PRIu64 " triangles (%" PRIu64 " emissive), %" PRIu64 " spheres", s.triangle_count,
                 s.emissive_triangle_count, s.sphere_count);
     if (s.instance_count > 0)
-        std::printf(", %" PRIu64 " instances showing %" PRIu64 " triangles", s.instance_count, s.instanced_triangle_count);
-    std::printf("\n  camera     perspective, fov %g degrees%s; film %d x %d, maxdepth %d, %d samples per pixel\n", double(d.camera.fov_degrees),
-                d.camera.lens_radius > 0 ? ", thin lens" : "", d.film.width, d.film.height, d.max_depth, d.samples_per_pixel);
+        std::printf(", %" PRIu64 " instances showing %" PRIu64 " triangles", s.instance_count,
+                    s.instanced_triangle_count);
+    std::printf("\n  camera     perspective, fov %g degrees%s; film %d x %d, maxdepth %d, %d samples per pixel\n",
+                double(d.camera.fov_degrees), d.camera.lens_radius > 0 ? ", thin lens" : "", d.film.width,
+                d.film.height, d.max_depth, d.samples_per_pixel);
     std::printf("  lights     %zu\n", s.lights.size());
     for (const SceneSummary::Light& l : s.lights) {
         std::printf("    %-9s power %.6g", l.kind.c_str(), l.power);
@@ -92,8 +104,9 @@ void print(const SceneDescription& d, const SceneSummary& s, const std::string& 
     for (const auto& [name, count] : count_kinds(d.materials)) std::printf(" %zu %s", count, name.c_str());
     std::printf("\n  textures   %zu images (%s)", d.images.size(), megabytes(s.image_bytes).c_str());
     for (const auto& [name, count] : count_kinds(d.textures)) std::printf(", %zu %s", count, name.c_str());
-    std::printf("\n  memory     geometry %s, acceleration structure %s, images %s\n", megabytes(s.geometry_bytes).c_str(),
-                megabytes(s.acceleration_bytes).c_str(), megabytes(s.image_bytes).c_str());
+    std::printf("\n  memory     geometry %s, acceleration structure %s, images %s\n",
+                megabytes(s.geometry_bytes).c_str(), megabytes(s.acceleration_bytes).c_str(),
+                megabytes(s.image_bytes).c_str());
     std::printf("  time       %.3f s to read, %.3f s to build\n", import_seconds, s.build_seconds);
     std::printf("  ignored    %s\n", d.warnings.empty() ? "nothing" : "");
     for (const std::string& warning : d.warnings) std::printf("    %s\n", warning.c_str());
@@ -120,7 +133,8 @@ int run(const Options& options) {
         file << describe(description, summary, imported->files, seconds).dump(2) << "\n";
         file.close();
         if (!file) {
-            std::fprintf(stderr, "cannot write %s; check that its folder exists and is writable\n", options.json.c_str());
+            std::fprintf(stderr, "cannot write %s; check that its folder exists and is writable\n",
+                         options.json.c_str());
             return kFailure;
         }
     }
@@ -131,8 +145,10 @@ int run(const Options& options) {
 
 void add_inspect_command(CLI::App& app, int* exit_code) {
     const auto options = std::make_shared<Options>();
-    CLI::App* command = app.add_subcommand("inspect", "Show what a scene holds: geometry, lights with their power, materials, textures, "
-                                                      "memory, and everything in the file that is ignored");
+    CLI::App* command =
+        app.add_subcommand("inspect",
+                           "Show what a scene holds: geometry, lights with their power, materials, textures, "
+                           "memory, and everything in the file that is ignored");
     command->add_option("scene", options->scene, "The .pbrt file")->required();
     command->add_option("--json", options->json, "Write the same as JSON to this file");
     command->add_flag("--strict", options->strict, "Treat every ignored thing as an error");

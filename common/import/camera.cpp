@@ -13,18 +13,21 @@ void set_camera(Context* context, const std::string& kind, const ParameterList& 
     PerspectiveCamera camera;
     camera.camera_to_world = camera_to_world;
     camera.fov_degrees = p.one_float("fov", 90);
-    if (!(camera.fov_degrees > 0) || !(camera.fov_degrees < 180)) fail(p.where(), p.what() + ": fov must lie between 0 and 180 degrees");
+    if (!(camera.fov_degrees > 0) || !(camera.fov_degrees < 180))
+        fail(p.where(), p.what() + ": fov must lie between 0 and 180 degrees");
     camera.lens_radius = p.one_float("lensradius", 0);
     camera.focal_distance = p.one_float("focaldistance", 1e6f);
     if (!(camera.lens_radius >= 0) || !(camera.focal_distance > 0))
         fail(p.where(), p.what() + ": lensradius must not be negative and focaldistance must be positive");
     camera.frame_aspect_ratio = p.one_float("frameaspectratio", 0);
-    if (p.find_any("frameaspectratio") && !(camera.frame_aspect_ratio > 0)) fail(p.where(), p.what() + ": frameaspectratio must be positive");
+    if (p.find_any("frameaspectratio") && !(camera.frame_aspect_ratio > 0))
+        fail(p.where(), p.what() + ": frameaspectratio must be positive");
     if (const std::vector<double>* window = p.numbers("float", "screenwindow", 4)) {
         if (window->size() != 4) fail(p.where(), p.what() + ": screenwindow needs four numbers");
         camera.has_screen_window = true;
         for (size_t i = 0; i < 4; ++i) camera.screen_window[i] = float((*window)[i]);
-        if (!(camera.screen_window[0] < camera.screen_window[1]) || !(camera.screen_window[2] < camera.screen_window[3]))
+        if (!(camera.screen_window[0] < camera.screen_window[1]) ||
+            !(camera.screen_window[2] < camera.screen_window[3]))
             fail(p.where(), p.what() + ": screenwindow must be x0 < x1, y0 < y1");
     }
     // Nothing moves, so the shutter matters only as the exposure time.
@@ -46,25 +49,32 @@ void set_film(Context* context, const std::string& kind, const ParameterList& p)
     const std::vector<double>* bounds = p.numbers("integer", "pixelbounds", 4);
     const std::vector<double>* window = p.numbers("float", "cropwindow", 4);
     if (bounds && window) fail(p.where(), p.what() + ": give either pixelbounds or cropwindow, not both");
-    if ((bounds && bounds->size() != 4) || (window && window->size() != 4)) fail(p.where(), p.what() + ": a crop needs four numbers");
+    if ((bounds && bounds->size() != 4) || (window && window->size() != 4))
+        fail(p.where(), p.what() + ": a crop needs four numbers");
     for (int i = 0; i < 4 && (bounds || window); ++i) {
         const int size = i < 2 ? film.width : film.height;
-        if (window && !((*window)[size_t(i)] >= 0 && (*window)[size_t(i)] <= 1)) fail(p.where(), p.what() + ": cropwindow must lie in [0, 1]");
+        if (window && !((*window)[size_t(i)] >= 0 && (*window)[size_t(i)] <= 1))
+            fail(p.where(), p.what() + ": cropwindow must lie in [0, 1]");
         // pbrt rounds both ends of a crop window up.
-        const double pixel = bounds ? (*bounds)[size_t(i)] : std::ceil(double(float(size) * float((*window)[size_t(i)])));
+        const double pixel =
+            bounds ? (*bounds)[size_t(i)] : std::ceil(double(float(size) * float((*window)[size_t(i)])));
         if (pixel < 0 || pixel > size) fail(p.where(), p.what() + ": pixelbounds lie outside of the image");
         film.crop[i] = int(pixel);
     }
-    if ((bounds || window) && (film.crop[0] >= film.crop[1] || film.crop[2] >= film.crop[3])) fail(p.where(), p.what() + ": the crop is empty");
+    if ((bounds || window) && (film.crop[0] >= film.crop[1] || film.crop[2] >= film.crop[3]))
+        fail(p.where(), p.what() + ": the crop is empty");
     film.max_component_value = p.one_float("maxcomponentvalue", 0);
     if (p.find_any("maxcomponentvalue")) {
         if (!(film.max_component_value > 0)) fail(p.where(), p.what() + ": maxcomponentvalue must be positive");
-        context->diagnostics.warn(p.where(), p.what() + ": maxcomponentvalue clamps bright samples, which darkens the picture");
+        context->diagnostics.warn(p.where(),
+                                  p.what() + ": maxcomponentvalue clamps bright samples, which darkens the picture");
     }
     context->iso = p.one_float("iso", 100);
     if (!(context->iso > 0)) fail(p.where(), p.what() + ": iso must be positive");
     const std::string sensor = p.one_string("sensor", "cie1931");
-    if (sensor != "cie1931") fail(p.where(), p.what() + ": the sensor " + quoted(sensor) + " is not supported; use \"cie1931\" or remove it");
+    if (sensor != "cie1931")
+        fail(p.where(),
+             p.what() + ": the sensor " + quoted(sensor) + " is not supported; use \"cie1931\" or remove it");
     if (p.one_float("whitebalance", 0) != 0) fail(p.where(), p.what() + ": whitebalance is not supported; remove it");
     p.ignore(&context->diagnostics, "diagonal", "it matters only for cameras with real lenses");
     p.ignore(&context->diagnostics, "savefp16", "the output's precision is the command line's business");
@@ -73,41 +83,52 @@ void set_film(Context* context, const std::string& kind, const ParameterList& p)
 
 void set_pixel_filter(Context* context, const std::string& kind, const ParameterList& p) {
     constexpr std::array<std::string_view, 5> kKinds{"box", "gaussian", "mitchell", "sinc", "triangle"};
-    if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end()) fail(p.where(), p.what() + " is unknown; use \"box\"");
+    if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end())
+        fail(p.where(), p.what() + " is unknown; use \"box\"");
     context->has_pixel_filter = true;
     if (kind == "box") {
         const float x = p.one_float("xradius", 0.5f), y = p.one_float("yradius", 0.5f);
-        if (x != 0.5f || y != 0.5f) context->diagnostics.warn(p.where(), p.what() + ": a radius other than 0.5 is ignored; the picture is a little sharper");
+        if (x != 0.5f || y != 0.5f)
+            context->diagnostics.warn(
+                p.where(), p.what() + ": a radius other than 0.5 is ignored; the picture is a little sharper");
         return;
     }
     for (const std::string_view name : {"xradius", "yradius", "sigma", "B", "C", "tau"}) p.accept(name);
-    context->diagnostics.warn(p.where(), p.what() + " is replaced by a box of radius 0.5; the picture is a little sharper");
+    context->diagnostics.warn(p.where(),
+                              p.what() + " is replaced by a box of radius 0.5; the picture is a little sharper");
 }
 
 void set_sampler(Context* context, const std::string& kind, const ParameterList& p) {
-    constexpr std::array<std::string_view, 7> kKinds{"halton", "sobol", "paddedsobol", "zsobol", "stratified", "independent", "pmj02bn"};
-    if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end()) fail(p.where(), p.what() + " is unknown; use \"halton\"");
+    constexpr std::array<std::string_view, 7> kKinds{"halton",     "sobol",       "paddedsobol", "zsobol",
+                                                     "stratified", "independent", "pmj02bn"};
+    if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end())
+        fail(p.where(), p.what() + " is unknown; use \"halton\"");
     int64_t samples = p.one_int("pixelsamples", 16);
     if (kind == "stratified") {
         samples = int64_t(p.one_int("xsamples", 4)) * p.one_int("ysamples", 4);
         p.accept("jitter");
     }
-    if (samples < 1 || samples > (int64_t(1) << 30)) fail(p.where(), p.what() + ": the number of samples must be positive");
+    if (samples < 1 || samples > (int64_t(1) << 30))
+        fail(p.where(), p.what() + ": the number of samples must be positive");
     p.ignore(&context->diagnostics, "seed", "the command line's --seed selects the random numbers");
     p.ignore(&context->diagnostics, "randomization", "the renderer has its own random numbers");
     context->scene.samples_per_pixel = int(samples);
 }
 
 void set_integrator(Context* context, const std::string& kind, const ParameterList& p) {
-    constexpr std::array<std::string_view, 9> kKinds{"path", "volpath", "bdpt", "mlt", "sppm", "lightpath", "simplepath", "simplevolpath", "randomwalk"};
+    constexpr std::array<std::string_view, 9> kKinds{"path",      "volpath",    "bdpt",          "mlt",       "sppm",
+                                                     "lightpath", "simplepath", "simplevolpath", "randomwalk"};
     if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end())
         fail(p.where(), p.what() + " is not supported: it does not compute light transport; use \"path\"");
     context->scene.max_depth = p.one_int("maxdepth", 5);
     if (context->scene.max_depth < 0) fail(p.where(), p.what() + ": maxdepth is negative");
-    if (p.one_bool("regularize", false)) context->diagnostics.warn(p.where(), p.what() + ": regularize is ignored, it would blur the picture's glossy light");
+    if (p.one_bool("regularize", false))
+        context->diagnostics.warn(p.where(),
+                                  p.what() + ": regularize is ignored, it would blur the picture's glossy light");
     const std::string reason = "algorithm and parameters come from the command line";
-    for (const std::string_view name : {"lightsampler", "samplelights", "samplebsdf", "visualizestrategies", "visualizeweights", "bootstrapsamples", "chains",
-                                        "mutationsperpixel", "largestepprobability", "sigma", "photonsperiteration", "radius", "seed"})
+    for (const std::string_view name :
+         {"lightsampler", "samplelights", "samplebsdf", "visualizestrategies", "visualizeweights", "bootstrapsamples",
+          "chains", "mutationsperpixel", "largestepprobability", "sigma", "photonsperiteration", "radius", "seed"})
         p.ignore(&context->diagnostics, name, reason);
 }
 

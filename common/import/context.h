@@ -1,6 +1,6 @@
 #pragma once
-// What the parts of the importer share: the scene under construction, the files, the diagnostics, and the tables that map
-// names to what they stand for.
+// What the parts of the importer share: the scene under construction, the files, the diagnostics, and the tables that
+// map names to what they stand for.
 
 #include <array>
 #include <map>
@@ -30,8 +30,8 @@ struct MaterialReference {
     Location where;
 };
 
-/// A Texture, Material or MakeNamedMaterial directive, interpreted when everything has been read (pbrt allows references
-/// to what comes later).
+/// A Texture, Material or MakeNamedMaterial directive, interpreted when everything has been read (pbrt allows
+/// references to what comes later).
 struct Definition {
     std::string kind;  ///< "imagemap", "diffuse", ...
     ParameterList parameters;
@@ -79,9 +79,9 @@ struct Context {
     std::map<std::tuple<float, float, float>, TextureId> constants;
     std::map<std::string, int32_t> image_index;  ///< By file, encoding and channel choice.
     std::map<std::tuple<float, float, float, bool>, int32_t> emission_index;
-    std::vector<TextureCost> texture_costs;  ///< One per scene texture.
-    std::map<MaterialId, int> mix_levels;    ///< Of mix materials; others have none.
-    int texture_depth = 0, material_depth = 0;   ///< Of the definitions being resolved.
+    std::vector<TextureCost> texture_costs;     ///< One per scene texture.
+    std::map<MaterialId, int> mix_levels;       ///< Of mix materials; others have none.
+    int texture_depth = 0, material_depth = 0;  ///< Of the definitions being resolved.
 
     float exposure_time = 1, iso = 100;
     bool has_pixel_filter = false;
@@ -105,7 +105,8 @@ TextureId float_texture_parameter(Context* context, const ParameterList& paramet
 /// How a colour is used decides what its numbers may be (and how a spectrum is reduced, see spectra.h).
 enum class ColourUse { kReflectance, kUnbounded };
 /// Parameter `name` as "rgb", "spectrum" or "texture"; kNone if absent.
-TextureId spectrum_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name, ColourUse use);
+TextureId spectrum_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name,
+                                     ColourUse use);
 
 /// Parameter `name` of type "spectrum" read from its values or file; nothing if absent.
 std::optional<Spectrum> spectrum_parameter(Context* context, const ParameterList& parameters, std::string_view name);
@@ -121,7 +122,8 @@ AreaEmission area_emission(Context* context, const AreaLightDefinition& definiti
 bool area_light_uses_power(const AreaLightDefinition& definition);
 
 // camera.cpp
-void set_camera(Context* context, const std::string& kind, const ParameterList& parameters, const Mat4& camera_to_world);
+void set_camera(Context* context, const std::string& kind, const ParameterList& parameters,
+                const Mat4& camera_to_world);
 void set_film(Context* context, const std::string& kind, const ParameterList& parameters);
 void set_pixel_filter(Context* context, const std::string& kind, const ParameterList& parameters);
 void set_sampler(Context* context, const std::string& kind, const ParameterList& parameters);
@@ -134,8 +136,8 @@ struct ShapeState {
     bool reverse_orientation = false;
 };
 /// Appends the shape's geometry to `pending` (its references are the caller's).
-std::variant<TriangleMesh, Sphere> make_shape(Context* context, const std::string& kind, const ParameterList& parameters,
-                                              const ShapeState& state);
+std::variant<TriangleMesh, Sphere> make_shape(Context* context, const std::string& kind,
+                                              const ParameterList& parameters, const ShapeState& state);
 
 // resolve.cpp
 /// Resolves all references and moves the shapes into the scene.

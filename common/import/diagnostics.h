@@ -1,7 +1,7 @@
 #pragma once
 // Where something was said in a scene file, and what the importer has to say about it. Inside common/import an error is
-// thrown as an ImportFailure (a parser that is thirty calls deep has nothing else to do with it); import_pbrt() turns it
-// into a Status, so no exception leaves the module.
+// thrown as an ImportFailure (a parser that is thirty calls deep has nothing else to do with it); import_pbrt() turns
+// it into a Status, so no exception leaves the module.
 
 #include <map>
 #include <string>

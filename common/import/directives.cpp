@@ -34,9 +34,14 @@ void Parser::option(Tokenizer* tokens, const Location& where) {
     const std::string name = space == std::string::npos ? declaration : declaration.substr(space + 1);
     const std::string shown = "Option " + quoted(declaration);
     // These steer how pbrt computes, writes or displays, not what the picture converges to.
-    constexpr std::array<std::string_view, 8> kHarmless{"seed", "rendercoordsys", "msereferenceimage", "msereferenceout",
-                                                        "disablewavelengthjitter", "displacementedgescale",
-                                                        "disabletexturefiltering", "wavefront"};
+    constexpr std::array<std::string_view, 8> kHarmless{"seed",
+                                                        "rendercoordsys",
+                                                        "msereferenceimage",
+                                                        "msereferenceout",
+                                                        "disablewavelengthjitter",
+                                                        "displacementedgescale",
+                                                        "disabletexturefiltering",
+                                                        "wavefront"};
     if (std::find(kHarmless.begin(), kHarmless.end(), name) != kHarmless.end()) {
         context_->diagnostics.warn(where, shown + " is ignored: it does not change what the picture converges to");
     } else if (name == "disablepixeljitter" || name == "forcediffuse" || name == "pixelstats") {
@@ -47,7 +52,8 @@ void Parser::option(Tokenizer* tokens, const Location& where) {
 }
 
 bool Parser::global_option(Tokenizer* tokens, const std::string& word, const Location& where) {
-    constexpr std::array<std::string_view, 6> kWords{"Camera", "Film", "PixelFilter", "Sampler", "Integrator", "Accelerator"};
+    constexpr std::array<std::string_view, 6> kWords{"Camera",  "Film",       "PixelFilter",
+                                                     "Sampler", "Integrator", "Accelerator"};
     if (std::find(kWords.begin(), kWords.end(), word) == kWords.end()) return false;
     require_world(where, word, false);
     const std::string kind = read_name(tokens, where, word);
@@ -99,8 +105,10 @@ bool Parser::world_item(Tokenizer* tokens, const std::string& word, const Locati
     } else if (word == "AreaLightSource") {
         require_world(where, word, true);
         const std::string kind = read_name(tokens, where, word);
-        if (kind != "diffuse") fail(where, "AreaLightSource " + quoted(kind) + " is not supported; the only kind is \"diffuse\"");
-        state_.area_light = std::make_shared<AreaLightDefinition>(AreaLightDefinition{parameters(tokens, where, word, kind, "light")});
+        if (kind != "diffuse")
+            fail(where, "AreaLightSource " + quoted(kind) + " is not supported; the only kind is \"diffuse\"");
+        state_.area_light =
+            std::make_shared<AreaLightDefinition>(AreaLightDefinition{parameters(tokens, where, word, kind, "light")});
     } else if (word == "ObjectInstance") {
         object_instance(tokens, where);
     } else if (word == "MakeNamedMedium") {
@@ -148,7 +156,8 @@ void Parser::shape(Tokenizer* tokens, const Location& where) {
     pending.object = current_object_;
     pending.area_light = state_.area_light;
     if (pending.area_light && current_object_ != kNone) {
-        context_->diagnostics.warn(where, "an area light inside an object instance is ignored, as in pbrt: its shapes do not emit");
+        context_->diagnostics.warn(
+            where, "an area light inside an object instance is ignored, as in pbrt: its shapes do not emit");
         pending.area_light = nullptr;
     }
     if (const Parameter* p = list.find("texture", "alpha")) {
@@ -158,7 +167,8 @@ void Parser::shape(Tokenizer* tokens, const Location& where) {
         pending.alpha = list.one_float("alpha", 1);
         if (pending.alpha < 0 || pending.alpha > 1) fail(where, list.what() + ": alpha must be between 0 and 1");
     }
-    pending.geometry = make_shape(context_, kind, list, {static_transform(where, list.what()), state_.reverse_orientation});
+    pending.geometry =
+        make_shape(context_, kind, list, {static_transform(where, list.what()), state_.reverse_orientation});
     list.finish();
     context_->shapes.push_back(std::move(pending));
 }
@@ -178,7 +188,9 @@ void Parser::object_begin(Tokenizer* tokens, const Location& where) {
 void Parser::object_instance(Tokenizer* tokens, const Location& where) {
     require_world(where, "ObjectInstance", true);
     const std::string name = read_name(tokens, where, "ObjectInstance");
-    if (current_object_ != kNone) fail(where, "ObjectInstance inside ObjectBegin: nested instances are not supported; place the inner object outside");
+    if (current_object_ != kNone)
+        fail(where,
+             "ObjectInstance inside ObjectBegin: nested instances are not supported; place the inner object outside");
     const auto it = objects_.find(name);
     if (it == objects_.end()) fail(where, "no object is named " + quoted(name) + "; define it with ObjectBegin first");
     context_->scene.instances.push_back({it->second, static_transform(where, "the instance"), where.text()});

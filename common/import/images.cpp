@@ -56,15 +56,19 @@ std::vector<float> keep_scalar(const T* raw, size_t pixels, int channels, T opaq
     std::vector<float> out(pixels);
     for (size_t i = 0; i < pixels; ++i) {
         const T* p = raw + i * stride;
-        if (use_alpha) out[i] = linear(p[3]);
-        else if (channels >= 3) out[i] = (linear(p[0]) + linear(p[1]) + linear(p[2])) * (1.0f / 3.0f);
-        else out[i] = linear(p[0]);
+        if (use_alpha)
+            out[i] = linear(p[3]);
+        else if (channels >= 3)
+            out[i] = (linear(p[0]) + linear(p[1]) + linear(p[2])) * (1.0f / 3.0f);
+        else
+            out[i] = linear(p[0]);
     }
     return out;
 }
 
 template <typename T>
-void fill(Image* image, const T* raw, int channels, const ImageRequest& request, T opaque, const std::vector<float>& table) {
+void fill(Image* image, const T* raw, int channels, const ImageRequest& request, T opaque,
+          const std::vector<float>& table) {
     const size_t pixels = size_t(image->width) * size_t(image->height);
     const auto linear = [&](T v) { return table.empty() ? float(v) : table[size_t(v)]; };
     if (request.channels == ImageChannels::kScalar) {
@@ -96,18 +100,22 @@ Result<Image> read_with_stb(const std::string& bytes, const ImageRequest& reques
     int channels = 0;
     if (!stbi_info_from_memory(data, size, &image.width, &image.height, &channels))
         return invalid_argument(std::string("the image cannot be decoded: ") + stbi_failure_reason());
-    LL_RETURN_IF_ERROR(check_image_size(uint64_t(image.width), uint64_t(image.height), uint64_t(channels), bytes.size()));
+    LL_RETURN_IF_ERROR(
+        check_image_size(uint64_t(image.width), uint64_t(image.height), uint64_t(channels), bytes.size()));
     const auto failed = [] { return data_loss(std::string("the image is damaged: ") + stbi_failure_reason()); };
     if (stbi_is_hdr_from_memory(data, size)) {
-        const std::unique_ptr<float, void (*)(void*)> raw(stbi_loadf_from_memory(data, size, &image.width, &image.height, &channels, 0), stbi_image_free);
+        const std::unique_ptr<float, void (*)(void*)> raw(
+            stbi_loadf_from_memory(data, size, &image.width, &image.height, &channels, 0), stbi_image_free);
         if (!raw) return failed();
         fill(&image, raw.get(), channels, request, 1.0f, {});
     } else if (stbi_is_16_bit_from_memory(data, size)) {
-        const std::unique_ptr<stbi_us, void (*)(void*)> raw(stbi_load_16_from_memory(data, size, &image.width, &image.height, &channels, 0), stbi_image_free);
+        const std::unique_ptr<stbi_us, void (*)(void*)> raw(
+            stbi_load_16_from_memory(data, size, &image.width, &image.height, &channels, 0), stbi_image_free);
         if (!raw) return failed();
         fill(&image, raw.get(), channels, request, stbi_us(65535), decoding_table(65536, request));
     } else {
-        const std::unique_ptr<stbi_uc, void (*)(void*)> raw(stbi_load_from_memory(data, size, &image.width, &image.height, &channels, 0), stbi_image_free);
+        const std::unique_ptr<stbi_uc, void (*)(void*)> raw(
+            stbi_load_from_memory(data, size, &image.width, &image.height, &channels, 0), stbi_image_free);
         if (!raw) return failed();
         fill(&image, raw.get(), channels, request, stbi_uc(255), decoding_table(256, request));
     }
@@ -119,7 +127,8 @@ Result<Image> read_with_stb(const std::string& bytes, const ImageRequest& reques
 Result<Image> read_image(const std::string& name, const std::string& bytes, const ImageRequest& request) {
     const std::string extension = lower_extension(name);
     if (bytes.size() > (size_t(1) << 30)) return invalid_argument("the image file is larger than 1 GiB");
-    Result<Image> image = invalid_argument("images of type " + quoted(extension) + " are not supported; use png, jpg, tga, hdr or exr");
+    Result<Image> image =
+        invalid_argument("images of type " + quoted(extension) + " are not supported; use png, jpg, tga, hdr or exr");
     if (extension == "exr") {
         Result<ExrPixels> exr = read_exr(bytes);
         if (!exr.ok()) return exr.status();
@@ -128,7 +137,8 @@ Result<Image> read_image(const std::string& name, const std::string& bytes, cons
         out.height = exr->height;
         fill(&out, exr->values.data(), exr->channels, request, 1.0f, {});
         image = std::move(out);
-    } else if (extension == "png" || extension == "jpg" || extension == "jpeg" || extension == "tga" || extension == "hdr") {
+    } else if (extension == "png" || extension == "jpg" || extension == "jpeg" || extension == "tga" ||
+               extension == "hdr") {
         image = read_with_stb(bytes, request);
     }
     if (!image.ok()) return image;

@@ -11,7 +11,8 @@ namespace lightloom::import {
 /// What of a file's channels is wanted.
 enum class ImageChannels {
     kColour,  ///< Three channels (one for a grey file); alpha is dropped.
-    kScalar,  ///< One channel: alpha where the file has a fourth channel that is not all opaque, else the mean of R, G, B.
+    kScalar,  ///< One channel: alpha where the file has a fourth channel that is not all opaque, else the mean of R, G,
+              ///< B.
 };
 
 struct ImageRequest {
@@ -21,8 +22,9 @@ struct ImageRequest {
     float gamma = 1;  ///< Used when `srgb` is false; 1 is linear.
 };
 
-/// Decodes `bytes` of the file `name` (its extension selects the format). Dimensions are checked against the size of the
-/// data before anything of their size is allocated. Values that are not finite are an error. The message does not name the file.
+/// Decodes `bytes` of the file `name` (its extension selects the format). Dimensions are checked against the size of
+/// the data before anything of their size is allocated. Values that are not finite are an error. The message does not
+/// name the file.
 Result<Image> read_image(const std::string& name, const std::string& bytes, const ImageRequest& request);
 
 }  // namespace lightloom::import

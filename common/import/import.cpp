@@ -13,7 +13,9 @@ Result<ImportedScene> import_from(FileSource* files, const std::string& name, co
     Parser(&context).parse_main(name);
     const Location main{context.intern_file_name(name), 0};
     if (!context.has_pixel_filter)
-        context.diagnostics.warn(main, "there is no PixelFilter, so pbrt would use a gaussian; a box of radius 0.5 is used, the picture is a little sharper");
+        context.diagnostics.warn(main,
+                                 "there is no PixelFilter, so pbrt would use a gaussian; a box of radius 0.5 is used, "
+                                 "the picture is a little sharper");
     resolve_shapes(&context);
     context.scene.film.exposure_scale = context.exposure_time * context.iso / 100;
     context.scene.warnings = context.diagnostics.messages();

@@ -1,5 +1,6 @@
-// Light sources. In pbrt-v4 a light is its colour times `scale`; `power` (or `illuminance`) then replaces the magnitude: it is
-// the luminous flux (illuminance) that the light has for a colour of luminance 1, so an rgb colour still multiplies it.
+// Light sources. In pbrt-v4 a light is its colour times `scale`; `power` (or `illuminance`) then replaces the
+// magnitude: it is the luminous flux (illuminance) that the light has for a colour of luminance 1, so an rgb colour
+// still multiplies it.
 
 #include <cmath>
 
@@ -17,7 +18,8 @@ Rgb light_colour(Context* context, const ParameterList& p, std::string_view name
     bool clipped = false;
     const Parameter* given = nullptr;
     if ((given = p.find("rgb", name))) {
-        if (given->numbers.size() != 3) fail(given->where, p.what() + ": " + quoted(given->name) + " needs three numbers");
+        if (given->numbers.size() != 3)
+            fail(given->where, p.what() + ": " + quoted(given->name) + " needs three numbers");
         colour = {float(given->numbers[0]), float(given->numbers[1]), float(given->numbers[2])};
     } else if ((given = p.find("blackbody", name))) {
         if (given->numbers.size() != 1 || !(given->numbers[0] >= 100) || !(given->numbers[0] <= 1e6))
@@ -27,13 +29,17 @@ Rgb light_colour(Context* context, const ParameterList& p, std::string_view name
         std::optional<Rgb> reduced;
         if (given->strings.size() == 1) reduced = named_illuminant_rgb(given->strings[0], &clipped);
         if (!reduced) reduced = illuminant_rgb(*spectrum_parameter(context, p, name), &clipped);
-        if (!reduced) fail(given->where, p.what() + ": the spectrum " + quoted(given->name) + " has no luminance between 380 and 780 nm");
+        if (!reduced)
+            fail(given->where,
+                 p.what() + ": the spectrum " + quoted(given->name) + " has no luminance between 380 and 780 nm");
         colour = *reduced;
     }
-    if (given && (colour.r < 0 || colour.g < 0 || colour.b < 0)) fail(given->where, p.what() + ": " + quoted(given->name) + " is negative");
+    if (given && (colour.r < 0 || colour.g < 0 || colour.b < 0))
+        fail(given->where, p.what() + ": " + quoted(given->name) + " is negative");
     if (clipped)
-        context->diagnostics.warn(given->where, p.what() + ": the colour of " + quoted(given->name) +
-                                                    " lies outside the RGB gamut; its negative component became 0 at equal luminance");
+        context->diagnostics.warn(
+            given->where, p.what() + ": the colour of " + quoted(given->name) +
+                              " lies outside the RGB gamut; its negative component became 0 at equal luminance");
     return colour;
 }
 
@@ -44,7 +50,9 @@ float light_scale(const ParameterList& p) {
 }
 
 /// The value of "power" or "illuminance" if it is in force (pbrt: if positive); 0 otherwise.
-double magnitude(const ParameterList& p, std::string_view name) { return double(std::fmax(p.one_float(name, -1), 0.0f)); }
+double magnitude(const ParameterList& p, std::string_view name) {
+    return double(std::fmax(p.one_float(name, -1), 0.0f));
+}
 
 Rgb checked(const ParameterList& p, const Rgb& colour, double factor) {
     const Rgb out = colour * float(factor);
@@ -74,15 +82,20 @@ void point_light(Context* context, const ParameterList& p, const Mat4& m) {
     double scale = light_scale(p);
     if (const double power = magnitude(p, "power"); power > 0) scale *= power / (4 * kPiD);
     const Vec3 from = p.one_point3("from").value_or(Vec3{0, 0, 0});
-    context->scene.point_lights.push_back({light_position(p, m, from), checked(p, light_colour(context, p, "I"), scale)});
+    context->scene.point_lights.push_back(
+        {light_position(p, m, from), checked(p, light_colour(context, p, "I"), scale)});
 }
 
 void spot_light(Context* context, const ParameterList& p, const Mat4& m) {
     const float cone = p.one_float("coneangle", 30), delta = p.one_float("conedeltaangle", 5);
     if (!(cone > 0) || !(cone <= 180) || !(delta >= 0) || !(delta <= cone))
         fail(p.where(), p.what() + ": coneangle must lie in (0, 180] degrees and conedeltaangle between 0 and it");
-    if (!similarity_scale(m)) fail(p.where(), p.what() + ": its transformation is not a similarity, so the cone would not be round; remove the uneven scale or shear");
-    const double cos_total = math::cos(double(cone) * kPiD / 180), cos_falloff = math::cos((double(cone) - delta) * kPiD / 180);
+    if (!similarity_scale(m))
+        fail(p.where(), p.what() +
+                            ": its transformation is not a similarity, so the cone would not be round; remove the "
+                            "uneven scale or shear");
+    const double cos_total = math::cos(double(cone) * kPiD / 180),
+                 cos_falloff = math::cos((double(cone) - delta) * kPiD / 180);
     double scale = light_scale(p);
     // The flux of unit intensity on the axis: the smoothstep's mean over its band is one half.
     if (const double power = magnitude(p, "power"); power > 0)
@@ -101,7 +114,8 @@ void distant_light(Context* context, const ParameterList& p, const Mat4& m) {
     double scale = light_scale(p);
     if (const double illuminance = magnitude(p, "illuminance"); illuminance > 0) scale *= illuminance;
     const Vec3 from = p.one_point3("from").value_or(Vec3{0, 0, 0}), to = p.one_point3("to").value_or(Vec3{0, 0, 1});
-    context->scene.distant_lights.push_back({unit_vector(p, m, from, to), checked(p, light_colour(context, p, "L"), scale)});
+    context->scene.distant_lights.push_back(
+        {unit_vector(p, m, from, to), checked(p, light_colour(context, p, "L"), scale)});
 }
 
 /// What "illuminance" normalises: the light's own xy plane lit by the upper half of the map. pbrt-v4 counts every pixel
@@ -110,7 +124,8 @@ double illuminance_of(const Image& image) {
     double sum = 0;
     for (int y = 0; y < image.height; ++y)
         for (int x = 0; x < image.width; ++x) {
-            const Vec3 w = equal_area_square_to_sphere({(float(x) + 0.5f) / float(image.width), (float(y) + 0.5f) / float(image.height)});
+            const Vec3 w = equal_area_square_to_sphere(
+                {(float(x) + 0.5f) / float(image.width), (float(y) + 0.5f) / float(image.height)});
             if (w.z > 0) sum += double(image.texel(x, y).luminance()) * w.z;
         }
     return sum * 2 * kPiD / (double(image.width) * image.height);
@@ -120,7 +135,8 @@ void infinite_light(Context* context, const ParameterList& p, const Mat4& m) {
     p.refuse("portal", "portals restrict the light to an opening; remove the parameter, the light is the same without");
     InfiniteLight light;
     light.light_to_world = m;
-    if (!similarity_scale(m)) fail(p.where(), p.what() + ": its transformation must be a rotation, reflection or uniform scale");
+    if (!similarity_scale(m))
+        fail(p.where(), p.what() + ": its transformation must be a rotation, reflection or uniform scale");
     double scale = light_scale(p);
     const double illuminance = magnitude(p, "illuminance");
     const std::string reference = p.one_string("filename", "");
@@ -132,13 +148,17 @@ void infinite_light(Context* context, const ParameterList& p, const Mat4& m) {
         light.image = context->load_image(p.where(), reference, ImageRequest{});
         const Image& image = context->scene.images[size_t(light.image)];
         if (image.width != image.height)
-            fail(p.where(), quoted(reference) + ": an environment map must be a square equal-area octahedral image, not " + std::to_string(image.width) +
-                                " x " + std::to_string(image.height) + "; convert it with \"imgtool makeequiarea\"");
+            fail(p.where(), quoted(reference) +
+                                ": an environment map must be a square equal-area octahedral image, not " +
+                                std::to_string(image.width) + " x " + std::to_string(image.height) +
+                                "; convert it with \"imgtool makeequiarea\"");
         for (const float v : image.floats)
             if (v < 0) fail(p.where(), quoted(reference) + ": the environment map holds a negative value");
         if (illuminance > 0) {
             const double own = illuminance_of(image);
-            if (!(own > 0)) fail(p.where(), quoted(reference) + ": the map is black above its horizon, so illuminance cannot scale it");
+            if (!(own > 0))
+                fail(p.where(),
+                     quoted(reference) + ": the map is black above its horizon, so illuminance cannot scale it");
             scale *= illuminance / own;
         }
         light.radiance = checked(p, Rgb(1.0f), scale);
@@ -149,14 +169,21 @@ void infinite_light(Context* context, const ParameterList& p, const Mat4& m) {
 }  // namespace
 
 void add_light(Context* context, const std::string& kind, const ParameterList& p, const Mat4& light_to_world) {
-    if (kind == "point") point_light(context, p, light_to_world);
-    else if (kind == "spot") spot_light(context, p, light_to_world);
-    else if (kind == "distant") distant_light(context, p, light_to_world);
-    else if (kind == "infinite") infinite_light(context, p, light_to_world);
-    else fail(p.where(), p.what() + " is not supported; use point, spot, distant or infinite");
+    if (kind == "point")
+        point_light(context, p, light_to_world);
+    else if (kind == "spot")
+        spot_light(context, p, light_to_world);
+    else if (kind == "distant")
+        distant_light(context, p, light_to_world);
+    else if (kind == "infinite")
+        infinite_light(context, p, light_to_world);
+    else
+        fail(p.where(), p.what() + " is not supported; use point, spot, distant or infinite");
 }
 
-bool area_light_uses_power(const AreaLightDefinition& definition) { return magnitude(definition.parameters, "power") > 0; }
+bool area_light_uses_power(const AreaLightDefinition& definition) {
+    return magnitude(definition.parameters, "power") > 0;
+}
 
 AreaEmission area_emission(Context* context, const AreaLightDefinition& definition, double area) {
     const ParameterList& p = definition.parameters;

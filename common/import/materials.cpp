@@ -23,7 +23,8 @@ void check_roughness(Context* context, const ParameterList& p, TextureId id, std
 }
 
 /// `prefix`roughness, `prefix`uroughness and `prefix`vroughness.
-void read_roughness(Context* context, const ParameterList& p, const std::string& prefix, float fallback, TextureId* u, TextureId* v) {
+void read_roughness(Context* context, const ParameterList& p, const std::string& prefix, float fallback, TextureId* u,
+                    TextureId* v) {
     TextureId both = float_texture_parameter(context, p, prefix + "roughness");
     if (both == kNone) both = constant_texture(context, Rgb(fallback));
     *u = float_texture_parameter(context, p, prefix + "uroughness");
@@ -41,15 +42,18 @@ float read_index(Context* context, const ParameterList& p, std::string_view name
         std::optional<float> glass;
         if (s->strings.size() == 1) glass = named_glass(s->strings[0]);
         index = glass ? *glass : float(evaluate(*spectrum_parameter(context, p, name), 587.6));
-        context->diagnostics.warn(s->where, p.what() + ": the dispersion of " + quoted(s->name) + " is ignored: its index at 587.6 nm is used for all colours");
+        context->diagnostics.warn(s->where, p.what() + ": the dispersion of " + quoted(s->name) +
+                                                " is ignored: its index at 587.6 nm is used for all colours");
     }
-    if (!(index > 0) || !(index < 100)) fail(p.where(), p.what() + ": the index of refraction must lie between 0 and 100");
+    if (!(index > 0) || !(index < 100))
+        fail(p.where(), p.what() + ": the index of refraction must lie between 0 and 100");
     return index;
 }
 
 /// "metal-Cu-eta" split into metal and property; empty if it is not of this form.
 std::string metal_of(const Parameter* p, std::string_view suffix) {
-    if (!p || p->strings.size() != 1 || !has_suffix(p->strings[0], suffix) || p->strings[0].rfind("metal-", 0) != 0) return {};
+    if (!p || p->strings.size() != 1 || !has_suffix(p->strings[0], suffix) || p->strings[0].rfind("metal-", 0) != 0)
+        return {};
     return p->strings[0].substr(0, p->strings[0].size() - suffix.size());
 }
 
@@ -75,7 +79,8 @@ void read_conductor(Context* context, const ParameterList& p, const std::string&
     if (!eta_metal.empty()) m->eta = constant_texture(context, metal(eta, eta_metal).eta);
     if (!k_metal.empty()) m->k = constant_texture(context, metal(k, k_metal).k);
     if (eta && k && eta_metal.empty() && k_metal.empty()) {
-        const ConductorRgb both = conductor_rgb(*spectrum_parameter(context, p, eta_name), *spectrum_parameter(context, p, k_name));
+        const ConductorRgb both =
+            conductor_rgb(*spectrum_parameter(context, p, eta_name), *spectrum_parameter(context, p, k_name));
         m->eta = constant_texture(context, both.eta);
         m->k = constant_texture(context, both.k);
     }
@@ -84,26 +89,35 @@ void read_conductor(Context* context, const ParameterList& p, const std::string&
     if (m->eta == kNone || m->k == kNone) p.finish();  // A parameter of the wrong type.
 }
 
-void ignore_layer_medium(Context* context, const ParameterList& p) {
+void read_layers(Context* context, const ParameterList& p, Material* m) {
     Diagnostics* d = &context->diagnostics;
-    p.ignore(d, "thickness", "the layers here are joined analytically, without a medium between them");
+    m->thickness = p.one_float("thickness", m->thickness);
+    if (!(m->thickness >= 0)) fail(p.where(), p.what() + ": the thickness is negative");
+    if (m->kind == MaterialKind::kCoatedDiffuse) {
+        m->layer_events = p.one_int("maxdepth", m->layer_events);
+        if (m->layer_events < 1) fail(p.where(), p.what() + ": maxdepth must be positive");
+    } else {
+        p.ignore(d, "maxdepth", "the layers here are joined analytically, without a random walk");
+    }
     p.ignore(d, "g", "the medium between the layers is not modelled");
     p.ignore(d, "albedo", "the medium between the layers is not modelled");
-    p.ignore(d, "maxdepth", "the layers here are joined analytically, without a random walk");
     p.ignore(d, "nsamples", "the layers here are joined analytically, without a random walk");
 }
 
 void read_mix(Context* context, const ParameterList& p, Material* m) {
     const Parameter* names = p.find("string", "materials");
     if (!names || names->strings.size() != 2) fail(p.where(), p.what() + " needs \"string materials\" with two names");
-    if (++context->material_depth > kMaxMixDepth) fail(p.where(), p.what() + ": mix materials refer to one another more than 32 levels deep");
+    if (++context->material_depth > kMaxMixDepth)
+        fail(p.where(), p.what() + ": mix materials refer to one another more than 32 levels deep");
     m->mix_a = resolve_material_reference(context, {true, names->strings[0], 0, names->where});
     m->mix_b = resolve_material_reference(context, {true, names->strings[1], 0, names->where});
     --context->material_depth;
     const int levels = 1 + std::max(context->mix_levels[m->mix_a], context->mix_levels[m->mix_b]);
-    if (levels > kMaxMixDepth) fail(p.where(), p.what() + ": mix materials refer to one another more than 32 levels deep");
+    if (levels > kMaxMixDepth)
+        fail(p.where(), p.what() + ": mix materials refer to one another more than 32 levels deep");
     if (m->mix_a == kInterfaceMaterial || m->mix_b == kInterfaceMaterial)
-        fail(p.where(), p.what() + ": a mix with an \"interface\" material is not supported; use the shape's alpha instead");
+        fail(p.where(),
+             p.what() + ": a mix with an \"interface\" material is not supported; use the shape's alpha instead");
     m->mix_amount = float_texture_parameter(context, p, "amount");
     if (m->mix_amount == kNone) m->mix_amount = constant_texture(context, Rgb(0.5f));
 }
@@ -158,7 +172,7 @@ MaterialId make_material(Context* context, const std::string& name, const Defini
         m.ior = read_index(context, p, "eta");
         read_roughness(context, p, "", 0, &m.roughness_u, &m.roughness_v);
         m.remap_roughness = p.one_bool("remaproughness", true);
-        ignore_layer_medium(context, p);
+        read_layers(context, p, &m);
     } else if (kind == "coatedconductor") {
         m.kind = MaterialKind::kCoatedConductor;
         read_conductor(context, p, "conductor.", &m);
@@ -166,13 +180,14 @@ MaterialId make_material(Context* context, const std::string& name, const Defini
         read_roughness(context, p, "interface.", 0, &m.roughness_u, &m.roughness_v);
         read_roughness(context, p, "conductor.", 0, &m.base_roughness_u, &m.base_roughness_v);
         m.remap_roughness = p.one_bool("remaproughness", true);
-        ignore_layer_medium(context, p);
+        read_layers(context, p, &m);
     } else if (kind == "mix") {
         m.kind = MaterialKind::kMix;
         read_mix(context, p, &m);
     } else {
         fail(p.where(), p.what() + ": the material " + quoted(kind) +
-                            " is not supported; use diffuse, diffusetransmission, conductor, dielectric, thindielectric, coateddiffuse, coatedconductor, mix or interface");
+                            " is not supported; use diffuse, diffusetransmission, conductor, dielectric, "
+                            "thindielectric, coateddiffuse, coatedconductor, mix or interface");
     }
     p.finish();
     const MaterialId id = MaterialId(context->scene.materials.size());
@@ -188,7 +203,8 @@ MaterialId resolve_material_reference(Context* context, const MaterialReference&
     constexpr MaterialId kInProgress = -3;
     if (!reference.named) {
         const auto [it, inserted] = context->resolved_anonymous_materials.try_emplace(reference.anonymous, kNone);
-        if (inserted) it->second = make_material(context, "", context->anonymous_materials[size_t(reference.anonymous)]);
+        if (inserted)
+            it->second = make_material(context, "", context->anonymous_materials[size_t(reference.anonymous)]);
         return it->second;
     }
     const std::string& name = reference.name;

@@ -1,5 +1,5 @@
-// Named metals, reduced once with conductor_rgb() from the measured spectra that pbrt-v4 knows by these names (Johnson and
-// Christy, Palik, refractiveindex.info), between 380 and 780 nm.
+// Named metals, reduced once with conductor_rgb() from the measured spectra that pbrt-v4 knows by these names (Johnson
+// and Christy, Palik, refractiveindex.info), between 380 and 780 nm.
 
 #include <array>
 

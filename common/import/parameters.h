@@ -1,6 +1,6 @@
 #pragma once
-// Parameter lists: "type name" followed by one or more values. Every parameter must be asked for (or be named as ignored)
-// by whoever interprets the directive; finish() reports the rest, so that nothing is ever silently dropped.
+// Parameter lists: "type name" followed by one or more values. Every parameter must be asked for (or be named as
+// ignored) by whoever interprets the directive; finish() reports the rest, so that nothing is ever silently dropped.
 
 #include <optional>
 #include <string>
@@ -19,7 +19,7 @@ struct Parameter {
     std::vector<double> numbers;       ///< float, integer, point*, vector*, normal, rgb, blackbody, spectrum values.
     std::vector<std::string> strings;  ///< string, texture, spectrum names and files.
     std::vector<bool> bools;
-    bool from_attribute = false;       ///< A default set by an Attribute directive: may stay unused.
+    bool from_attribute = false;  ///< A default set by an Attribute directive: may stay unused.
     mutable bool used = false;
 };
 

@@ -17,7 +17,8 @@ double read_number(Tokenizer* tokens, const Location& where, const std::string& 
     double value = 0;
     if (token.kind != TokenKind::kWord || !parse_number(token.text, &value))
         fail(token.where.line ? token.where : where,
-             word + " needs a finite number" + (token.kind == TokenKind::kEnd ? "" : ", not " + quoted(std::string(token.text))));
+             word + " needs a finite number" +
+                 (token.kind == TokenKind::kEnd ? "" : ", not " + quoted(std::string(token.text))));
     return value;
 }
 
@@ -55,7 +56,8 @@ void Parser::parse_main(const std::string& name) {
     const Location where{context_->intern_file_name(name), 0};
     parse_file(name, where);
     if (!scopes_.empty())
-        fail(scopes_.back().where, "this scope is never closed; add the missing AttributeEnd, TransformEnd or ObjectEnd");
+        fail(scopes_.back().where,
+             "this scope is never closed; add the missing AttributeEnd, TransformEnd or ObjectEnd");
     if (!in_world_) fail(where, "the file has no WorldBegin; a scene needs one before its shapes and lights");
 }
 
@@ -114,7 +116,8 @@ bool Parser::transformation(Tokenizer* tokens, const std::string& word, const Lo
         const std::string name = read_string(tokens, where, word);
         const auto it = coordinate_systems_.find(name);
         if (it == coordinate_systems_.end())
-            fail(where, "CoordSysTransform: no coordinate system is named " + quoted(name) + "; define it with CoordinateSystem first");
+            fail(where, "CoordSysTransform: no coordinate system is named " + quoted(name) +
+                            "; define it with CoordinateSystem first");
         state_.ctm[0] = it->second[0];
         state_.ctm[1] = it->second[1];
     } else if (word == "ActiveTransform") {
@@ -142,13 +145,16 @@ void Parser::transform(const Location& where, const std::function<Mat4(const Mat
     for (int i = 0; i < 2; ++i) {
         if (!state_.active[i]) continue;
         state_.ctm[i] = f(state_.ctm[i]);
-        if (!inverse(state_.ctm[i])) fail(where, "the transformation becomes singular or infinite here; correct its numbers");
+        if (!inverse(state_.ctm[i]))
+            fail(where, "the transformation becomes singular or infinite here; correct its numbers");
     }
 }
 
 const Mat4& Parser::static_transform(const Location& where, const std::string& what) const {
     if (!(state_.ctm[0] == state_.ctm[1]))
-        fail(where, what + " moves while the shutter is open (ActiveTransform); motion is not supported, remove one of the transformations");
+        fail(where, what +
+                        " moves while the shutter is open (ActiveTransform); motion is not supported, remove one of "
+                        "the transformations");
     return state_.ctm[0];
 }
 
@@ -182,7 +188,8 @@ bool Parser::scope(Tokenizer* tokens, const std::string& word, const Location& w
         option(tokens, where);
     } else if (word == "ColorSpace") {
         const std::string name = read_string(tokens, where, word);
-        if (name != "srgb") fail(where, "ColorSpace " + quoted(name) + " is not supported; convert the colours to \"srgb\"");
+        if (name != "srgb")
+            fail(where, "ColorSpace " + quoted(name) + " is not supported; convert the colours to \"srgb\"");
     } else {
         return false;
     }
@@ -190,13 +197,15 @@ bool Parser::scope(Tokenizer* tokens, const std::string& word, const Location& w
 }
 
 void Parser::open_scope(char kind, const Location& where) {
-    if (scopes_.size() >= kMaxScopeDepth) fail(where, "scopes are nested deeper than " + std::to_string(kMaxScopeDepth));
+    if (scopes_.size() >= kMaxScopeDepth)
+        fail(where, "scopes are nested deeper than " + std::to_string(kMaxScopeDepth));
     scopes_.push_back({kind, state_, where});
 }
 
 void Parser::close_scope(char kind, const std::string& word, const Location& where) {
     if (scopes_.empty() || scopes_.back().kind != kind)
-        fail(where, word + " does not match " + (scopes_.empty() ? "any open scope" : "the scope opened at " + scopes_.back().where.text()));
+        fail(where, word + " does not match " +
+                        (scopes_.empty() ? "any open scope" : "the scope opened at " + scopes_.back().where.text()));
     state_ = std::move(scopes_.back().state);
     scopes_.pop_back();
 }
@@ -206,7 +215,12 @@ void Parser::include(Tokenizer* tokens, const Location& where) {
     const Result<std::string> name = normalise_reference(reference);
     if (!name.ok()) fail(where, name.status().message());
     if (include_depth_ >= kMaxIncludeDepth)
-        fail(where, "Include is nested deeper than " + std::to_string(kMaxIncludeDepth) + " files; does " + quoted(reference) + " include itself?");
+        fail(where, "Include is nested deeper than " + std::to_string(kMaxIncludeDepth) + " files; does " +
+                        quoted(reference) + " include itself?");
+    // Files that include each other several times multiply on every level.
+    if (++include_count_ > kMaxIncludes)
+        fail(where, "the scene includes files more than " + std::to_string(kMaxIncludes) +
+                        " times; put repeated content into an object");
     ++include_depth_;
     parse_file(*name, where);
     --include_depth_;
@@ -219,7 +233,8 @@ void Parser::import(Tokenizer* tokens, const Location& where) {
     const auto coordinate_systems = coordinate_systems_;
     const size_t depth = scopes_.size();
     include(tokens, where);
-    if (scopes_.size() != depth) fail(where, "the imported file leaves a scope open or closes one that it did not open");
+    if (scopes_.size() != depth)
+        fail(where, "the imported file leaves a scope open or closes one that it did not open");
     state_ = state;
     coordinate_systems_ = coordinate_systems;
 }

@@ -20,6 +20,7 @@ class Parser {
 
   private:
     static constexpr int kMaxIncludeDepth = 16;
+    static constexpr int kMaxIncludes = 100000;
     static constexpr size_t kMaxScopeDepth = 1024;
 
     struct GraphicsState {
@@ -28,7 +29,8 @@ class Parser {
         bool reverse_orientation = false;
         MaterialReference material;
         std::shared_ptr<const AreaLightDefinition> area_light;
-        std::map<std::string, ParameterList> attributes;  ///< Defaults by target: shape, light, material, medium, texture.
+        std::map<std::string, ParameterList>
+            attributes;  ///< Defaults by target: shape, light, material, medium, texture.
     };
     struct Scope {
         char kind;  ///< 'a' AttributeBegin, 't' TransformBegin, 'o' ObjectBegin.
@@ -72,7 +74,7 @@ class Parser {
     std::map<std::string, int32_t> objects_;
     std::map<std::string, bool> media_;
     int32_t current_object_ = kNone;
-    int include_depth_ = 0;
+    int include_depth_ = 0, include_count_ = 0;
     bool in_world_ = false;
 };
 

@@ -36,10 +36,22 @@ enum VertexValue { kX, kY, kZ, kNx, kNy, kNz, kU, kV, kVertexValues };
 
 std::optional<Scalar> scalar_type(std::string_view name) {
     constexpr std::array<std::pair<std::string_view, Scalar>, 16> kNames{{
-        {"char", Scalar::kInt8}, {"int8", Scalar::kInt8}, {"uchar", Scalar::kUint8}, {"uint8", Scalar::kUint8},
-        {"short", Scalar::kInt16}, {"int16", Scalar::kInt16}, {"ushort", Scalar::kUint16}, {"uint16", Scalar::kUint16},
-        {"int", Scalar::kInt32}, {"int32", Scalar::kInt32}, {"uint", Scalar::kUint32}, {"uint32", Scalar::kUint32},
-        {"float", Scalar::kFloat}, {"float32", Scalar::kFloat}, {"double", Scalar::kDouble}, {"float64", Scalar::kDouble},
+        {"char", Scalar::kInt8},
+        {"int8", Scalar::kInt8},
+        {"uchar", Scalar::kUint8},
+        {"uint8", Scalar::kUint8},
+        {"short", Scalar::kInt16},
+        {"int16", Scalar::kInt16},
+        {"ushort", Scalar::kUint16},
+        {"uint16", Scalar::kUint16},
+        {"int", Scalar::kInt32},
+        {"int32", Scalar::kInt32},
+        {"uint", Scalar::kUint32},
+        {"uint32", Scalar::kUint32},
+        {"float", Scalar::kFloat},
+        {"float32", Scalar::kFloat},
+        {"double", Scalar::kDouble},
+        {"float64", Scalar::kDouble},
     }};
     for (const auto& [text, type] : kNames)
         if (text == name) return type;
@@ -48,8 +60,20 @@ std::optional<Scalar> scalar_type(std::string_view name) {
 
 int vertex_slot(std::string_view name) {
     constexpr std::array<std::pair<std::string_view, VertexValue>, 14> kNames{{
-        {"x", kX}, {"y", kY}, {"z", kZ}, {"nx", kNx}, {"ny", kNy}, {"nz", kNz}, {"u", kU}, {"v", kV}, {"s", kU}, {"t", kV},
-        {"texture_u", kU}, {"texture_v", kV}, {"texture_s", kU}, {"texture_t", kV},
+        {"x", kX},
+        {"y", kY},
+        {"z", kZ},
+        {"nx", kNx},
+        {"ny", kNy},
+        {"nz", kNz},
+        {"u", kU},
+        {"v", kV},
+        {"s", kU},
+        {"t", kV},
+        {"texture_u", kU},
+        {"texture_v", kV},
+        {"texture_s", kU},
+        {"texture_t", kV},
     }};
     for (const auto& [text, slot] : kNames)
         if (text == name) return slot;
@@ -87,8 +111,8 @@ class Reader {
     T load(const char* p) const;
     double decode(Scalar type, const char* p) const;
     Status ended(const Element& element, uint64_t index) const {
-        return data_loss("the data end or are not a number in element " + quoted(element.name) + " number " + std::to_string(index) +
-                         " of " + std::to_string(element.count));
+        return data_loss("the data end or are not a number in element " + quoted(element.name) + " number " +
+                         std::to_string(index) + " of " + std::to_string(element.count));
     }
 
     std::string_view bytes_;
@@ -102,11 +126,16 @@ Status Reader::header_line(const std::vector<std::string_view>& words) {
     const std::string_view key = words[0];
     if (key == "comment" || key == "obj_info") return {};
     if (key == "format") {
-        if (words.size() != 3 || words[2] != "1.0") return invalid_argument("the PLY format line is not \"format KIND 1.0\"");
-        if (words[1] == "ascii") format_ = Format::kAscii;
-        else if (words[1] == "binary_little_endian") format_ = Format::kLittle;
-        else if (words[1] == "binary_big_endian") format_ = Format::kBig;
-        else return invalid_argument("unknown PLY format " + quoted(std::string(words[1])));
+        if (words.size() != 3 || words[2] != "1.0")
+            return invalid_argument("the PLY format line is not \"format KIND 1.0\"");
+        if (words[1] == "ascii")
+            format_ = Format::kAscii;
+        else if (words[1] == "binary_little_endian")
+            format_ = Format::kLittle;
+        else if (words[1] == "binary_big_endian")
+            format_ = Format::kBig;
+        else
+            return invalid_argument("unknown PLY format " + quoted(std::string(words[1])));
         have_format_ = true;
         return {};
     }
@@ -128,7 +157,8 @@ Status Reader::header_line(const std::vector<std::string_view>& words) {
         if (!p.is_list && words.size() != 3) return invalid_argument("a PLY property line is malformed");
         const auto type = scalar_type(words[p.is_list ? 3 : 1]);
         const auto count_type = p.is_list ? scalar_type(words[2]) : Scalar::kUint8;
-        if (!type || !count_type || *count_type >= Scalar::kFloat) return invalid_argument("a PLY property has an unknown type");
+        if (!type || !count_type || *count_type >= Scalar::kFloat)
+            return invalid_argument("a PLY property has an unknown type");
         p.type = *type;
         p.count_type = *count_type;
         p.name = words.back();
@@ -137,7 +167,8 @@ Status Reader::header_line(const std::vector<std::string_view>& words) {
         if (p.slot >= 0)
             for (const Property& other : element.properties)
                 if (other.slot == p.slot)
-                    return invalid_argument("the PLY properties " + quoted(other.name) + " and " + quoted(p.name) + " say the same thing twice");
+                    return invalid_argument("the PLY properties " + quoted(other.name) + " and " + quoted(p.name) +
+                                            " say the same thing twice");
         element.properties.push_back(std::move(p));
         return {};
     }
@@ -159,7 +190,8 @@ Status Reader::header() {
         if (words.empty()) continue;
         if (words[0] == "end_header") break;
         LL_RETURN_IF_ERROR(header_line(words));
-        if (words[0] != "comment" && ++lines > kMaxProperties) return invalid_argument("the PLY header has more than 256 lines");
+        if (words[0] != "comment" && ++lines > kMaxProperties)
+            return invalid_argument("the PLY header has more than 256 lines");
     }
     pos_ = std::min(pos_ + 1, bytes_.size());
     if (!have_format_) return invalid_argument("the PLY header has no format line");
@@ -174,13 +206,15 @@ Status Reader::check_claims() const {
         for (const Property& p : element.properties)
             record += format_ == Format::kAscii ? 2 : kScalarBytes[size_t(p.is_list ? p.count_type : p.type)];
         if (record == 0) {
-            if (element.count > 0) return invalid_argument("the PLY element " + quoted(element.name) + " has no properties");
+            if (element.count > 0)
+                return invalid_argument("the PLY element " + quoted(element.name) + " has no properties");
             continue;
         }
         // The last ascii value needs no separator.
         if (element.count > (left + 1) / record)
-            return data_loss("the PLY header claims " + std::to_string(element.count) + " elements " + quoted(element.name) +
-                             ", but the file has only " + std::to_string(bytes_.size() - pos_) + " bytes of data");
+            return data_loss("the PLY header claims " + std::to_string(element.count) + " elements " +
+                             quoted(element.name) + ", but the file has only " + std::to_string(bytes_.size() - pos_) +
+                             " bytes of data");
         left -= std::min(left, element.count * record);
     }
     return {};
@@ -216,12 +250,15 @@ bool Reader::value(Scalar type, double* out) {
         pos_ += size;
         return true;
     }
-    while (pos_ < bytes_.size() && (bytes_[pos_] == ' ' || bytes_[pos_] == '\n' || bytes_[pos_] == '\r' || bytes_[pos_] == '\t')) ++pos_;
+    while (pos_ < bytes_.size() &&
+           (bytes_[pos_] == ' ' || bytes_[pos_] == '\n' || bytes_[pos_] == '\r' || bytes_[pos_] == '\t'))
+        ++pos_;
     const char* begin = bytes_.data() + pos_;
     const auto [end, error] = std::from_chars(begin, bytes_.data() + bytes_.size(), *out);
     if (error != std::errc()) return false;
     pos_ += size_t(end - begin);
-    return pos_ == bytes_.size() || bytes_[pos_] == ' ' || bytes_[pos_] == '\n' || bytes_[pos_] == '\r' || bytes_[pos_] == '\t';
+    return pos_ == bytes_.size() || bytes_[pos_] == ' ' || bytes_[pos_] == '\n' || bytes_[pos_] == '\r' ||
+           bytes_[pos_] == '\t';
 }
 
 bool Reader::skip_property(const Property& p) {
@@ -242,8 +279,10 @@ bool Reader::skip_property(const Property& p) {
 Status Reader::vertices(const Element& element, PlyMesh* mesh) {
     bool has[kVertexValues] = {};
     for (const Property& p : element.properties) {
-        if (p.slot >= 0) has[p.slot] = true;
-        else mesh->ignored_properties.push_back("vertex " + p.name);
+        if (p.slot >= 0)
+            has[p.slot] = true;
+        else
+            mesh->ignored_properties.push_back("vertex " + p.name);
     }
     if (!has[kX] || !has[kY] || !has[kZ]) return invalid_argument("the PLY vertices have no x, y and z");
     const bool normals = has[kNx] && has[kNy] && has[kNz], uvs = has[kU] && has[kV];
@@ -261,7 +300,8 @@ Status Reader::vertices(const Element& element, PlyMesh* mesh) {
             if (!value(p.type, &number)) return ended(element, i);
             v[p.slot] = float(number);
             if (!std::isfinite(v[p.slot]))
-                return invalid_argument("the PLY vertex " + std::to_string(i) + " has a " + p.name + " that is not a finite number");
+                return invalid_argument("the PLY vertex " + std::to_string(i) + " has a " + p.name +
+                                        " that is not a finite number");
         }
         mesh->positions.push_back({v[kX], v[kY], v[kZ]});
         if (normals) mesh->normals.push_back({v[kNx], v[kNy], v[kNz]});
@@ -288,13 +328,15 @@ Status Reader::faces(const Element& element, PlyMesh* mesh) {
             double count = 0;
             if (!value(p.count_type, &count)) return ended(element, i);
             if (count < 3)
-                return invalid_argument("the PLY face " + std::to_string(i) + " has " + std::to_string(int64_t(count)) + " vertices; it needs three or more");
+                return invalid_argument("the PLY face " + std::to_string(i) + " has " + std::to_string(int64_t(count)) +
+                                        " vertices; it needs three or more");
             uint32_t first = 0, previous = 0;
             for (double corner = 0; corner < count; ++corner) {
                 double number = 0;
                 if (!value(p.type, &number)) return ended(element, i);
                 if (!(number >= 0 && number < vertex_count) || number != std::floor(number))
-                    return invalid_argument("the PLY face " + std::to_string(i) + " refers to a vertex that does not exist (the mesh has " +
+                    return invalid_argument("the PLY face " + std::to_string(i) +
+                                            " refers to a vertex that does not exist (the mesh has " +
                                             std::to_string(mesh->positions.size()) + ")");
                 const uint32_t index = uint32_t(number);
                 if (corner >= 2) mesh->indices.insert(mesh->indices.end(), {first, previous, index});

@@ -16,9 +16,9 @@ struct PlyMesh {
     std::vector<std::string> ignored_properties;  ///< Vertex and face properties that nothing here uses.
 };
 
-/// Decodes a PLY file. Polygons become fans of triangles around their first vertex. Reserves no more memory than the data
-/// can fill, whatever the header claims; every index is checked and every number is finite. The error message does not
-/// name the file.
+/// Decodes a PLY file. Polygons become fans of triangles around their first vertex. Reserves no more memory than the
+/// data can fill, whatever the header claims; every index is checked and every number is finite. The error message does
+/// not name the file.
 Result<PlyMesh> read_ply(std::string_view bytes);
 
 }  // namespace lightloom::import

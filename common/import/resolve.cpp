@@ -47,7 +47,8 @@ TriangleMesh subset(const TriangleMesh& mesh, const std::vector<size_t>& triangl
     return out;
 }
 
-/// As in pbrt, every triangle of a mesh is a light of its own with the given power; triangles of equal area stay together.
+/// As in pbrt, every triangle of a mesh is a light of its own with the given power; triangles of equal area stay
+/// together.
 void add_powered_mesh(Context* context, TriangleMesh mesh, const PendingShape& shape) {
     std::map<float, std::vector<size_t>> by_area;
     for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
@@ -56,7 +57,8 @@ void add_powered_mesh(Context* context, TriangleMesh mesh, const PendingShape& s
     }
     const size_t count = mesh.indices.size() / 3;
     if (count > 1)
-        context->diagnostics.warn(shape.where, "as in pbrt, each of the " + std::to_string(count) + " triangles of this light emits the given power");
+        context->diagnostics.warn(shape.where, "as in pbrt, each of the " + std::to_string(count) +
+                                                   " triangles of this light emits the given power");
     for (const auto& [area, triangles] : by_area) {
         TriangleMesh part = subset(mesh, triangles);
         part.attributes.emission = add_emission(context, area_emission(context, *shape.area_light, double(area)));
@@ -74,22 +76,28 @@ void add_shape(Context* context, PendingShape shape) {
     attributes.material = resolve_material_reference(context, shape.material);
     if (attributes.material == kInterfaceMaterial) {
         if (shape.area_light)
-            context->diagnostics.warn(shape.where, "an area light on a shape with the \"interface\" material is ignored, as in pbrt");
+            context->diagnostics.warn(
+                shape.where, "an area light on a shape with the \"interface\" material is ignored, as in pbrt");
         return;
     }
-    if (!shape.alpha_texture.empty()) attributes.alpha = named_float_texture(context, shape.where, shape.alpha_texture);
-    else if (shape.alpha != 1) attributes.alpha = constant_texture(context, Rgb(shape.alpha));
+    if (!shape.alpha_texture.empty())
+        attributes.alpha = named_float_texture(context, shape.where, shape.alpha_texture);
+    else if (shape.alpha != 1)
+        attributes.alpha = constant_texture(context, Rgb(shape.alpha));
     if (shape.area_light) {
         if (shape.alpha_texture.empty() && shape.alpha == 0)
-            fail(shape.where, "an emitting shape with alpha 0 (pbrt's invisible light) is not supported; give it a visible alpha");
+            fail(shape.where,
+                 "an emitting shape with alpha 0 (pbrt's invisible light) is not supported; give it a visible alpha");
         const bool powered = area_light_uses_power(*shape.area_light);
         if (powered && mesh) return add_powered_mesh(context, std::move(*mesh), shape);
         const double area = sphere ? 4 * kPiD * double(sphere->radius) * sphere->radius : 0;
         const AreaEmission emission = area_emission(context, *shape.area_light, area);
         if (!emission.radiance.is_black()) attributes.emission = add_emission(context, emission);
     }
-    if (mesh) (object ? object->meshes : scene.meshes).push_back(std::move(*mesh));
-    else (object ? object->spheres : scene.spheres).push_back(*sphere);
+    if (mesh)
+        (object ? object->meshes : scene.meshes).push_back(std::move(*mesh));
+    else
+        (object ? object->spheres : scene.spheres).push_back(*sphere);
 }
 
 }  // namespace
@@ -102,8 +110,10 @@ void resolve_shapes(Context* context) {
         resolve_material_reference(context, {true, name, 0, definition.parameters.where()});
     for (size_t i = 1; i < context->anonymous_materials.size(); ++i)
         resolve_material_reference(context, {false, "", int(i), context->anonymous_materials[i].parameters.where()});
-    for (const auto& [name, definition] : context->float_textures) named_float_texture(context, definition.parameters.where(), name);
-    for (const auto& [name, definition] : context->spectrum_textures) named_spectrum_texture(context, definition.parameters.where(), name);
+    for (const auto& [name, definition] : context->float_textures)
+        named_float_texture(context, definition.parameters.where(), name);
+    for (const auto& [name, definition] : context->spectrum_textures)
+        named_spectrum_texture(context, definition.parameters.where(), name);
 }
 
 }  // namespace lightloom::import

@@ -1,8 +1,8 @@
 // Shapes become triangle meshes and spheres in world space (the space of the object inside ObjectBegin).
 //
-// Orientation: a mesh keeps its corners in file order; `flip_normal` is ReverseOrientation xor "the transformation swaps
-// handedness", which makes the geometric normal the image of the object-space one. A sphere's geometric normal points
-// outwards whatever the transformation does, so only ReverseOrientation flips it.
+// Orientation: a mesh keeps its corners in file order; `flip_normal` is ReverseOrientation xor "the transformation
+// swaps handedness", which makes the geometric normal the image of the object-space one. A sphere's geometric normal
+// points outwards whatever the transformation does, so only ReverseOrientation flips it.
 
 #include <cmath>
 
@@ -45,7 +45,8 @@ TriangleMesh place(Context* context, const ParameterList& parameters, TriangleMe
     const bool identity = state.object_to_world == Mat4();
     for (Vec3& p : mesh.positions) {
         if (!identity) p = state.object_to_world.point(p);
-        if (!is_finite(p)) fail(parameters.where(), parameters.what() + ": a vertex is not finite after its transformation");
+        if (!is_finite(p))
+            fail(parameters.where(), parameters.what() + ": a vertex is not finite after its transformation");
     }
     mesh.attributes.flip_normal = state.reverse_orientation != state.object_to_world.swaps_handedness();
     std::vector<Vec3> substitutes;
@@ -54,7 +55,9 @@ TriangleMesh place(Context* context, const ParameterList& parameters, TriangleMe
         if (state.reverse_orientation) n = -n;
         if (!normalise(&n)) {
             if (substitutes.empty()) {
-                context->diagnostics.warn(parameters.where(), parameters.what() + ": a normal has length zero; the geometry's own is used there");
+                context->diagnostics.warn(
+                    parameters.where(),
+                    parameters.what() + ": a normal has length zero; the geometry's own is used there");
                 substitutes = geometric_normals(mesh);
             }
             n = mesh.attributes.flip_normal ? -substitutes[i] : substitutes[i];
@@ -69,7 +72,8 @@ std::vector<Vec3> points(const ParameterList& parameters, std::string_view type,
     std::vector<Vec3> out;
     if (const std::vector<double>* v = parameters.numbers(type, name, 3)) {
         out.reserve(v->size() / 3);
-        for (size_t i = 0; i < v->size(); i += 3) out.push_back({float((*v)[i]), float((*v)[i + 1]), float((*v)[i + 2])});
+        for (size_t i = 0; i < v->size(); i += 3)
+            out.push_back({float((*v)[i]), float((*v)[i + 1]), float((*v)[i + 2])});
     }
     return out;
 }
@@ -84,15 +88,18 @@ TriangleMesh read_mesh(const ParameterList& parameters, size_t corners) {
     if (const std::vector<double>* uv = parameters.numbers("point2", "uv", 2))
         for (size_t i = 0; i < uv->size(); i += 2) mesh.uvs.push_back({float((*uv)[i]), float((*uv)[i + 1])});
     if (!mesh.normals.empty() && mesh.normals.size() != mesh.positions.size())
-        fail(parameters.where(), what + ": N has " + std::to_string(mesh.normals.size()) + " normals for " + std::to_string(mesh.positions.size()) + " points");
+        fail(parameters.where(), what + ": N has " + std::to_string(mesh.normals.size()) + " normals for " +
+                                     std::to_string(mesh.positions.size()) + " points");
     if (!mesh.uvs.empty() && mesh.uvs.size() != mesh.positions.size())
-        fail(parameters.where(), what + ": uv has " + std::to_string(mesh.uvs.size()) + " pairs for " + std::to_string(mesh.positions.size()) + " points");
+        fail(parameters.where(), what + ": uv has " + std::to_string(mesh.uvs.size()) + " pairs for " +
+                                     std::to_string(mesh.positions.size()) + " points");
     if (const std::vector<double>* indices = parameters.numbers("integer", "indices", corners)) {
         mesh.indices.reserve(indices->size());
         for (const double index : *indices) {
             if (index < 0 || index >= double(mesh.positions.size()))
-                fail(parameters.where(), what + ": the index " + std::to_string(int64_t(index)) + " is out of range; there are " +
-                                             std::to_string(mesh.positions.size()) + " points");
+                fail(parameters.where(), what + ": the index " + std::to_string(int64_t(index)) +
+                                             " is out of range; there are " + std::to_string(mesh.positions.size()) +
+                                             " points");
             mesh.indices.push_back(uint32_t(index));
         }
     } else if (mesh.positions.size() == corners) {
@@ -105,7 +112,8 @@ TriangleMesh read_mesh(const ParameterList& parameters, size_t corners) {
 
 TriangleMesh triangle_mesh(Context* context, const ParameterList& parameters, const ShapeState& state) {
     TriangleMesh mesh = read_mesh(parameters, 3);
-    parameters.ignore(&context->diagnostics, "S", "tangents only turn anisotropic highlights, which follow the (u, v) directions here");
+    parameters.ignore(&context->diagnostics, "S",
+                      "tangents only turn anisotropic highlights, which follow the (u, v) directions here");
     parameters.ignore(&context->diagnostics, "faceIndices", "no texture here is looked up by face");
     return place(context, parameters, std::move(mesh), state);
 }
@@ -124,7 +132,8 @@ TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const S
     Result<PlyMesh> ply = read_ply(bytes);
     if (!ply.ok()) fail(parameters.where(), quoted(reference) + ": " + ply.status().message());
     for (const std::string& name : ply->ignored_properties)
-        context->diagnostics.warn(parameters.where(), "the PLY property " + quoted(name) + " is ignored: nothing here uses it");
+        context->diagnostics.warn(parameters.where(),
+                                  "the PLY property " + quoted(name) + " is ignored: nothing here uses it");
     TriangleMesh mesh;
     mesh.positions = std::move(ply->positions);
     mesh.normals = std::move(ply->normals);
@@ -142,13 +151,16 @@ std::variant<TriangleMesh, Sphere> sphere(Context* context, const ParameterList&
     const float radius = parameters.one_float("radius", 1);
     if (!(radius > 0)) fail(parameters.where(), parameters.what() + ": the radius must be positive");
     if (parameters.one_float("zmin", -radius) > -radius || parameters.one_float("zmax", radius) < radius)
-        fail(parameters.where(), parameters.what() + ": zmin or zmax cut the sphere; partial spheres are not supported, use a triangle mesh");
+        fail(parameters.where(),
+             parameters.what() +
+                 ": zmin or zmax cut the sphere; partial spheres are not supported, use a triangle mesh");
     require_full_turn(parameters);
     checked_inverse(parameters, state.object_to_world);
     const std::optional<double> scale = similarity_scale(state.object_to_world);
     if (!scale) {
-        context->diagnostics.warn(parameters.where(), parameters.what() + ": its transformation is not a similarity, so it becomes " +
-                                                          std::to_string(kEllipsoidTriangles) + " triangles with smooth normals");
+        context->diagnostics.warn(parameters.where(),
+                                  parameters.what() + ": its transformation is not a similarity, so it becomes " +
+                                      std::to_string(kEllipsoidTriangles) + " triangles with smooth normals");
         return place(context, parameters, tessellate_sphere(radius), state);
     }
     Sphere s;
@@ -172,8 +184,9 @@ TriangleMesh disk(Context* context, const ParameterList& parameters, const Shape
     if (!(radius > 0) || !(inner >= 0) || !(inner < radius))
         fail(parameters.where(), parameters.what() + ": radius must be positive and larger than innerradius");
     require_full_turn(parameters);
-    context->diagnostics.warn(parameters.where(), parameters.what() + ": disks become a ring of " + std::to_string(kDiskSegments) +
-                                                      " segments of exactly the disk's area; the rim is true to 0.03 % of the radius");
+    context->diagnostics.warn(parameters.where(),
+                              parameters.what() + ": disks become a ring of " + std::to_string(kDiskSegments) +
+                                  " segments of exactly the disk's area; the rim is true to 0.03 % of the radius");
     return place(context, parameters, tessellate_disk(radius, inner, height), state);
 }
 
@@ -183,21 +196,24 @@ TriangleMesh bilinear_mesh(Context* context, const ParameterList& parameters, co
     bool curved = false;
     TriangleMesh mesh = tessellate_patches(read_mesh(parameters, 4), &curved);
     if (curved)
-        context->diagnostics.warn(parameters.where(), parameters.what() + ": a patch that is no parallelogram becomes a grid of " +
-                                                          std::to_string(kPatchSteps) + " x " + std::to_string(kPatchSteps) + " quadrilaterals");
+        context->diagnostics.warn(parameters.where(), parameters.what() +
+                                                          ": a patch that is no parallelogram becomes a grid of " +
+                                                          std::to_string(kPatchSteps) + " x " +
+                                                          std::to_string(kPatchSteps) + " quadrilaterals");
     return place(context, parameters, std::move(mesh), state);
 }
 
 }  // namespace
 
-std::variant<TriangleMesh, Sphere> make_shape(Context* context, const std::string& kind, const ParameterList& parameters,
-                                              const ShapeState& state) {
+std::variant<TriangleMesh, Sphere> make_shape(Context* context, const std::string& kind,
+                                              const ParameterList& parameters, const ShapeState& state) {
     if (kind == "trianglemesh") return triangle_mesh(context, parameters, state);
     if (kind == "plymesh") return ply_mesh(context, parameters, state);
     if (kind == "sphere") return sphere(context, parameters, state);
     if (kind == "disk") return disk(context, parameters, state);
     if (kind == "bilinearmesh") return bilinear_mesh(context, parameters, state);
-    fail(parameters.where(), parameters.what() + " is not supported; use trianglemesh, plymesh, sphere, disk or bilinearmesh");
+    fail(parameters.where(),
+         parameters.what() + " is not supported; use trianglemesh, plymesh, sphere, disk or bilinearmesh");
 }
 
 }  // namespace lightloom::import

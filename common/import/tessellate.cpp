@@ -90,7 +90,8 @@ TriangleMesh tessellate_patches(const TriangleMesh& patches, bool* curved) {
             if (!patches.normals.empty()) n[k] = patches.normals[index];
             uv[k] = patches.uvs.empty() ? kCorners[k] : patches.uvs[index];
         }
-        const bool even_uv = patches.uvs.empty() || (uv[0].x - uv[1].x - uv[2].x + uv[3].x == 0 && uv[0].y - uv[1].y - uv[2].y + uv[3].y == 0);
+        const bool even_uv = patches.uvs.empty() ||
+                             (uv[0].x - uv[1].x - uv[2].x + uv[3].x == 0 && uv[0].y - uv[1].y - uv[2].y + uv[3].y == 0);
         const bool flat = is_parallelogram(p) && even_uv && patches.normals.empty();
         *curved = *curved || !flat;
         const uint32_t steps = flat ? 1 : kPatchSteps;
@@ -101,7 +102,9 @@ TriangleMesh tessellate_patches(const TriangleMesh& patches, bool* curved) {
                 mesh.positions.push_back(bilinear(p, u, v));
                 if (!patches.normals.empty()) mesh.normals.push_back(bilinear(n, u, v));
                 const Vec3 texture = bilinear(std::array<Vec3, 4>{Vec3{uv[0].x, uv[0].y, 0}, Vec3{uv[1].x, uv[1].y, 0},
-                                                                  Vec3{uv[2].x, uv[2].y, 0}, Vec3{uv[3].x, uv[3].y, 0}}.data(), u, v);
+                                                                  Vec3{uv[2].x, uv[2].y, 0}, Vec3{uv[3].x, uv[3].y, 0}}
+                                                  .data(),
+                                              u, v);
                 mesh.uvs.push_back({texture.x, texture.y});
             }
         for (uint32_t j = 0; j < steps; ++j)

@@ -22,8 +22,8 @@ TriangleMesh tessellate_disk(float radius, float inner_radius, float height);
 /// A sphere about the origin with pbrt's (u, v) and exact normals at the vertices.
 TriangleMesh tessellate_sphere(float radius);
 
-/// Four corners per face (p00, p10, p01, p11) to triangles. A parallelogram becomes two, which is exact; any other patch a
-/// grid, and then `*curved` is set.
+/// Four corners per face (p00, p10, p01, p11) to triangles. A parallelogram becomes two, which is exact; any other
+/// patch a grid, and then `*curved` is set.
 TriangleMesh tessellate_patches(const TriangleMesh& patches, bool* curved);
 
 }  // namespace lightloom::import

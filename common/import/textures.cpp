@@ -19,12 +19,15 @@ constexpr double kMaxVisits = 4096;
 Spectrum read_spectrum(Context* context, const Parameter& p, const std::string& what) {
     if (!p.numbers.empty() && p.strings.empty()) {
         if (auto spectrum = spectrum_from_pairs(p.numbers)) return *spectrum;
-        fail(p.where, what + ": the spectrum " + quoted(p.name) + " needs pairs of wavelength and value with increasing wavelengths");
+        fail(p.where, what + ": the spectrum " + quoted(p.name) +
+                          " needs pairs of wavelength and value with increasing wavelengths");
     }
-    if (p.strings.size() != 1 || !p.numbers.empty()) fail(p.where, what + ": the spectrum " + quoted(p.name) + " needs one name, one file or pairs of numbers");
+    if (p.strings.size() != 1 || !p.numbers.empty())
+        fail(p.where, what + ": the spectrum " + quoted(p.name) + " needs one name, one file or pairs of numbers");
     const std::string text = context->read_file(p.where, p.strings[0]);
     if (auto spectrum = parse_spectrum_text(text)) return *spectrum;
-    fail(p.where, what + ": " + quoted(p.strings[0]) + " is not a spectrum file (pairs of increasing wavelength and value)");
+    fail(p.where,
+         what + ": " + quoted(p.strings[0]) + " is not a spectrum file (pairs of increasing wavelength and value)");
 }
 
 Rgb colour_of(Context* context, const Parameter& p, const std::string& what, ColourUse use) {
@@ -59,8 +62,10 @@ void read_encoding(const ParameterList& parameters, const std::string& fallback,
     request->srgb = encoding == "sRGB";
     if (encoding == "sRGB" || encoding == "linear") return;
     double gamma = 0;
-    if (encoding.rfind("gamma ", 0) != 0 || !parse_number(std::string_view(encoding).substr(6), &gamma) || !(gamma > 0) || gamma > 100)
-        fail(parameters.where(), parameters.what() + ": the encoding " + quoted(encoding) + " must be sRGB, linear or \"gamma VALUE\"");
+    if (encoding.rfind("gamma ", 0) != 0 || !parse_number(std::string_view(encoding).substr(6), &gamma) ||
+        !(gamma > 0) || gamma > 100)
+        fail(parameters.where(),
+             parameters.what() + ": the encoding " + quoted(encoding) + " must be sRGB, linear or \"gamma VALUE\"");
     request->gamma = float(gamma);
 }
 
@@ -72,10 +77,12 @@ TextureId image_texture(Context* context, const ParameterList& parameters, bool 
     node.invert = parameters.one_bool("invert", false);
     const std::string wrap = parameters.one_choice("wrap", "repeat", {"repeat", "clamp", "black"});
     node.wrap = wrap == "repeat" ? WrapMode::kRepeat : wrap == "clamp" ? WrapMode::kClamp : WrapMode::kBlack;
-    const std::string filter = parameters.one_choice("filter", "bilinear", {"point", "bilinear", "trilinear", "EWA", "ewa"});
+    const std::string filter =
+        parameters.one_choice("filter", "bilinear", {"point", "bilinear", "trilinear", "EWA", "ewa"});
     node.nearest = filter == "point";
     if (filter != "point" && filter != "bilinear")
-        context->diagnostics.warn(parameters.where(), parameters.what() + ": the filter " + quoted(filter) + " becomes bilinear; samples average the rest");
+        context->diagnostics.warn(parameters.where(), parameters.what() + ": the filter " + quoted(filter) +
+                                                          " becomes bilinear; samples average the rest");
     parameters.accept("maxanisotropy");  // Belongs to the EWA filter only.
     const std::string reference = parameters.one_string("filename", "");
     if (reference.empty()) fail(parameters.where(), parameters.what() + " has no \"string filename\"");
@@ -86,7 +93,8 @@ TextureId image_texture(Context* context, const ParameterList& parameters, bool 
     return add_node(context, node);
 }
 
-TextureId operand(Context* context, const ParameterList& parameters, std::string_view name, bool is_float, float fallback) {
+TextureId operand(Context* context, const ParameterList& parameters, std::string_view name, bool is_float,
+                  float fallback) {
     const TextureId id = is_float ? float_texture_parameter(context, parameters, name)
                                   : spectrum_texture_parameter(context, parameters, name, ColourUse::kUnbounded);
     return id == kNone ? constant_texture(context, Rgb(fallback)) : id;
@@ -122,7 +130,8 @@ TextureId make_texture(Context* context, const Definition& definition, bool is_f
         node.amount = operand(context, parameters, "amount", true, 0.5f);
         return add_node(context, node);
     }
-    fail(parameters.where(), parameters.what() + " is not supported; use constant, scale, mix, checkerboard or imagemap");
+    fail(parameters.where(),
+         parameters.what() + " is not supported; use constant, scale, mix, checkerboard or imagemap");
 }
 
 /// Marks a texture that is being resolved, so that a cycle is found.
@@ -139,8 +148,9 @@ TextureId named_texture(Context* context, const Location& where, const std::stri
     }
     const auto it = definitions.find(name);
     if (it == definitions.end()) {
-        fail(where, "no " + type + " texture is named " + quoted(name) +
-                        (others.count(name) ? "; the texture of this name has the other type" : "; define it with Texture"));
+        fail(where,
+             "no " + type + " texture is named " + quoted(name) +
+                 (others.count(name) ? "; the texture of this name has the other type" : "; define it with Texture"));
     }
     if (resolved.size() > 100000) fail(where, "the scene has more than 100000 textures");
     resolved[name] = kInProgress;
@@ -149,7 +159,9 @@ TextureId named_texture(Context* context, const Location& where, const std::stri
     --context->texture_depth;
     const TextureCost cost = context->texture_costs[size_t(id)];
     if (cost.levels > kMaxNesting) fail(where, "textures refer to one another more than 31 levels deep");
-    if (cost.visits > kMaxVisits) fail(where, "the texture " + quoted(name) + " needs more than 4096 look-ups; use fewer textures in one another");
+    if (cost.visits > kMaxVisits)
+        fail(where,
+             "the texture " + quoted(name) + " needs more than 4096 look-ups; use fewer textures in one another");
     it->second.parameters.finish();
     resolved[name] = id;
     return id;
@@ -190,20 +202,24 @@ TextureId named_spectrum_texture(Context* context, const Location& where, const 
 
 TextureId float_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name) {
     if (const Parameter* p = parameters.find("texture", name)) {
-        if (p->strings.size() != 1) fail(p->where, parameters.what() + ": " + quoted(p->name) + " needs one texture name");
+        if (p->strings.size() != 1)
+            fail(p->where, parameters.what() + ": " + quoted(p->name) + " needs one texture name");
         return named_float_texture(context, p->where, p->strings[0]);
     }
     if (!parameters.find("float", name)) return kNone;
     return constant_texture(context, Rgb(parameters.one_float(name, 0)));
 }
 
-TextureId spectrum_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name, ColourUse use) {
+TextureId spectrum_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name,
+                                     ColourUse use) {
     if (const Parameter* p = parameters.find("texture", name)) {
-        if (p->strings.size() != 1) fail(p->where, parameters.what() + ": " + quoted(p->name) + " needs one texture name");
+        if (p->strings.size() != 1)
+            fail(p->where, parameters.what() + ": " + quoted(p->name) + " needs one texture name");
         return named_spectrum_texture(context, p->where, p->strings[0]);
     }
     for (const std::string_view type : {"rgb", "spectrum"})
-        if (const Parameter* p = parameters.find(type, name)) return constant_texture(context, colour_of(context, *p, parameters.what(), use));
+        if (const Parameter* p = parameters.find(type, name))
+            return constant_texture(context, colour_of(context, *p, parameters.what(), use));
     return kNone;
 }
 

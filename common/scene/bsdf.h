@@ -106,8 +106,9 @@ Rgb conductor_k(const Rgb& reflectance);
 Bsdf make_dielectric(float eta, float alpha_x, float alpha_y);
 /// A thin pane: both interfaces with all their inter-reflections, without refraction.
 Bsdf make_thin_dielectric(float eta);
-/// Dielectric coat of index `eta` and optical thickness `thickness` over a Lambertian base.
-Bsdf make_coated_diffuse(const Rgb& reflectance, float eta, float thickness, float alpha_x, float alpha_y);
+/// Dielectric coat of index `eta` and optical thickness `thickness` over a Lambertian base. Light is followed through
+/// `base_bounces` reflections at the base; 0 means all of them.
+Bsdf make_coated_diffuse(const Rgb& reflectance, float eta, float thickness, float alpha_x, float alpha_y, int base_bounces = 0);
 /// Dielectric coat over a conductor whose complex index is given against vacuum.
 Bsdf make_coated_conductor(const Rgb& conductor_eta, const Rgb& conductor_k, float base_alpha_x, float base_alpha_y,
                            float eta, float thickness, float alpha_x, float alpha_y);

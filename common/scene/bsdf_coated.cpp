@@ -6,8 +6,9 @@
 // A Lambertian base forgets where light came from, so that with r, the share of its light that the coat returns to it, the
 // walk is a geometric series [Saunderson 1942]:
 //     f = f_coat + A(wo) A(wi) rho / (pi eta^2 (1 - rho r)).
-// This IS the mean of pbrt's walk, but for pbrt's end after ten events, which takes (rho r)^5 of the second term. A smooth
-// coat without thickness is a furnace at rho = 1. Rough interfaces scatter once and lose what they shadow, as in pbrt;
+// This IS the mean of pbrt's walk. pbrt's walk ends after "maxdepth" events (10: five at the base), and so does the series
+// with n base bounces: 1 - (rho r)^n of it. A smooth coat without thickness and with the endless series is a furnace at
+// rho = 1. Rough interfaces scatter once and lose what they shadow, as in pbrt;
 // the loss is large (a coat of alpha 0.25 over albedo 0.7 absorbs a fifth), so that scenes are made to look right with it.
 //
 // Over a conductor with microfacet lobe f_base, whose mean reflectance is R, in directions w' refracted by Snell's law:
@@ -101,13 +102,15 @@ ConductorSide conductor_side(const Bsdf& b, float cos) {
 
 }  // namespace
 
-Bsdf make_coated_diffuse(const Rgb& reflectance, float eta, float thickness, float alpha_x, float alpha_y) {
+Bsdf make_coated_diffuse(const Rgb& reflectance, float eta, float thickness, float alpha_x, float alpha_y, int base_bounces) {
     Bsdf b;
     b.kind = BsdfKind::kCoatedDiffuse;
     const float r = make_coat(&b, eta, thickness, alpha_x, alpha_y);
-    const auto base = [r, eta](float rho) {
+    const auto base = [r, eta, base_bounces](float rho) {
         rho = clamp(rho, 0.0f, 1.0f);
-        return rho / (eta * eta * (1 - rho * r));
+        float rest = base_bounces > 0 ? 1.0f : 0.0f;  // (rho r)^n, what the endless series has beyond n bounces
+        for (int i = 0; i < base_bounces; ++i) rest *= rho * r;
+        return rho * (1 - rest) / (eta * eta * (1 - rho * r));
     };
     // Stored so that the base's lobe is A(wo) A(wi) reflectance / pi.
     b.reflectance = {base(reflectance.r), base(reflectance.g), base(reflectance.b)};

@@ -58,6 +58,8 @@ struct Material {
     bool remap_roughness = true;              ///< pbrt: alpha = sqrt(roughness) if true, alpha = roughness otherwise.
     float ior = 1.5f;                         ///< Relative index of (thin) dielectric or of the coat.
     float thickness = 0.01f;                  ///< Of the coat of coated kinds: every crossing transmits exp(-thickness / cos).
+    int layer_events = 10;                    ///< kCoatedDiffuse: scattering events between coat and base that are followed, as
+                                              ///< pbrt's "maxdepth"; every other one is a base reflection. 0: all.
     MaterialId mix_a = kNone, mix_b = kNone;  ///< kMix: a with probability 1 - amount, b with probability amount.
     TextureId mix_amount = kNone;
 };

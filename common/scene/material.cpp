@@ -63,7 +63,8 @@ Bsdf resolve_material(const TextureTables& tables, MaterialId material, Vec2 uv,
             }
             case MaterialKind::kDielectric: return make_dielectric(ior, alpha_x, alpha_y);
             case MaterialKind::kCoatedDiffuse:
-                return make_coated_diffuse(value(tables, m.reflectance, uv, Rgb(0.5f)), ior, m.thickness, alpha_x, alpha_y);
+                return make_coated_diffuse(value(tables, m.reflectance, uv, Rgb(0.5f)), ior, m.thickness, alpha_x, alpha_y,
+                                           (m.layer_events + 1) / 2);
             case MaterialKind::kCoatedConductor: {
                 const ConductorIndex index = conductor_index(tables, m, uv);
                 return make_coated_conductor(index.eta, index.k,

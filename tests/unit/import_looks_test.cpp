@@ -48,7 +48,8 @@ TEST(ImportMaterial, DefaultsAreThoseOfPbrt) {
     EXPECT_EQ(value(d, material_of(d).k), import::named_metal("metal-Cu")->k);
     EXPECT_EQ(value(d, material_of(d).roughness_u), Rgb(0.0f));
     EXPECT_TRUE(material_of(d).remap_roughness);
-    d = world("Material \"dielectric\" \"float vroughness\" 0.3 \"float roughness\" 0.1 \"bool remaproughness\" false" + kShape);
+    d = world("Material \"dielectric\" \"float vroughness\" 0.3 \"float roughness\" 0.1 \"bool remaproughness\" false" +
+              kShape);
     EXPECT_EQ(material_of(d).ior, 1.5f);
     EXPECT_EQ(value(d, material_of(d).roughness_u), Rgb(0.1f));
     EXPECT_EQ(value(d, material_of(d).roughness_v), Rgb(0.3f));
@@ -57,16 +58,20 @@ TEST(ImportMaterial, DefaultsAreThoseOfPbrt) {
     EXPECT_EQ(value(d, material_of(d).reflectance), Rgb(0.5f));
     EXPECT_EQ(value(d, material_of(d).roughness_u), Rgb(0.0f));
     EXPECT_EQ(material_of(d).ior, 1.5f);
-    d = world("Material \"coatedconductor\" \"float interface.roughness\" 0.1 \"float conductor.roughness\" 0.2 \"rgb reflectance\" [0.1 0.2 0.3]" + kShape);
+    d = world(
+        "Material \"coatedconductor\" \"float interface.roughness\" 0.1 \"float conductor.roughness\" 0.2 \"rgb "
+        "reflectance\" [0.1 0.2 0.3]" +
+        kShape);
     EXPECT_EQ(value(d, material_of(d).roughness_u), Rgb(0.1f));
     EXPECT_EQ(value(d, material_of(d).base_roughness_v), Rgb(0.2f));
     EXPECT_EQ(value(d, material_of(d).reflectance), Rgb(0.1f, 0.2f, 0.3f));
 }
 
 TEST(ImportMaterial, NamedOnesMayComeLaterAndMix) {
-    const SceneDescription d = world("NamedMaterial \"m\"" + kShape +
-                                     "MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"a\" \"b\"] \"float amount\" 0.25\n"
-                                     "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" MakeNamedMaterial \"b\" \"string type\" \"dielectric\"");
+    const SceneDescription d = world(
+        "NamedMaterial \"m\"" + kShape +
+        "MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"a\" \"b\"] \"float amount\" 0.25\n"
+        "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" MakeNamedMaterial \"b\" \"string type\" \"dielectric\"");
     const Material m = material_of(d);
     EXPECT_EQ(m.kind, MaterialKind::kMix);
     EXPECT_EQ(m.name, "m");
@@ -75,7 +80,9 @@ TEST(ImportMaterial, NamedOnesMayComeLaterAndMix) {
     expect_error("MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"m\" \"m\"]", {"itself"});
     expect_error("NamedMaterial \"x\"" + kShape, {"scene.pbrt:3", "\"x\""});
     expect_error("MakeNamedMaterial \"x\"", {"type"});
-    expect_error("MakeNamedMaterial \"x\" \"string type\" \"diffuse\" MakeNamedMaterial \"x\" \"string type\" \"diffuse\"", {"twice"});
+    expect_error(
+        "MakeNamedMaterial \"x\" \"string type\" \"diffuse\" MakeNamedMaterial \"x\" \"string type\" \"diffuse\"",
+        {"twice"});
     std::string chain = "MakeNamedMaterial \"m0\" \"string type\" \"diffuse\"";
     for (int i = 1; i < 40; ++i) {
         const std::string previous = "\"m" + std::to_string(i - 1) + "\"";
@@ -103,14 +110,19 @@ TEST(ImportMaterial, WhatIsNotModelledIsNamed) {
     expect_error("Material \"conductor\" \"spectrum eta\" \"metal-Xx-eta\"", {"metal-Xx"});
     expect_error("Material \"dielectric\" \"float roughness\" 2", {"[0, 1]"});
     expect_error("Material \"dielectric\" \"float eta\" 0", {"index"});
-    expect_warning("Material \"coateddiffuse\" \"float thickness\" 0.1", "thickness");
+    expect_warning("Material \"coateddiffuse\" \"float g\" 0.1", "medium");
+    const Material coat = material_of(world("Material \"coateddiffuse\" \"float thickness\" 0.1 \"integer maxdepth\" 7" + kShape));
+    EXPECT_EQ(coat.thickness, 0.1f);
+    EXPECT_EQ(coat.layer_events, 7);
     expect_warning("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"" + kShape, "dispersion");
-    EXPECT_NEAR(material_of(world("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"" + kShape)).ior, 1.5168, 1e-4);
+    EXPECT_NEAR(material_of(world("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"" + kShape)).ior, 1.5168,
+                1e-4);
 }
 
 TEST(ImportTexture, KindsAndNesting) {
     const SceneDescription d = world(
-        "Texture \"c\" \"spectrum\" \"checkerboard\" \"rgb tex1\" [1 0 0] \"rgb tex2\" [0 1 0] \"float uscale\" 2 \"float vscale\" 2\n"
+        "Texture \"c\" \"spectrum\" \"checkerboard\" \"rgb tex1\" [1 0 0] \"rgb tex2\" [0 1 0] \"float uscale\" 2 "
+        "\"float vscale\" 2\n"
         "Texture \"h\" \"float\" \"constant\" \"float value\" 0.5\n"
         "Texture \"s\" \"spectrum\" \"scale\" \"texture tex\" \"c\" \"texture scale\" \"h\"\n"
         "Texture \"m\" \"spectrum\" \"mix\" \"texture tex1\" \"s\" \"rgb tex2\" [0 0 1] \"float amount\" 0.25\n"
@@ -124,10 +136,16 @@ TEST(ImportTexture, KindsAndNesting) {
 
 TEST(ImportTexture, ImagesAreLookedUpAsInPbrt) {
     // Bottom row: red, green; top row: blue, white.
-    const testing::FileMap files{{"t.tga", tga(2, 2, std::string("\0\0\xff" "\0\xff\0" "\xff\0\0" "\xff\xff\xff", 12))}};
+    const testing::FileMap files{{"t.tga", tga(2, 2,
+                                               std::string("\0\0\xff"
+                                                           "\0\xff\0"
+                                                           "\xff\0\0"
+                                                           "\xff\xff\xff",
+                                                           12))}};
     const auto look = [&](const std::string& options, Vec2 uv) {
-        const SceneDescription d = world("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"t.tga\" " + options +
-                                         " Material \"diffuse\" \"texture reflectance\" \"t\"" + kShape, files);
+        const SceneDescription d = world("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"t.tga\" " +
+                                             options + " Material \"diffuse\" \"texture reflectance\" \"t\"" + kShape,
+                                         files);
         return value(d, material_of(d).reflectance, uv);
     };
     const std::string point = "\"string filter\" \"point\" ";
@@ -143,49 +161,61 @@ TEST(ImportTexture, ImagesAreLookedUpAsInPbrt) {
 }
 
 TEST(ImportTexture, EncodingsAndFloats) {
-    const testing::FileMap files{{"g.tga", tga(1, 1, "\x80\x80\x80")}, {"c.tga", tga(1, 1, std::string("\x30\x60\x90", 3))}};
+    const testing::FileMap files{{"g.tga", tga(1, 1, "\x80\x80\x80")},
+                                 {"c.tga", tga(1, 1, std::string("\x30\x60\x90", 3))}};
     const auto grey = [&](const std::string& options) {
-        const SceneDescription d = world("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"g.tga\" " + options +
-                                         " Shape \"sphere\" \"texture alpha\" \"t\"", files);
+        const SceneDescription d = world("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"g.tga\" " +
+                                             options + " Shape \"sphere\" \"texture alpha\" \"t\"",
+                                         files);
         return value(d, d.spheres.at(0).attributes.alpha).g;
     };
     EXPECT_NEAR(grey(""), 0.21586, 1e-4);
     EXPECT_NEAR(grey("\"string encoding\" \"linear\""), 128 / 255.0, 1e-6);
     EXPECT_NEAR(grey("\"string encoding\" \"gamma 2.2\""), std::pow(128 / 255.0, 2.2), 1e-5);
-    const SceneDescription d = world("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"c.tga\" \"string encoding\" \"linear\""
-                                     " Shape \"sphere\" \"texture alpha\" \"t\"", files);
+    const SceneDescription d = world(
+        "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"c.tga\" \"string encoding\" \"linear\""
+        " Shape \"sphere\" \"texture alpha\" \"t\"",
+        files);
     EXPECT_NEAR(value(d, d.spheres[0].attributes.alpha).r, 96 / 255.0, 1e-6);
 }
 
 TEST(ImportTexture, Errors) {
     expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.png\"", {"scene.pbrt:3", "no.png"});
-    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.bmp\"", {"bmp", "png"}, {{"no.bmp", "BM"}});
+    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.bmp\"", {"bmp", "png"},
+                 {{"no.bmp", "BM"}});
     for (const char* name : {"a.png", "a.jpg", "a.hdr", "a.tga", "a.exr"})
-        expect_error(std::string("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"") + name + "\"", {name}, {{name, "rubbish"}});
+        expect_error(std::string("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"") + name + "\"",
+                     {name}, {{name, "rubbish"}});
     std::string huge = tga(1, 1, "");
     huge[12] = huge[13] = huge[14] = huge[15] = '\x3f';
-    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.tga\"", {"cannot hold"}, {{"a.tga", huge}});
+    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.tga\"", {"cannot hold"},
+                 {{"a.tga", huge}});
     expect_error("Texture \"t\" \"spectrum\" \"marble\"", {"marble", "not supported"});
     expect_error("Texture \"t\" \"spectrum\" \"checkerboard\" \"string mapping\" \"planar\"", {"mapping", "uv"});
     expect_error("Texture \"t\" \"spectrum\" \"checkerboard\" \"integer dimension\" 3", {"dimension"});
     expect_error("Texture \"t\" \"spectrum\" \"scale\" \"texture tex\" \"t\"", {"itself"});
     expect_error("Texture \"t\" \"colour\" \"constant\"", {"float or spectrum"});
     expect_error("Texture \"t\" \"float\" \"constant\" Texture \"t\" \"float\" \"constant\"", {"twice"});
-    expect_error("Texture \"t\" \"float\" \"constant\" Material \"diffuse\" \"texture reflectance\" \"t\"", {"other type"});
-    expect_warning("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"t.tga\" \"string filter\" \"trilinear\"", "bilinear",
-                   {{"t.tga", tga(1, 1, "abc")}});
+    expect_error("Texture \"t\" \"float\" \"constant\" Material \"diffuse\" \"texture reflectance\" \"t\"",
+                 {"other type"});
+    expect_warning("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"t.tga\" \"string filter\" \"trilinear\"",
+                   "bilinear", {{"t.tga", tga(1, 1, "abc")}});
     std::string chain = "Texture \"t0\" \"float\" \"checkerboard\"", wide = chain;
     for (int i = 1; i < 40; ++i) {
         const std::string name = "\"t" + std::to_string(i) + "\"", previous = "\"t" + std::to_string(i - 1) + "\"";
-        chain += " Shape \"sphere\" \"texture alpha\" " + previous + " Texture " + name + " \"float\" \"scale\" \"texture tex\" " + previous;
-        if (i < 20) wide += " Texture " + name + " \"float\" \"scale\" \"texture tex\" " + previous + " \"texture scale\" " + previous;
+        chain += " Shape \"sphere\" \"texture alpha\" " + previous + " Texture " + name +
+                 " \"float\" \"scale\" \"texture tex\" " + previous;
+        if (i < 20)
+            wide += " Texture " + name + " \"float\" \"scale\" \"texture tex\" " + previous + " \"texture scale\" " +
+                    previous;
     }
     expect_error(chain, {"31 levels"});
     expect_error(wide, {"4096"});
 }
 
 TEST(ImportLight, AreaLights) {
-    SceneDescription d = world("AreaLightSource \"diffuse\" \"rgb L\" [1 2 3] \"float scale\" 2 \"bool twosided\" true" + kShape);
+    SceneDescription d =
+        world("AreaLightSource \"diffuse\" \"rgb L\" [1 2 3] \"float scale\" 2 \"bool twosided\" true" + kShape);
     ASSERT_EQ(d.emissions.size(), 1u);
     EXPECT_EQ(d.emissions[0].radiance, Rgb(2, 4, 6));
     EXPECT_TRUE(d.emissions[0].two_sided);
@@ -193,13 +223,16 @@ TEST(ImportLight, AreaLights) {
     // A sphere of radius 1: flux = pi * area * radiance.
     d = world("AreaLightSource \"diffuse\" \"float power\" 10" + kShape);
     EXPECT_NEAR(d.emissions[0].radiance.g, 10 / (3.14159265 * 4 * 3.14159265), 1e-5);
-    // As in pbrt, the power is each triangle's: a 1 x 3 rectangle of two triangles gets one radiance for its area of 1.5.
-    const std::string quad = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 3 0 0 3 1 0 0 1 0] \"integer indices\" [0 1 2 0 2 3]";
+    // As in pbrt, the power is each triangle's: a 1 x 3 rectangle of two triangles gets one radiance for its area
+    // of 1.5.
+    const std::string quad =
+        "Shape \"trianglemesh\" \"point3 P\" [0 0 0 3 0 0 3 1 0 0 1 0] \"integer indices\" [0 1 2 0 2 3]";
     d = world("AreaLightSource \"diffuse\" \"float power\" 10 " + quad);
     ASSERT_EQ(d.meshes.size(), 1u);
     EXPECT_NEAR(d.emissions.at(0).radiance.g, 10 / (3.14159265 * 1.5), 1e-5);
     EXPECT_NE(d.warnings.at(0).find("each of the 2 triangles"), std::string::npos);
-    const std::string uneven = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 0 9 9] \"integer indices\" [0 1 2 1 2 3]";
+    const std::string uneven =
+        "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 0 9 9] \"integer indices\" [0 1 2 1 2 3]";
     d = world("AreaLightSource \"diffuse\" \"float power\" 10 " + uneven);
     EXPECT_EQ(d.meshes.size(), 2u);
     EXPECT_EQ(d.emissions.size(), 2u);
@@ -211,10 +244,13 @@ TEST(ImportLight, AreaLights) {
 }
 
 TEST(ImportLight, PointSpotAndDistant) {
-    SceneDescription d = world("Translate 1 0 0 LightSource \"point\" \"rgb I\" [1 2 3] \"point3 from\" [0 1 0] \"float power\" 8");
+    SceneDescription d =
+        world("Translate 1 0 0 LightSource \"point\" \"rgb I\" [1 2 3] \"point3 from\" [0 1 0] \"float power\" 8");
     EXPECT_EQ(d.point_lights.at(0).position, (Vec3{1, 1, 0}));
     EXPECT_NEAR(d.point_lights[0].intensity.g, 2 * 8 / (4 * 3.14159265), 1e-5);
-    d = world("LightSource \"spot\" \"point3 from\" [0 0 5] \"point3 to\" [0 0 0] \"float coneangle\" 60 \"float conedeltaangle\" 60");
+    d = world(
+        "LightSource \"spot\" \"point3 from\" [0 0 5] \"point3 to\" [0 0 0] \"float coneangle\" 60 \"float "
+        "conedeltaangle\" 60");
     EXPECT_EQ(d.spot_lights.at(0).axes.n, (Vec3{0, 0, -1}));
     EXPECT_NEAR(d.spot_lights[0].cos_total, 0.5, 1e-6);
     EXPECT_NEAR(d.spot_lights[0].cos_falloff, 1, 1e-6);
@@ -252,7 +288,8 @@ TEST(ImportSpectra, Reductions) {
     const Rgb warm = import::blackbody_rgb(2856, &clipped), a = *import::named_illuminant_rgb("stdillum-A", &clipped);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(warm[c], a[c], 0.01);
     EXPECT_FALSE(clipped);
-    for (const double kelvin : {150.0, 1000.0, 6500.0, 1e6}) EXPECT_NEAR(import::blackbody_rgb(kelvin, &clipped).luminance(), 1, 1e-3) << kelvin;
+    for (const double kelvin : {150.0, 1000.0, 6500.0, 1e6})
+        EXPECT_NEAR(import::blackbody_rgb(kelvin, &clipped).luminance(), 1, 1e-3) << kelvin;
     EXPECT_TRUE(clipped);
     const import::Spectrum flat{{300, 0.4}, {900, 0.4}};
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(import::reflectance_rgb(flat)[c], 0.4, 1e-6);
@@ -271,7 +308,8 @@ TEST(ImportSpectra, InScenes) {
     SceneDescription d = world("LightSource \"point\" \"blackbody I\" 3000 \"float scale\" 4");
     EXPECT_NEAR(d.point_lights.at(0).intensity.luminance(), 4, 0.01);
     EXPECT_GT(d.point_lights[0].intensity.r, d.point_lights[0].intensity.b);
-    d = world("Material \"diffuse\" \"spectrum reflectance\" \"r.spd\"" + kShape, {{"r.spd", "# grey\n300 0.25\n900 0.25\n"}});
+    d = world("Material \"diffuse\" \"spectrum reflectance\" \"r.spd\"" + kShape,
+              {{"r.spd", "# grey\n300 0.25\n900 0.25\n"}});
     EXPECT_NEAR(value(d, material_of(d).reflectance).g, 0.25, 1e-6);
     d = world("Material \"conductor\" \"spectrum eta\" \"metal-Au-eta\" \"spectrum k\" \"metal-Au-k\"" + kShape);
     EXPECT_EQ(value(d, material_of(d).eta), import::named_metal("metal-Au")->eta);
