@@ -10,13 +10,16 @@ namespace lightloom {
 
 using Json = nlohmann::ordered_json;
 
-std::string replay_command(const JobSpec& spec, const std::string& scene, const DroppedSample& sample) {
+std::string replay_command(const JobSpec& spec, const std::string& scene, const ManifestDropped& dropped) {
+    const DroppedSample& sample = dropped.sample;
     const int width = spec.frame.crop.width();
     const int x = spec.frame.crop.x0 + int(sample.pixel) % width, y = spec.frame.crop.y0 + int(sample.pixel) / width;
     std::string command = "lightloom replay " + scene + " --algorithm " + spec.algorithm;
     for (const auto& [key, value] : spec.parameters) command += " --set " + key + "=" + value;
     command += " --seed " + std::to_string(spec.seed) + " --max-depth " + std::to_string(spec.max_depth);
     if (spec.width > 0) command += " --resolution " + std::to_string(spec.width) + "x" + std::to_string(spec.height);
+    if (sample.splat)
+        return command + " --unit " + std::to_string(dropped.unit.group) + "," + std::to_string(dropped.unit.tile);
     return command + " --iteration " + std::to_string(sample.iteration) + " --pixel " + std::to_string(x) + "," +
            std::to_string(y);
 }
@@ -65,7 +68,7 @@ std::string to_json(const Manifest& m) {
                            {"iteration", d.sample.iteration},
                            {"pixel", d.sample.pixel},
                            {"splat", d.sample.splat},
-                           {"replay", replay_command(spec, m.scene_main, d.sample)}});
+                           {"replay", replay_command(spec, m.scene_main, d)}});
     }
     json["dropped"] = {{"count", m.job.dropped_samples}, {"first", std::move(dropped)}};
     Json workers = Json::array();

@@ -37,8 +37,8 @@ struct Manifest {
     uint64_t expired_leases = 0, rejected_results = 0;
 };
 
-/// Command line that renders one dropped sample again.
-std::string replay_command(const JobSpec& spec, const std::string& scene, const DroppedSample& sample);
+/// Command line that renders one dropped sample again; its unit for a splat, which is known only by where it would have landed.
+std::string replay_command(const JobSpec& spec, const std::string& scene, const ManifestDropped& dropped);
 /// The manifest as JSON text.
 std::string to_json(const Manifest& manifest);
 

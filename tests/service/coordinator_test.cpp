@@ -199,9 +199,14 @@ TEST(Coordinator, TimeLimitKeepsAPrefixThatSamplesPerPixelReproduce) {
     for (int i = 0; i < 31; ++i) {
         const auto leases = timed.lease(worker);
         ASSERT_EQ(leases.size(), 1u);
-        if (i == 0) ASSERT_TRUE(timed.coordinator->heartbeat(worker, {{leases[0].reference(), true}}).ok());
-        if (i < 30) EXPECT_EQ(timed.deliver(worker, leases[0]).outcome, SubmitOutcome::kAccepted);
-        else held = leases;
+        if (i == 0) {
+            ASSERT_TRUE(timed.coordinator->heartbeat(worker, {{leases[0].reference(), true}}).ok());
+        }
+        if (i < 30) {
+            EXPECT_EQ(timed.deliver(worker, leases[0]).outcome, SubmitOutcome::kAccepted);
+        } else {
+            held = leases;
+        }
     }
     const auto after = timed.lease(worker);
     ASSERT_EQ(after.size(), 1u);

@@ -1,10 +1,14 @@
 // Workers against a coordinator in process and over gRPC on loopback, with fake light.
 
+#include <arpa/inet.h>
 #include <grpcpp/create_channel.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "client/grpc_job_port.h"
 #include "server/grpc_services.h"
+#include "server/status_http.h"
 #include "tests/service/fake.h"
 #include "worker/grpc_worker_port.h"
 
@@ -95,6 +99,41 @@ TEST(Workers, JobPortOverGrpcDoesAllThatAClientNeeds) {
     std::stop_source stop;
     stop.request_stop();
     EXPECT_EQ(jobs.watch_job("nope", [](const JobInfo&) {}, stop.get_token()).code(), StatusCode::kCancelled);
+}
+
+/// Sends `request` to a loopback port and returns all that comes back before the connection ends.
+std::string http(int port, const std::string& request) {
+    const int client = ::socket(AF_INET, SOCK_STREAM, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(uint16_t(port));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    std::string answer;
+    if (::connect(client, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0) {
+        (void)!::send(client, request.data(), request.size(), MSG_NOSIGNAL);
+        char buffer[4096];
+        for (ssize_t n; (n = ::recv(client, buffer, sizeof buffer, 0)) > 0;) answer.append(buffer, size_t(n));
+    }
+    ::close(client);
+    return answer;
+}
+
+TEST(StatusPage, AnswersGetAndSurvivesNonsense) {
+    FakeService service;
+    const auto status = std::move(StatusHttp::start(*service.coordinator, "127.0.0.1:0")).value();
+    const std::string id = service.submit(service.spec(4));
+    service.add_worker();
+    const auto get = [&](const std::string& path) { return http(status->port(), "GET " + path + " HTTP/1.1\r\nHost: x\r\n\r\n"); };
+    EXPECT_NE(get("/healthz").find("200 OK"), std::string::npos);
+    const std::string json = get("/api/v1/status");
+    EXPECT_NE(json.find(id), std::string::npos);
+    EXPECT_NE(json.find("\"units_total\": 4"), std::string::npos) << json;
+    EXPECT_NE(get("/nope").find("404"), std::string::npos);
+    EXPECT_NE(http(status->port(), "POST /healthz HTTP/1.1\r\nHost: x\r\n\r\n").find("405"), std::string::npos);
+    EXPECT_EQ(http(status->port(), "GET /" + std::string(20000, 'a') + " HTTP/1.1\r\n\r\n").find("200"), std::string::npos);
+    EXPECT_EQ(http(status->port(), "\x01\x02nonsense\r\n\r\n").find("200"), std::string::npos);
+    EXPECT_NE(get("/healthz").find("200 OK"), std::string::npos);
+    EXPECT_EQ(StatusHttp::start(*service.coordinator, "nonsense").status().code(), StatusCode::kInvalidArgument);
 }
 
 TEST(Workers, AStoppedWorkerFinishesOrReleasesAndOthersGoOn) {

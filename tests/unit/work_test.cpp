@@ -95,8 +95,8 @@ TEST(Plan, BoundedGroupsAreAPrefixOfTheUnboundedOnes) {
         for (size_t i = 0; i < groups.size(); ++i) {
             const Group open = plan.group(uint32_t(i));
             EXPECT_EQ(groups[i].first_iteration, open.first_iteration);
-            if (i + 1 < groups.size()) EXPECT_EQ(groups[i].iteration_count, open.iteration_count);
-            else EXPECT_LE(groups[i].iteration_count, open.iteration_count);
+            EXPECT_LE(groups[i].iteration_count, open.iteration_count);
+            EXPECT_TRUE(i + 1 == groups.size() || groups[i].iteration_count == open.iteration_count);
             sum += groups[i].iteration_count;
         }
         EXPECT_EQ(sum, iterations);
@@ -187,7 +187,9 @@ TEST(AssetManifest, CanonicalTextIsTheOnlyOneAccepted) {
         std::string changed = text;
         changed[i] = changed[i] == '/' ? '\n' : '/';
         const auto parsed = AssetManifest::parse(changed);
-        if (parsed.ok()) EXPECT_EQ(parsed->canonical_text(), changed);
+        if (parsed.ok()) {
+            EXPECT_EQ(parsed->canonical_text(), changed);
+        }
     }
     EXPECT_FALSE(AssetManifest::of_files(directory.path, {"../x"}).ok());
     EXPECT_EQ(AssetManifest::of_files(directory.path, {"none"}).status().code(), StatusCode::kNotFound);
