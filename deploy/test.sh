@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs, builds with warnings as errors, and runs the whole test suite. Arguments go to ctest.
+# Installs, builds, and runs the whole test suite, then each fuzz target for a minute (LIGHTLOOM_FUZZ_SECONDS).
+# Arguments go to ctest and leave the rest out. With CI=true, warnings are errors.
 #
 #   deploy/test.sh                     everything
 #   deploy/test.sh -R work_test        some of it
@@ -8,15 +9,29 @@ set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 "$root/deploy/install-deps.sh"
 cd "$root"
-cmake --preset release -B build/test -DLIGHTLOOM_WERROR=ON >/dev/null
-cmake --build build/test
-cd build/test
+# The quick start's build is reused; CI adds warnings as errors.
+werror=OFF
+if [ "${CI:-}" = true ]; then werror=ON; fi
+cmake --preset release -DLIGHTLOOM_WERROR=$werror >/dev/null
+cmake --build --preset release
+cd build/release
 if [ $# -gt 0 ]; then
     exec ctest --output-on-failure "$@"
 fi
-# The statistical label goes last and alone: its tests use all processors themselves.
-if ctest -N -L statistical | grep -q '^Total Tests: 0$'; then
-    exec ctest --output-on-failure -j "$(nproc)"
-fi
 ctest --output-on-failure -j "$(nproc)" -LE statistical
-exec ctest --output-on-failure -L statistical
+
+cd "$root"
+cmake --preset fuzz >/dev/null
+cmake --build --preset fuzz
+seconds=${LIGHTLOOM_FUZZ_SECONDS:-60}
+corpus=$(mktemp -d)
+trap 'rm -rf "$corpus"' EXIT
+for target in pbrt ply; do
+    mkdir "$corpus/$target"
+    (cd "$corpus" && "$root/build/fuzz/bin/${target}_fuzz" -max_total_time="$seconds" -rss_limit_mb=2048 -timeout=20 \
+        -verbosity=0 -print_final_stats=1 "$corpus/$target" "$root/tests/fuzz/corpus/$target")
+done
+
+# Last and alone: the statistical tests use all processors themselves.
+cd build/release
+ctest --output-on-failure -L statistical

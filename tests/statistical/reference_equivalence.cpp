@@ -1,16 +1,19 @@
-// Equivalence of the image mean with an independent renderer's reference: renders a scene for a while, forms independent
-// group images, and reports confidence intervals of the ratio of mean luminances, for the whole image and a 3 x 3 grid.
+// Equivalence of image means with an independent renderer's references: renders every scene that has one with each
+// algorithm and reports confidence intervals of the ratio of mean luminances, for the whole image and a 3 x 3 grid.
 //
-//   reference_equivalence SCENE REF.exr --resolution WxH --algorithm A --seconds S [--reference-error REL] [--tests N]
-//       [--png OUT.png] [--heat OUT.png]
+//   reference_equivalence SHARED_DIR [--only house,door] [--algorithms path,bdpt] [--seconds 60] [--json OUT.jsonl]
 //
-// One JSON object per line on standard output. The interval is two-sided, Sidak-corrected over --tests, and includes the
-// reference's own relative standard error (scaled by 3 for a region, which has a ninth of the pixels).
+// SHARED_DIR holds scenes/NAME/scene.pbrt, refs/NAME.exr and refs/refs.json. The intervals are two-sided at 95 %,
+// Sidak-corrected over all scenes and algorithms (and regions), from the spread of independent group images, and include the
+// reference's own relative standard error (three times that for a region, which has a ninth of the pixels). Rendering of a
+// scene ends when its interval lies within the bound or after --seconds. Exit code 1 if some interval excludes the bound
+// altogether: then the means differ.
 
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "common/film/accumulation.h"
@@ -42,111 +45,165 @@ struct Region {
     double standard_error() const { return std::sqrt(std::fmax(0, sum2 / groups - mean() * mean()) / (groups - 1)); }
 };
 
-}  // namespace
+struct Interval {
+    double ratio = 0, low = 0, high = 0;
+    bool within(double bound) const { return low >= 1 - bound && high <= 1 + bound; }
+    bool excludes(double bound) const { return low > 1 + bound || high < 1 - bound; }
+    nlohmann::ordered_json json() const { return {{"ratio", ratio}, {"low", low}, {"high", high}}; }
+};
 
-int main(int argc, char** argv) {
-    CLI::App app("Equivalence of the mean with a reference image");
-    std::string scene_path, reference_path, resolution, algorithm = "path", png, heat;
-    double seconds = 30, reference_error = 0;
-    int tests = 34;
+struct Options {
+    std::string shared, json, pictures;
+    std::vector<std::string> only, algorithms{"path", "bdpt"};
+    double seconds = 60, bound = 0.01, region_bound = 0.05;
     uint64_t seed = 1;
-    app.add_option("scene", scene_path)->required();
-    app.add_option("reference", reference_path)->required();
-    app.add_option("--resolution", resolution);
-    app.add_option("--algorithm", algorithm);
-    app.add_option("--seconds", seconds);
-    app.add_option("--reference-error", reference_error);
-    app.add_option("--tests", tests);
-    app.add_option("--seed", seed);
-    app.add_option("--png", png);
-    app.add_option("--heat", heat);
-    CLI11_PARSE(app, argc, argv);
-    const auto fail = [](const Status& s) {
-        std::fprintf(stderr, "%s\n", s.message().c_str());
-        return 2;
-    };
+};
 
-    auto imported = import_pbrt(scene_path);
-    if (!imported.ok()) return fail(imported.status());
-    SceneOptions options;
-    if (!resolution.empty() && std::sscanf(resolution.c_str(), "%dx%d", &options.width, &options.height) != 2) return 2;
+/// Luminance means of the whole image (first) and of nine regions.
+void luminance_means(const RgbImage& image, double means[10]) {
+    double count[10] = {};
+    std::fill(means, means + 10, 0.0);
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
+            const float* p = &image.pixels[(size_t(y) * size_t(image.width) + size_t(x)) * 3];
+            const double l = 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2];
+            const int r = 1 + (y * 3 / image.height) * 3 + x * 3 / image.width;
+            means[0] += l, ++count[0];
+            means[r] += l, ++count[r];
+        }
+    for (int r = 0; r < 10; ++r) means[r] /= count[r];
+}
+
+Interval interval(const Region& r, double z, double relative_reference_error) {
+    const double ratio = r.mean() / r.reference;
+    const double error = std::hypot(r.standard_error() / r.reference, ratio * relative_reference_error);
+    return {ratio, ratio - z * error, ratio + z * error};
+}
+
+struct Outcome {
+    Interval image, regions[9];
+    uint64_t iterations = 0, dropped = 0;
+    double seconds = 0;
+};
+
+Result<Outcome> compare_means(const Options& options, const std::string& name, const nlohmann::json& entry,
+                              const std::string& algorithm, size_t tests) {
+    auto imported = import_pbrt(options.shared + "/scenes/" + name + "/scene.pbrt");
+    if (!imported.ok()) return imported.status();
+    SceneOptions scene_options;
+    const std::string resolution = entry.at("resolution");
+    if (std::sscanf(resolution.c_str(), "%dx%d", &scene_options.width, &scene_options.height) != 2)
+        return invalid_argument(name + ": no resolution in refs.json");
     RenderSettings settings;
     settings.algorithm = algorithm;
     settings.max_depth = imported->description.max_depth;
-    settings.seed = seed;
-    auto built = Scene::build(std::move(imported->description), options);
-    if (!built.ok()) return fail(built.status());
+    settings.seed = options.seed;
+    const float exposure = imported->description.film.exposure_scale;
+    auto built = Scene::build(std::move(imported->description), scene_options);
+    if (!built.ok()) return built.status();
     const std::shared_ptr<const Scene> scene = std::move(built).value();
     auto renderer = Renderer::create(scene, settings);
-    if (!renderer.ok()) return fail(renderer.status());
-    auto reference = read_exr(reference_path);
-    if (!reference.ok()) return fail(reference.status());
-
+    if (!renderer.ok()) return renderer.status();
+    auto reference = read_exr(options.shared + "/refs/" + name + ".exr");
+    if (!reference.ok()) return reference.status();
     const FrameLayout frame = scene->frame();
-    if (reference->color.width != frame.crop.width() || reference->color.height != frame.crop.height()) {
-        std::fprintf(stderr, "%s is %dx%d, the frame %dx%d\n", reference_path.c_str(), reference->color.width,
-                     reference->color.height, frame.crop.width(), frame.crop.height());
-        return 2;
-    }
+    if (reference->color.width != frame.crop.width() || reference->color.height != frame.crop.height())
+        return invalid_argument(name + ": the reference has another size than the frame");
+
     Region regions[10];
-    const int w = frame.crop.width(), h = frame.crop.height();
-    const auto luminance_means = [&](const RgbImage& image, double means[10]) {
-        double count[10] = {};
-        std::fill(means, means + 10, 0.0);
-        for (int y = 0; y < h; ++y)
-            for (int x = 0; x < w; ++x) {
-                const float* p = &image.pixels[(size_t(y) * size_t(w) + size_t(x)) * 3];
-                const double l = 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2];
-                const int r = 1 + (y * 3 / h) * 3 + x * 3 / w;
-                means[0] += l, ++count[0];
-                means[r] += l, ++count[r];
-            }
-        for (int r = 0; r < 10; ++r) means[r] /= count[r];
-    };
     double means[10];
     luminance_means(reference->color, means);
     for (int r = 0; r < 10; ++r) regions[r].reference = means[r];
+    const double reference_error = double(entry.at("mean_y_se")) / double(entry.at("mean_y"));
+    const double z_image = normal_quantile(0.5 * (1 - std::pow(0.95, 1.0 / double(tests))));
+    const double z_region = normal_quantile(0.5 * (1 - std::pow(0.95, 1.0 / double(9 * tests))));
 
+    constexpr uint32_t kIterations = 2, kLeastGroups = 16;
     Accumulation total(frame);
+    Outcome outcome;
     const auto start = std::chrono::steady_clock::now();
-    const auto elapsed = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
-    const uint32_t per_group = 4;
-    uint32_t group = 0;
-    do {
-        UnitWork work{uint64_t(group) * per_group, per_group, uint64_t(group) * per_group, frame.crop, 0, uint64_t(per_group) * uint64_t(frame.crop.area())};
+    for (uint32_t group = 0;; ++group) {
+        const UnitWork work{uint64_t(group) * kIterations, kIterations, group, frame.crop, 0,
+                            uint64_t(kIterations) * uint64_t(frame.crop.area())};
         auto partial = (*renderer)->render(work, {});
-        if (!partial.ok()) return fail(partial.status());
-        GroupSum sum(frame), alone(frame);
-        Accumulation single(frame);
-        if (Status s = sum.add(*partial); !s.ok()) return fail(s);
-        if (Status s = total.fold(sum, per_group); !s.ok()) return fail(s);
-        if (Status s = alone.add(*partial); !s.ok()) return fail(s);
-        if (Status s = single.fold(alone, per_group); !s.ok()) return fail(s);
-        luminance_means(single.develop(), means);
+        if (!partial.ok()) return partial.status();
+        GroupSum sum(frame);
+        Accumulation alone(frame);
+        LL_RETURN_IF_ERROR(sum.add(*partial));
+        LL_RETURN_IF_ERROR(alone.fold(sum, kIterations));
+        LL_RETURN_IF_ERROR(total.fold(sum, kIterations));
+        luminance_means(alone.develop(exposure), means);
         for (int r = 0; r < 10; ++r) regions[r].add(means[r]);
-        ++group;
-    } while (elapsed() < seconds || group < 8);
+        outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        if (group + 1 < kLeastGroups) continue;
+        outcome.image = interval(regions[0], z_image, reference_error);
+        bool settled = outcome.image.within(options.bound);
+        for (int r = 0; r < 9; ++r) {
+            outcome.regions[r] = interval(regions[r + 1], z_region, 3 * reference_error);
+            settled &= outcome.regions[r].within(options.region_bound);
+        }
+        if (settled || outcome.seconds >= options.seconds) break;
+    }
+    outcome.iterations = total.iterations();
+    outcome.dropped = total.dropped();
+    if (!options.pictures.empty()) {
+        const std::string stem = options.pictures + "/" + name + "-" + algorithm;
+        LL_RETURN_IF_ERROR(write_png(stem + ".png", total.develop(exposure)));
+        LL_RETURN_IF_ERROR(write_png8(stem + "-error.png", frame.crop.width(), frame.crop.height(),
+                                      signed_error_picture(total.develop(exposure), reference->color, 0.2)));
+    }
+    return outcome;
+}
 
-    const double tail = 0.5 * (1 - std::pow(0.95, 1.0 / (tests)));
-    const double tail_regions = 0.5 * (1 - std::pow(0.95, 1.0 / (9.0 * tests)));
-    nlohmann::ordered_json out;
-    out["algorithm"] = algorithm;
-    out["spp"] = total.iterations();
-    out["seconds"] = elapsed();
-    out["dropped"] = total.dropped();
-    const auto interval = [&](const Region& r, double z, double relative_reference_error) {
-        const double ratio = r.mean() / r.reference;
-        const double relative = std::hypot(r.standard_error() / r.reference, ratio * relative_reference_error);
-        return nlohmann::ordered_json{{"ratio", ratio}, {"low", ratio - z * relative}, {"high", ratio + z * relative}};
-    };
-    out["image"] = interval(regions[0], normal_quantile(tail), reference_error);
-    for (int r = 1; r < 10; ++r)
-        out["regions"].push_back(interval(regions[r], normal_quantile(tail_regions), 3 * reference_error));
-    std::printf("%s\n", out.dump().c_str());
-    const RgbImage image = total.develop();
-    if (!png.empty())
-        if (Status s = write_png(png, image); !s.ok()) return fail(s);
-    if (!heat.empty())
-        if (Status s = write_png8(heat, w, h, signed_error_picture(image, reference->color, 0.2)); !s.ok()) return fail(s);
-    return 0;
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app("Equivalence of image means with reference images");
+    Options options;
+    app.add_option("shared", options.shared, "directory with scenes/ and refs/")->required();
+    app.add_option("--only", options.only, "scenes, comma separated")->delimiter(',');
+    app.add_option("--algorithms", options.algorithms)->delimiter(',');
+    app.add_option("--seconds", options.seconds, "at most, per scene and algorithm");
+    app.add_option("--bound", options.bound, "of the image mean");
+    app.add_option("--region-bound", options.region_bound, "of a region's mean");
+    app.add_option("--seed", options.seed);
+    app.add_option("--json", options.json, "one object per line");
+    app.add_option("--pictures", options.pictures, "directory for the image and the signed error");
+    CLI11_PARSE(app, argc, argv);
+    std::ifstream file(options.shared + "/refs/refs.json");
+    if (!file) return std::fprintf(stderr, "%s/refs/refs.json cannot be read\n", options.shared.c_str()), 2;
+    const auto refs = nlohmann::ordered_json::parse(file);
+    std::ofstream json(options.json, std::ios::app);
+    bool differ = false;
+    const size_t tests = refs.size() * options.algorithms.size();
+    std::printf("%-18s %-5s %5s %6s  %-26s %s\n", "scene", "alg", "spp", "s", "mean ratio [interval]", "regions (ratio +- half width)");
+    for (const auto& [name, entry] : refs.items()) {
+        if (!options.only.empty() && std::find(options.only.begin(), options.only.end(), name) == options.only.end()) continue;
+        for (const std::string& algorithm : options.algorithms) {
+            const auto outcome = compare_means(options, name, entry, algorithm, tests);
+            if (!outcome.ok()) {
+                std::fprintf(stderr, "%s %s: %s\n", name.c_str(), algorithm.c_str(), outcome.status().message().c_str());
+                return 2;
+            }
+            const Interval& image = outcome->image;
+            std::printf("%-18s %-5s %5llu %6.1f  %.4f [%.4f, %.4f] %c ", name.c_str(), algorithm.c_str(),
+                        static_cast<unsigned long long>(outcome->iterations), outcome->seconds, image.ratio, image.low, image.high,
+                        image.within(options.bound) ? '=' : image.excludes(options.bound) ? '!' : '?');
+            nlohmann::ordered_json line{{"scene", name},
+                                        {"algorithm", algorithm},
+                                        {"spp", outcome->iterations},
+                                        {"seconds", outcome->seconds},
+                                        {"dropped", outcome->dropped},
+                                        {"image", image.json()}};
+            for (const Interval& r : outcome->regions) {
+                std::printf(" %.3f+-%.3f", r.ratio, r.high - r.ratio);
+                line["regions"].push_back(r.json());
+            }
+            std::printf("\n");
+            std::fflush(stdout);
+            if (!options.json.empty()) json << line.dump() << std::endl;
+            differ |= image.excludes(options.bound);
+        }
+    }
+    return differ ? 1 : 0;
 }
