@@ -1,7 +1,7 @@
 #include "common/scene/accel.h"
 
 #include <embree3/rtcore.h>
-#include <tbb/task_arena.h>
+#include <tbb/global_control.h>
 
 #include <atomic>
 #include <cmath>
@@ -36,9 +36,11 @@ RTCDevice device() {
     return d.handle;
 }
 
-/// Builds on the calling thread alone (accel.h says why): Embree's tasks stay in the arena that they were started in.
+/// Builds on the calling thread alone (accel.h says why). Embree runs its builds in a task arena of its own, so the limit has
+/// to be the process's; other tasks are merely slowed down while it lasts.
 void commit(RTCScene scene) {
-    tbb::task_arena(1).execute([&] { rtcCommitScene(scene); });
+    const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+    rtcCommitScene(scene);
 }
 
 struct GeometryUser {
