@@ -81,10 +81,11 @@ std::stop_token interrupt_token() {
         sigaddset(&signals, SIGINT);
         sigaddset(&signals, SIGTERM);
         pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-        std::thread([signals] {
+        // The thread outlives main, so it has a share of its own in the state that the static's destructor lets go.
+        std::thread([signals, stop = source]() mutable {
             int signal = 0;
             sigwait(&signals, &signal);
-            source.request_stop();
+            stop.request_stop();
             sigwait(&signals, &signal);
             _exit(kCancelled);
         }).detach();
