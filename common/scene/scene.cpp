@@ -78,9 +78,7 @@ bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out) const {
         out->reach = largest_coordinate(s.centre) + s.radius;
         out->ng = s.attributes.flip_normal ? -n : n;
         const Vec3 local = s.orientation.to_local(n);
-        double phi = math::atan2(local.y, local.x);
-        if (phi < 0) phi += 2 * kPiD;
-        out->uv = {float(phi / (2 * kPiD)), float(1 - math::acos(local.z) / kPiD)};
+        out->uv = sphere_uv(s, n);
         out->shading = frame_along(out->ng, s.orientation.to_world({-local.y, local.x, 0}));
         out->material = s.attributes.material;
         out->emitter = instanced ? kNone : sphere_emitter_[hit.primitive];
@@ -120,7 +118,7 @@ float Scene::opacity(const void* user, int32_t object, uint32_t geometry, uint32
     const SceneDescription& d = scene.description_;
     if (geometry == Accel::kSphereGeometry) {
         const Sphere& s = (object < 0 ? d.spheres : d.objects[size_t(object)].spheres)[primitive];
-        return s.attributes.alpha == kNone ? 1 : evaluate_texture(scene.tables_, s.attributes.alpha, {0.5f, 0.5f}).r;
+        return s.attributes.alpha == kNone ? 1 : evaluate_texture(scene.tables_, s.attributes.alpha, {u, v}).r;
     }
     const TriangleMesh& mesh = (object < 0 ? d.meshes : d.objects[size_t(object)].meshes)[geometry];
     const uint32_t* index = &mesh.indices[size_t(primitive) * 3];
