@@ -64,7 +64,8 @@ bool passes_through(const GeometryUser& g, uint32_t primitive, uint32_t salt, fl
     const float opacity = g.opacity(g.opacity_user, g.object, g.geometry, primitive, u, v);
     if (opacity >= 1) return false;
     if (opacity <= 0) return true;
-    const uint64_t id = (uint64_t(g.geometry * 2 + salt) << 32) | primitive;
+    // The object too: a ray that crosses two objects through identity instances meets equal geometry and primitive numbers.
+    const uint64_t id = ((uint64_t(g.geometry * 2 + salt) << 32) | primitive) ^ mix64(uint64_t(g.object + 1));
     return ray_hash(ray.org_x, ray.org_y, ray.org_z, ray.dir_x, ray.dir_y, ray.dir_z, id) >= opacity;
 }
 
