@@ -264,6 +264,20 @@ TEST(SelfIntersection, LargeGroundShowsItsAlbedo) {
     family.check();
 }
 
+/// With rr-min=1 nothing ends a path in a closed white box but its length.
+TEST(Roulette, CanBeSwitchedOff) {
+    SceneBuilder b;
+    b.description().film.width = b.description().film.height = 8;
+    b.room({-1, -1, -1}, {1, 1, 1}, b.diffuse(Rgb(1.0f)));
+    b.look({0, 0, -0.9f}, {0, 0, 1}, 80);
+    const auto scene = b.build();
+    const auto renderer = Renderer::create(scene, {"path", {{"rr-min", "1"}, {"rr-start", "2"}}, 3, 20});
+    ASSERT_TRUE(renderer.ok());
+    const Result<Partial> partial = (*renderer)->render(whole_frame(*scene, 4), {});
+    ASSERT_TRUE(partial.ok());
+    EXPECT_EQ(partial->counters.vertices, partial->counters.camera_samples * 21);
+}
+
 /// The three algorithms in a few seconds; tests/statistical does the same per path length on many scenes.
 TEST(Means, OfTheThreeAlgorithmsAgree) {
     testing::TestFamily family;
