@@ -40,6 +40,7 @@ struct ScratchDirectory {
 
 int render(const JobOptions& options, uint32_t threads, uint32_t worker_count) {
     (void)interrupt_token();
+    if (Status s = check_outputs(options); !s.ok()) return report_error(s);
     auto scene = load_scene(options);
     if (!scene.ok()) return report_error(scene.status());
     const auto spec = make_spec(options, *scene);
