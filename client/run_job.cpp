@@ -12,6 +12,8 @@
 #include "client/commands.h"
 #include "client/progress.h"
 #include "common/film/atomic_file.h"
+#include "common/film/exr_io.h"
+#include "common/film/png.h"
 
 namespace lightloom::client {
 namespace {
@@ -174,8 +176,8 @@ int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTi
     Status status = write_file_atomically(output.string(), *image);
     if (status.ok()) status = write_file_atomically(manifest_path.string(), *manifest);
     if (status.ok() && !options.png.empty()) {
-        const auto png = port.image(job.job_id, ImageKind::kPreview);
-        status = png.ok() ? write_file_atomically(options.png, *png) : png.status();
+        const auto decoded = decode_exr(*image, output.string());
+        status = decoded.ok() ? write_png(options.png, decoded->color, options.exposure) : decoded.status();
     }
     times.fetch_seconds = seconds_since(begin);
     if (status.ok() && !options.json.empty()) status = write_statistics(options.json, job, times);

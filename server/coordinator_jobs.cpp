@@ -47,7 +47,7 @@ void Coordinator::prepare(JobRecord& job, std::stop_token stop) {
         const std::lock_guard lock(mutex_);
         spec = job.spec;
     }
-    const auto facts = options_.read_scene(assets_, spec, stop);
+    auto facts = options_.read_scene(assets_, spec, stop);
     const auto algorithm = find_algorithm(spec.algorithm);
     const auto parameters = parse_parameters(**algorithm, spec.parameters);
 
@@ -63,6 +63,7 @@ void Coordinator::prepare(JobRecord& job, std::stop_token stop) {
     job.spec.parameters = complete_parameters(**algorithm, *parameters);
     if (job.spec.max_depth < 0) job.spec.max_depth = facts->max_depth;
     job.exposure_scale = facts->exposure_scale;
+    job.layers = std::move(facts->layers);
     const double light_paths = light_paths_per_pixel(**algorithm, *parameters);
     const uint32_t window = group_window(frame, light_paths > 0, options_.waiting_bytes);
     job.units.emplace(Plan(frame, light_paths), job.spec.samples_per_pixel, window, options_.shuffle_seed);
@@ -95,15 +96,17 @@ void Coordinator::finish(JobRecord& job) {
     std::shared_ptr<Reducer> reducer;
     JobSpec spec;
     float scale = 1;
+    std::vector<ImageLayer> layers;
     {
         const std::lock_guard lock(mutex_);
         if (job.state != JobState::kFinishing) return;
         reducer = job.reducer;
+        layers = std::move(job.layers);
         spec = job.spec;
         scale = job.exposure_scale;
     }
     reducer->freeze();
-    const auto image = encode_image(spec, *reducer, scale);
+    const auto image = encode_image(spec, *reducer, scale, std::move(layers));
     if (!image.ok()) {
         const std::lock_guard lock(mutex_);
         return fail_job(job, image.status());

@@ -1,6 +1,7 @@
 #include "common/scene/accel.h"
 
 #include <embree3/rtcore.h>
+#include <tbb/global_control.h>
 
 #include <atomic>
 #include <cmath>
@@ -19,9 +20,10 @@ bool count_memory(void* user, ssize_t bytes, bool) {
     return true;
 }
 
-/// One device for the process: pinned instruction set, single-threaded builds.
+/// One device for the process, with a pinned instruction set. It must not be told a number of threads: that would be the
+/// limit of every other task of the process as long as the device lives.
 struct Device {
-    RTCDevice handle = rtcNewDevice("isa=avx2,threads=1,set_affinity=0,start_threads=0");
+    RTCDevice handle = rtcNewDevice("isa=avx2,set_affinity=0,start_threads=0");
     Device() {
         if (handle != nullptr) rtcSetDeviceMemoryMonitorFunction(handle, count_memory, &g_device_memory);
     }
@@ -33,6 +35,13 @@ struct Device {
 RTCDevice device() {
     static Device d;
     return d.handle;
+}
+
+/// Builds on the calling thread alone (accel.h says why). Embree runs its builds in a task arena of its own, so the limit has
+/// to be the process's; other tasks are merely slowed down while it lasts.
+void commit(RTCScene scene) {
+    const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+    rtcCommitScene(scene);
 }
 
 struct GeometryUser {
@@ -228,7 +237,7 @@ Result<std::unique_ptr<Accel>> Accel::build(const SceneDescription& scene, Opaci
         impl.add_meshes(s, scene.objects[size_t(o)].meshes, o, opacity, opacity_user);
         impl.add_spheres(s, scene.objects[size_t(o)].spheres, uint32_t(scene.objects[size_t(o)].meshes.size()), o, opacity,
                          opacity_user);
-        rtcCommitScene(s);
+        commit(s);
     }
     impl.world = new_scene();
     impl.add_meshes(impl.world, scene.meshes, -1, opacity, opacity_user);
@@ -246,7 +255,7 @@ Result<std::unique_ptr<Accel>> Accel::build(const SceneDescription& scene, Opaci
         rtcAttachGeometryByID(impl.world, g, impl.first_instance_id + i);
         rtcReleaseGeometry(g);
     }
-    rtcCommitScene(impl.world);
+    commit(impl.world);
     if (const RTCError error = rtcGetDeviceError(device()); error != RTC_ERROR_NONE)
         return internal_error("Embree could not build the acceleration structure (error " + std::to_string(int(error)) +
                               "); the machine may be out of memory");

@@ -7,6 +7,9 @@
 
 #include <cstring>
 #include <limits>
+#include <mutex>
+#include <set>
+#include <thread>
 
 #include "tests/support/estimates.h"
 #include "tests/support/test_scenes.h"
@@ -175,6 +178,33 @@ TEST(Tiles, ACropHasTheMeanOfItsPartOfTheFrame) {
                          testing::replicate(testing::catalog_image(b, algorithm, 5, 8), crop, 32, 200), algorithm, &family);
     }
     family.check();
+}
+
+/// Holds every sample until a second thread has come, or for ten seconds.
+struct MeetingAlgorithm {
+    std::mutex* mutex;
+    std::set<std::thread::id>* threads;
+    Rgb sample(SampleContext&) const {
+        const auto arrived = [&] {
+            std::lock_guard lock(*mutex);
+            threads->insert(std::this_thread::get_id());
+            return threads->size();
+        };
+        for (int i = 0; i < 10000 && arrived() < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        return {};
+    }
+};
+
+/// Building a scene on one thread must leave the others to rendering.
+TEST(Units, AreRenderedOnAllThreads) {
+    const auto scene = testing::diffuse_box();
+    tbb::global_control allowance(tbb::global_control::max_allowed_parallelism, 2);
+    std::mutex mutex;
+    std::set<std::thread::id> threads;
+    UnitWork work = whole_frame(*scene, 1);
+    work.tile = {0, 0, 32, 4};
+    tbb::task_arena(2).execute([&] { EXPECT_TRUE(render_unit(MeetingAlgorithm{&mutex, &threads}, *scene, {}, {}, work, {}).ok()); });
+    EXPECT_EQ(threads.size(), 2u);
 }
 
 /// Not finite at one pixel of one iteration, and in every splat that pixel makes.
