@@ -95,6 +95,21 @@ std::stop_token interrupt_token() {
     return source.get_token();
 }
 
+Status check_outputs(const JobOptions& options) {
+    const std::filesystem::path output = output_path(options);
+    std::filesystem::path manifest = output;
+    manifest.replace_extension(".manifest.json");
+    for (const std::string& path : {output.string(), manifest.string(), options.png, options.json}) {
+        if (path.empty()) continue;
+        std::error_code ignored;
+        if (std::filesystem::is_directory(path, ignored)) return invalid_argument(path + ": is a directory; give a file name");
+        const std::string probe = path + ".probe-" + std::to_string(::getpid());
+        LL_RETURN_IF_ERROR(write_file_atomically(probe, {}));
+        std::filesystem::remove(probe, ignored);
+    }
+    return {};
+}
+
 Status upload_scene(JobPort& port, const LocalScene& scene) {
     const std::string text = scene.manifest.canonical_text();
     const Digest root = sha256(text);
