@@ -1,12 +1,13 @@
 #include "common/scene/accel.h"
 
 #include <embree3/rtcore.h>
-#include <tbb/task_arena.h>
+#include <tbb/global_control.h>
 
 #include <atomic>
 #include <cmath>
 #include <cstring>
 
+#include "common/core/math.h"
 #include "common/core/rng.h"
 
 namespace lightloom {
@@ -36,9 +37,11 @@ RTCDevice device() {
     return d.handle;
 }
 
-/// Builds on the calling thread alone (accel.h says why): Embree's tasks stay in the arena that they were started in.
+/// Builds on the calling thread alone (accel.h says why). Embree runs its builds in a task arena of its own, so the limit has
+/// to be the process's; other tasks are merely slowed down while it lasts.
 void commit(RTCScene scene) {
-    tbb::task_arena(1).execute([&] { rtcCommitScene(scene); });
+    const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+    rtcCommitScene(scene);
 }
 
 struct GeometryUser {
@@ -70,7 +73,8 @@ bool passes_through(const GeometryUser& g, uint32_t primitive, uint32_t salt, fl
     const float opacity = g.opacity(g.opacity_user, g.object, g.geometry, primitive, u, v);
     if (opacity >= 1) return false;
     if (opacity <= 0) return true;
-    const uint64_t id = (uint64_t(g.geometry * 2 + salt) << 32) | primitive;
+    // The object too: a ray that crosses two objects through identity instances meets equal geometry and primitive numbers.
+    const uint64_t id = ((uint64_t(g.geometry * 2 + salt) << 32) | primitive) ^ mix64(uint64_t(g.object + 1));
     return ray_hash(ray.org_x, ray.org_y, ray.org_z, ray.dir_x, ray.dir_y, ray.dir_z, id) >= opacity;
 }
 
@@ -107,6 +111,15 @@ int sphere_roots(const Sphere& s, const RTCRay& ray, double t[2]) {
     return 2;
 }
 
+bool sphere_passes(const SphereUser& user, uint32_t primitive, int crossing, double t, const RTCRay& ray) {
+    if (user.filter.opacity == nullptr) return false;
+    const Sphere& s = (*user.spheres)[primitive];
+    if (s.attributes.alpha == kNone) return false;
+    const Vec3 p{float(ray.org_x + t * ray.dir_x), float(ray.org_y + t * ray.dir_y), float(ray.org_z + t * ray.dir_z)};
+    const Vec2 uv = sphere_uv(s, normalize(p - s.centre));
+    return passes_through(user.filter, primitive, uint32_t(crossing), uv.x, uv.y, ray);
+}
+
 void sphere_intersect(const RTCIntersectFunctionNArguments* args) {
     if (args->valid[0] == 0) return;
     const auto& user = *static_cast<const SphereUser*>(args->geometryUserPtr);
@@ -116,7 +129,7 @@ void sphere_intersect(const RTCIntersectFunctionNArguments* args) {
     for (int i = 0; i < n; ++i) {
         if (!(t[i] > rayhit.ray.tnear && t[i] < rayhit.ray.tfar)) continue;
         const float t_hit = float(t[i]);
-        if (user.filter.opacity != nullptr && passes_through(user.filter, args->primID, uint32_t(i), 0, 0, rayhit.ray)) continue;
+        if (sphere_passes(user, args->primID, i, t[i], rayhit.ray)) continue;
         rayhit.ray.tfar = t_hit;
         rayhit.hit.geomID = args->geomID;
         rayhit.hit.primID = args->primID;
@@ -135,13 +148,20 @@ void sphere_occluded(const RTCOccludedFunctionNArguments* args) {
     const int n = sphere_roots((*user.spheres)[args->primID], ray, t);
     for (int i = 0; i < n; ++i) {
         if (!(t[i] > ray.tnear && t[i] < ray.tfar)) continue;
-        if (user.filter.opacity != nullptr && passes_through(user.filter, args->primID, uint32_t(i), 0, 0, ray)) continue;
+        if (sphere_passes(user, args->primID, i, t[i], ray)) continue;
         ray.tfar = -INFINITY;
         return;
     }
 }
 
 }  // namespace
+
+Vec2 sphere_uv(const Sphere& sphere, const Vec3& n) {
+    const Vec3 local = sphere.orientation.to_local(n);
+    double phi = math::atan2(local.y, local.x);
+    if (phi < 0) phi += 2 * kPiD;
+    return {float(phi / (2 * kPiD)), float(1 - math::acos(local.z) / kPiD)};
+}
 
 struct Accel::Impl {
     RTCScene world = nullptr;

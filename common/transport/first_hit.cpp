@@ -1,8 +1,7 @@
 #include "common/transport/first_hit.h"
 
-#include <tbb/parallel_for.h>
-
 #include "common/path/camera_walk.h"
+#include "common/transport/fork_join.h"
 
 namespace lightloom {
 
@@ -12,9 +11,9 @@ std::vector<ImageLayer> first_hit_layers(const Scene& scene, uint64_t seed, int 
     std::vector<ImageLayer> layers{{"albedo", "RGB", std::vector<float>(3 * pixels)},
                                    {"normal", "XYZ", std::vector<float>(3 * pixels)},
                                    {"depth", "Z", std::vector<float>(pixels)}};
-    tbb::parallel_for(0, crop.height(), [&](int row) {
-        for (int column = 0; column < crop.width(); ++column) {
-            const size_t pixel = size_t(row) * size_t(crop.width()) + size_t(column);
+    fork_join(pixels, [&](size_t first, size_t last) {
+        for (size_t pixel = first; pixel < last; ++pixel) {
+            const int row = int(pixel / size_t(crop.width())), column = int(pixel % size_t(crop.width()));
             Rgb albedo;
             Vec3 normal;
             float depth = 0;

@@ -3,15 +3,13 @@
 // depend on how many there are. Pixels are dealt to threads in fixed chunks; a chunk owns its pixels and adds their samples
 // in iteration order; splats are kept in path order and added chunk by chunk at the end.
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <concepts>
 #include <stop_token>
 #include <vector>
 
 #include "common/film/partial.h"
 #include "common/path/random_walk.h"
+#include "common/transport/fork_join.h"
 #include "common/transport/renderer.h"
 
 namespace lightloom {
@@ -74,9 +72,9 @@ Result<Partial> render_unit(const A& algorithm, const Scene& scene, const Render
     const int64_t chunk_pixels = clamp<int64_t>(pixels / 256, 16, 4096);
     std::vector<Chunk> chunks(size_t((pixels + chunk_pixels - 1) / chunk_pixels));
 
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, chunks.size(), 1), [&](const tbb::blocked_range<size_t>& range) {
+    fork_join(chunks.size(), [&](size_t first_chunk, size_t last_chunk) {
         std::vector<PathVertex> camera_path(size_t(settings.max_depth) + 3), light_path(size_t(settings.max_depth) + 2);
-        for (size_t c = range.begin(); c != range.end(); ++c) {
+        for (size_t c = first_chunk; c != last_chunk; ++c) {
             if (stop.stop_requested()) return;
             Chunk& chunk = chunks[c];
             SampleContext context{.scene = scene,

@@ -198,6 +198,15 @@ TEST(WeightEvaluator, EqualsExplicitProducts) {
 }
 
 /// Depth 64 and scenes scaled by 1e-4 and 1e4: whole-path products would leave the range of double.
+/// Two vertices in the same place have an infinite density; the evaluator once never came back from one.
+TEST(WeightEvaluator, InfiniteDensitiesEnd) {
+    WideProduct product;
+    product.multiply(HUGE_VAL);
+    EXPECT_EQ(product.value(0.5), HUGE_VAL);
+    product.multiply(0.5);
+    EXPECT_EQ(product.value(1), HUGE_VAL);
+}
+
 TEST(WeightEvaluator, LongPathsAndScaledScenesKeepTheirWeights) {
     for (uint64_t seed = 0; seed < 50; ++seed) {
         const int k = 64;

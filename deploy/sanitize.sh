@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# Builds with sanitizers and runs what each of them is for:
+#
+#   asan   AddressSanitizer, LeakSanitizer, UndefinedBehaviorSanitizer: the whole suite without the statistical tests
+#   tsan   ThreadSanitizer: the service tests, the work plan and the transport of light on several threads
+#
+#   deploy/sanitize.sh                 both
+#   deploy/sanitize.sh tsan -R Workers one of them; what follows goes to ctest
+#
+# The options and the suppressions (deploy/tsan.supp) are properties of the tests (tests/CMakeLists.txt), so that a plain
+# ctest in build/asan or build/tsan uses them too. Any report fails the run, also one of a process that a test has killed.
+set -euo pipefail
+
+root=$(cd "$(dirname "$0")/.." && pwd)
+"$root/deploy/install-deps.sh"
+cd "$root"
+presets=(tsan asan)
+if [ $# -gt 0 ]; then
+    presets=("$1")
+    shift
+fi
+# ThreadSanitizer's shadow has fixed addresses, which the widest address randomisation of newer kernels runs into.
+run=()
+if setarch -R true 2>/dev/null; then run=(setarch -R); fi
+
+failed=0
+for preset in "${presets[@]}"; do
+    cmake --preset "$preset" >/dev/null
+    tests=(-LE statistical)
+    targets=(all)
+    if [ "$preset" = tsan ]; then
+        tests=(-R '^(coordinator|worker|process|work|transport)_test\.')
+        targets=(coordinator_test worker_test process_test work_test transport_test)
+    fi
+    "${run[@]}" cmake --build --preset "$preset" --target "${targets[@]}"
+    reports="$root/build/$preset/reports"
+    rm -rf "$reports" && mkdir -p "$reports"
+    (cd "build/$preset" && "${run[@]}" ctest --output-on-failure "${tests[@]}" "$@") || failed=1
+    for report in "$reports"/*; do
+        [ -s "$report" ] || continue
+        cat "$report"
+        failed=1
+    done
+done
+exit $failed
