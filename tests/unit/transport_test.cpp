@@ -299,13 +299,10 @@ TEST(Units, OutsideTheFrameOrCancelledAreRefused) {
     EXPECT_EQ(partial.status().code(), StatusCode::kCancelled);
 }
 
-<<<<<<< HEAD
-/// The three algorithms in a few seconds; tests/statistical does the same per path length on many
-/// scenes.
-=======
-/// Ground that fills the view under a sky of radiance 1 shows its albedo, whatever the size of the primitive that it is made
-/// of: where a ray leaves it must not depend on how near its other end is. (Spheres of radius 1000 once came out 20 % too
-/// dark, tilted triangles of size 100 by 24 %: they shadowed themselves.)
+/// Ground that fills the view under a sky of radiance 1 shows its albedo, whatever the size of the
+/// primitive that it is made of: where a ray leaves it must not depend on how near its other end
+/// is. (Spheres of radius 1000 once came out 20 % too dark, tilted triangles of size 100 by 24 %:
+/// they shadowed themselves.)
 TEST(SelfIntersection, LargeGroundShowsItsAlbedo) {
     testing::TestFamily family;
     const auto test = [&](SceneBuilder& b, const std::string& what) {
@@ -314,9 +311,11 @@ TEST(SelfIntersection, LargeGroundShowsItsAlbedo) {
         const auto scene = b.build();
         for (const char* algorithm : {"path", "bdpt"}) {
             const auto image = testing::catalog_image(scene, algorithm, 5, 4);
-            const testing::RegionMeans means = testing::replicate(image, scene->frame().crop, 16, 77);
+            const testing::RegionMeans means =
+                testing::replicate(image, scene->frame().crop, 16, 77);
             const testing::Sample sample(means.values[0]);
-            family.add(testing::one_sample_p_value(sample, 0.5), what + " " + algorithm + ": " + std::to_string(sample.mean));
+            family.add(testing::one_sample_p_value(sample, 0.5),
+                       what + " " + algorithm + ": " + std::to_string(sample.mean));
         }
     };
     for (const float size : {10.0f, 100.0f, 1000.0f, 10000.0f, 1e6f}) {
@@ -325,8 +324,10 @@ TEST(SelfIntersection, LargeGroundShowsItsAlbedo) {
         sphere.look({0, 1, -0.01f}, {0, 0, 0}, 40);
         test(sphere, "sphere " + std::to_string(size));
         SceneBuilder tilted;
-        const Vec3 a = normalize(Vec3{0.8f, 0.53f, 0.21f}), n = normalize(cross(Vec3{0.1f, -0.2f, 1}, a)), c = cross(a, n);
-        tilted.quad(a * -size - c * (1.3f * size), c * (2 * size), a * (2.1f * size), tilted.diffuse(Rgb(0.5f)));
+        const Vec3 a = normalize(Vec3{0.8f, 0.53f, 0.21f}),
+                   n = normalize(cross(Vec3{0.1f, -0.2f, 1}, a)), c = cross(a, n);
+        tilted.quad(a * -size - c * (1.3f * size), c * (2 * size), a * (2.1f * size),
+                    tilted.diffuse(Rgb(0.5f)));
         tilted.look(n * (n.y > 0 ? 1.0f : -1.0f), {0, 0, 0}, 40);
         test(tilted, "triangle " + std::to_string(size));
     }
@@ -340,15 +341,16 @@ TEST(Roulette, CanBeSwitchedOff) {
     b.room({-1, -1, -1}, {1, 1, 1}, b.diffuse(Rgb(1.0f)));
     b.look({0, 0, -0.9f}, {0, 0, 1}, 80);
     const auto scene = b.build();
-    const auto renderer = Renderer::create(scene, {"path", {{"rr-min", "1"}, {"rr-start", "2"}}, 3, 20});
+    const auto renderer =
+        Renderer::create(scene, {"path", {{"rr-min", "1"}, {"rr-start", "2"}}, 3, 20});
     ASSERT_TRUE(renderer.ok());
     const Result<Partial> partial = (*renderer)->render(whole_frame(*scene, 4), {});
     ASSERT_TRUE(partial.ok());
     EXPECT_EQ(partial->counters.vertices, partial->counters.camera_samples * 21);
 }
 
-/// The three algorithms in a few seconds; tests/statistical does the same per path length on many scenes.
->>>>>>> review
+/// The three algorithms in a few seconds; tests/statistical does the same per path length on many
+/// scenes.
 TEST(Means, OfTheThreeAlgorithmsAgree) {
     testing::TestFamily family;
     const auto scene = testing::diffuse_box();
