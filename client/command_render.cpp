@@ -40,6 +40,7 @@ struct ScratchDirectory {
 
 int render(const JobOptions& options, uint32_t threads, uint32_t worker_count) {
     (void)interrupt_token();
+    if (Status s = check_outputs(options); !s.ok()) return report_error(s);
     auto scene = load_scene(options);
     if (!scene.ok()) return report_error(scene.status());
     const auto spec = make_spec(options, *scene);
@@ -64,10 +65,13 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count) {
     LocalWorkerPort work(coordinator);
     if (Status s = jobs.upload_bytes(spec->scene_root, scene->manifest.canonical_text()); !s.ok()) return report_error(s);
 
-    // All workers share the one scene; it is built when the first unit asks for it.
+    // All workers share the one scene; it is built when the first unit asks for it. A build takes the description over, so
+    // its failure is final: a second attempt would build and render an empty scene.
+    Status build_failure;
     RendererCache renderers([&](const JobSpec& job, std::stop_token) -> Result<std::shared_ptr<const Scene>> {
+        if (!build_failure.ok()) return build_failure;
         auto built = Scene::build(std::move(scene->imported.description), {.width = job.width, .height = job.height});
-        if (!built.ok()) return built.status();
+        if (!built.ok()) return build_failure = built.status();
         return std::shared_ptr<const Scene>(std::move(built).value());
     });
     std::vector<std::unique_ptr<Worker>> workers;

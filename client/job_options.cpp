@@ -30,6 +30,10 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
 void add_output_settings(CLI::App& command, JobOptions& options) {
     command.add_option("-o,--output", options.output, "EXR to write; the manifest goes beside it (default: SCENE's name.exr)");
     command.add_option("--png", options.png, "Also write an 8-bit sRGB picture");
+    command.add_option("--exposure", options.exposure, "Stops by which the picture is brightened (the EXR never is)")
+        ->check(CLI::Range(-30.0, 30.0));
+    command.add_flag("--layers", options.layers, "Also store albedo, normal and depth of what the camera sees first");
+    command.add_flag("--half", options.half, "Store colour as half floats; fails where a value is beyond their range");
     auto* spp = command.add_option("--spp", options.samples_per_pixel, "Samples per pixel (default: the scene's)")
                     ->check(CLI::Range(1u, 1u << 24));
     command.add_option("--time", options.time_seconds,
@@ -80,6 +84,8 @@ Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
     if (spec.samples_per_pixel == 0 && spec.time_limit_seconds == 0)
         spec.samples_per_pixel = uint32_t(std::max(1, scene.imported.description.samples_per_pixel));
     spec.max_depth = options.max_depth;
+    spec.first_hit_layers = options.layers;
+    spec.half_float = options.half;
     if (!options.resolution.empty()) {
         int used = 0;
         const bool parsed = std::sscanf(options.resolution.c_str(), "%6dx%6d%n", &spec.width, &spec.height, &used) == 2;

@@ -15,6 +15,7 @@ struct JobOptions {
     std::string scene;
     std::string output;  ///< Empty: the scene's name with .exr, in the current directory.
     std::string png;     ///< Empty: none.
+    double exposure = 0; ///< Of the PNG, in stops.
     std::string algorithm = "path";
     uint32_t samples_per_pixel = 0;  ///< 0: the scene's (unless there is a time limit).
     double time_seconds = 0;
@@ -23,7 +24,7 @@ struct JobOptions {
     uint64_t seed = 0;
     std::vector<std::string> settings;  ///< "key=value"
     std::string json;
-    bool quiet = false, strict = false;
+    bool quiet = false, strict = false, layers = false, half = false;
 };
 
 /// Scene, algorithm, depth, resolution, seed and parameters.

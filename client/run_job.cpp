@@ -12,6 +12,8 @@
 #include "client/commands.h"
 #include "client/progress.h"
 #include "common/film/atomic_file.h"
+#include "common/film/exr_io.h"
+#include "common/film/png.h"
 
 namespace lightloom::client {
 namespace {
@@ -93,6 +95,21 @@ std::stop_token interrupt_token() {
     return source.get_token();
 }
 
+Status check_outputs(const JobOptions& options) {
+    const std::filesystem::path output = output_path(options);
+    std::filesystem::path manifest = output;
+    manifest.replace_extension(".manifest.json");
+    for (const std::string& path : {output.string(), manifest.string(), options.png, options.json}) {
+        if (path.empty()) continue;
+        std::error_code ignored;
+        if (std::filesystem::is_directory(path, ignored)) return invalid_argument(path + ": is a directory; give a file name");
+        const std::string probe = path + ".probe-" + std::to_string(::getpid());
+        LL_RETURN_IF_ERROR(write_file_atomically(probe, {}));
+        std::filesystem::remove(probe, ignored);
+    }
+    return {};
+}
+
 Status upload_scene(JobPort& port, const LocalScene& scene) {
     const std::string text = scene.manifest.canonical_text();
     const Digest root = sha256(text);
@@ -160,8 +177,8 @@ int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTi
     Status status = write_file_atomically(output.string(), *image);
     if (status.ok()) status = write_file_atomically(manifest_path.string(), *manifest);
     if (status.ok() && !options.png.empty()) {
-        const auto png = port.image(job.job_id, ImageKind::kPreview);
-        status = png.ok() ? write_file_atomically(options.png, *png) : png.status();
+        const auto decoded = decode_exr(*image, output.string());
+        status = decoded.ok() ? write_png(options.png, decoded->color, options.exposure) : decoded.status();
     }
     times.fetch_seconds = seconds_since(begin);
     if (status.ok() && !options.json.empty()) status = write_statistics(options.json, job, times);

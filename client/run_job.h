@@ -16,6 +16,9 @@ struct ClientTimes {
     double import_seconds = 0, digest_seconds = 0, upload_seconds = 0, wait_seconds = 0, fetch_seconds = 0;
 };
 
+/// Whether the files that options ask for can be written, tried out with empty ones: a typing error in -o must show before
+/// hours of rendering, not after them.
+Status check_outputs(const JobOptions& options);
 /// Sends what the coordinator lacks of the scene's files.
 Status upload_scene(JobPort& port, const LocalScene& scene);
 /// Submits under a fresh request id.

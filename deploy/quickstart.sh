@@ -60,7 +60,7 @@ done
 echo "coordinator on port $port, status at http://127.0.0.1:$status_port/api/v1/status, two workers with $threads thread(s) each"
 
 "$bin/lightloom" submit "$scene" --server "127.0.0.1:$port" --algorithm bdpt --spp "$spp" \
-    -o "$output/quickstart.exr" --png "$output/quickstart.png"
+    -o "$output/quickstart.exr" --png "$output/quickstart.png" --exposure 1
 echo
 echo "picture:  $(realpath "$output/quickstart.png")"
 echo "EXR:      $(realpath "$output/quickstart.exr")"

@@ -11,6 +11,7 @@
 #include <optional>
 #include <thread>
 
+#include "common/film/exr_io.h"
 #include "common/film/partial_exr.h"
 #include "common/work/service.h"
 #include "server/reducer.h"
@@ -23,6 +24,7 @@ struct SceneFacts {
     FrameLayout frame;         ///< With the job's resolution.
     float exposure_scale = 1;  ///< Multiplies the developed image.
     int max_depth = 5;         ///< Bounces, if the job leaves them to the scene.
+    std::vector<ImageLayer> layers;  ///< First-hit layers, if the job asks for them.
 };
 
 using SceneReader = std::function<Result<SceneFacts>(const AssetStore& assets, const JobSpec& spec, std::stop_token stop)>;

@@ -4,6 +4,7 @@
 
 #include <charconv>
 #include <ctime>
+#include <new>
 
 #include "common/film/atomic_file.h"
 #include "common/transport/catalog.h"
@@ -46,7 +47,7 @@ void Coordinator::prepare(JobRecord& job, std::stop_token stop) {
         const std::lock_guard lock(mutex_);
         spec = job.spec;
     }
-    const auto facts = options_.read_scene(assets_, spec, stop);
+    auto facts = options_.read_scene(assets_, spec, stop);
     const auto algorithm = find_algorithm(spec.algorithm);
     const auto parameters = parse_parameters(**algorithm, spec.parameters);
 
@@ -55,16 +56,22 @@ void Coordinator::prepare(JobRecord& job, std::stop_token stop) {
     job.prepared = options_.clock();
     if (!facts.ok()) return fail_job(job, facts.status());
     const FrameLayout& frame = facts->frame;
-    if (frame.crop.empty() || frame.crop.area() > (int64_t(1) << 31))
-        return fail_job(job, invalid_argument("the crop window must hold between 1 and 2^31 pixels"));
+    if (frame.crop.empty() || frame.crop.area() > kMaxPartialPixels)
+        return fail_job(job, invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) +
+                                              " pixels"));
     job.spec.frame = frame;
     job.spec.parameters = complete_parameters(**algorithm, *parameters);
     if (job.spec.max_depth < 0) job.spec.max_depth = facts->max_depth;
     job.exposure_scale = facts->exposure_scale;
+    job.layers = std::move(facts->layers);
     const double light_paths = light_paths_per_pixel(**algorithm, *parameters);
     const uint32_t window = group_window(frame, light_paths > 0, options_.waiting_bytes);
     job.units.emplace(Plan(frame, light_paths), job.spec.samples_per_pixel, window, options_.shuffle_seed);
-    job.reducer = std::make_shared<Reducer>(frame, job.units->tile_count());
+    try {
+        job.reducer = std::make_shared<Reducer>(frame, job.units->tile_count());
+    } catch (const std::bad_alloc&) {  // one job too large must not end the coordinator and all others
+        return fail_job(job, {StatusCode::kResourceExhausted, "the coordinator has no memory for the sums of a frame this large"});
+    }
     job.state = JobState::kRunning;
     spdlog::info("{}: {}x{}, {} tile(s), {} unit(s)", job.id, frame.crop.width(), frame.crop.height(),
                  job.units->tile_count(), job.units->unit_total());
@@ -89,15 +96,17 @@ void Coordinator::finish(JobRecord& job) {
     std::shared_ptr<Reducer> reducer;
     JobSpec spec;
     float scale = 1;
+    std::vector<ImageLayer> layers;
     {
         const std::lock_guard lock(mutex_);
         if (job.state != JobState::kFinishing) return;
         reducer = job.reducer;
+        layers = std::move(job.layers);
         spec = job.spec;
         scale = job.exposure_scale;
     }
     reducer->freeze();
-    const auto image = encode_image(spec, *reducer, scale);
+    const auto image = encode_image(spec, *reducer, scale, std::move(layers));
     if (!image.ok()) {
         const std::lock_guard lock(mutex_);
         return fail_job(job, image.status());

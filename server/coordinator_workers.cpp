@@ -124,7 +124,10 @@ Status Coordinator::release_unit(const std::string& worker_id, const UnitReferen
     worker->held.erase(unit);
     JobRecord* job = find_job(unit.job_id);
     if (!job || job->state != JobState::kRunning) return {};
-    if (why.ok() || why.code() == StatusCode::kCancelled) {
+    // What a network did to a worker says nothing about the unit: it costs time only.
+    const bool blameless = why.code() == StatusCode::kCancelled || why.code() == StatusCode::kUnavailable ||
+                           why.code() == StatusCode::kDeadlineExceeded || why.code() == StatusCode::kAborted;
+    if (why.ok() || blameless) {
         job->units->release(unit.key, worker->index);
     } else {
         const int failures = job->units->fail(unit.key, worker->index);

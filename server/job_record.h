@@ -31,6 +31,7 @@ struct Coordinator::JobRecord {
     bool closed = false;     ///< The time limit has passed.
     std::string created_at;  ///< UTC, for the manifest only.
     float exposure_scale = 1;
+    std::vector<ImageLayer> layers;  ///< First-hit layers, until the image is written.
     std::optional<UnitTable> units;
     std::shared_ptr<Reducer> reducer;  ///< Has its own lock; used without ours.
     uint32_t merged_groups = 0;        ///< Complete groups merged so far.

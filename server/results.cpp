@@ -87,7 +87,8 @@ std::string to_json(const Manifest& m) {
     return json.dump(1) + "\n";
 }
 
-Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, float exposure_scale) {
+Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, float exposure_scale,
+                                 std::vector<ImageLayer> layers) {
     auto color = reducer.image(exposure_scale);
     if (!color.ok()) return color.status();
     auto variance = reducer.variance(exposure_scale);
@@ -97,16 +98,17 @@ Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, fl
     ExrImage image;
     image.frame = spec.frame;
     image.color = *std::move(color);
+    image.layers = std::move(layers);
     image.layers.push_back({"variance", "RGB", std::move(variance->pixels)});
-    image.attributes = {{"lightloom.algorithm", spec.algorithm},
-                        {"lightloom.parameters", parameters},
-                        {"lightloom.seed", std::to_string(spec.seed)},
-                        {"lightloom.maxDepth", std::to_string(spec.max_depth)},
-                        {"lightloom.samplesPerPixel", std::to_string(reducer.iterations())},
+    image.attributes = {{exr_attribute::kAlgorithm, spec.algorithm},
+                        {exr_attribute::kParameters, parameters},
+                        {exr_attribute::kSeed, std::to_string(spec.seed)},
+                        {exr_attribute::kMaxDepth, std::to_string(spec.max_depth)},
+                        {exr_attribute::kSamples, std::to_string(reducer.iterations())},
                         {"lightloom.groups", std::to_string(reducer.folded_groups())},
-                        {"lightloom.sceneRoot", spec.scene_root.hex()},
+                        {exr_attribute::kScene, spec.scene_root.hex()},
                         {"lightloom.specDigest", spec.image_digest().hex()}};
-    return encode_exr(image);
+    return encode_exr(image, spec.half_float ? ExrPixelType::kHalf : ExrPixelType::kFloat);
 }
 
 Result<std::string> read_image(const std::filesystem::path& job_directory) {

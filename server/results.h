@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/film/exr_io.h"
 #include "common/work/service.h"
 #include "server/reducer.h"
 #include "server/unit_table.h"
@@ -42,8 +43,9 @@ std::string replay_command(const JobSpec& spec, const std::string& scene, const 
 /// The manifest as JSON text.
 std::string to_json(const Manifest& manifest);
 
-/// The EXR's bytes for the merged groups of `reducer`.
-Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, float exposure_scale);
+/// The EXR's bytes for the merged groups of `reducer`: colour, its variance, and `layers`.
+Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, float exposure_scale,
+                                 std::vector<ImageLayer> layers);
 Result<std::string> read_image(const std::filesystem::path& job_directory);
 /// PNG of the groups merged so far, or of the finished image when there is no reducer any more.
 Result<std::string> preview_png(const std::filesystem::path& job_directory, const Reducer* reducer, float exposure_scale);

@@ -3,13 +3,20 @@
 #include <unistd.h>
 
 #include "common/scene/scene.h"
+#include "common/transport/first_hit.h"
 
 namespace lightloom {
 
 Result<SceneFacts> scene_facts(const SceneDescription& description, const JobSpec& spec) {
     const auto frame = frame_layout(description.film, {.width = spec.width, .height = spec.height});
     if (!frame.ok()) return frame.status();
-    return SceneFacts{*frame, description.film.exposure_scale, description.max_depth};
+    SceneFacts facts{*frame, description.film.exposure_scale, description.max_depth, {}};
+    if (spec.first_hit_layers) {
+        const auto scene = Scene::build(description, {.width = spec.width, .height = spec.height});
+        if (!scene.ok()) return scene.status();
+        facts.layers = first_hit_layers(**scene, spec.seed);
+    }
+    return facts;
 }
 
 SceneReader make_scene_reader(std::filesystem::path scratch) {

@@ -48,7 +48,8 @@ std::string status_json(const Coordinator& coordinator) {
                            {"seconds_since_heard", w.seconds_since_heard},
                            {"lost", w.lost}});
     }
-    return Json{{"jobs", std::move(jobs)}, {"workers", std::move(workers)}}.dump(1) + "\n";
+    // Messages may quote bytes that are not UTF-8 (file names, cut texts); the default of dump() is to throw.
+    return Json{{"jobs", std::move(jobs)}, {"workers", std::move(workers)}}.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 http::response<http::string_body> respond(const Coordinator& coordinator, const http::request<http::empty_body>& request) {

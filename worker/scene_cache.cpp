@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <random>
 #include <thread>
 
 #include "common/import/import.h"
@@ -15,10 +16,16 @@ constexpr size_t kMaxRenderers = 4;
 /// The list of a scene's files; far above any real scene's.
 constexpr uint64_t kMaxManifestBytes = uint64_t(64) << 20;
 
+/// A process id alone is not enough: containers that share the cache may all run as process 1.
+std::string scratch_name() {
+    std::random_device device;
+    return "scenes-" + std::to_string(::getpid()) + "-" + std::to_string(device());
+}
+
 }  // namespace
 
 SceneFetcher::SceneFetcher(WorkerPort& port, std::filesystem::path directory)
-    : port_(port), scratch_(directory / ("scenes-" + std::to_string(::getpid()))), store_(directory / "assets") {}
+    : port_(port), scratch_(directory / scratch_name()), store_(directory / "assets") {}
 
 SceneFetcher::~SceneFetcher() {
     std::error_code ignored;

@@ -45,6 +45,10 @@ constexpr float length_squared(const Vec3& a) { return dot(a, a); }
 inline float length(const Vec3& a) { return std::sqrt(length_squared(a)); }
 inline Vec3 normalize(const Vec3& a) { return a / length(a); }
 inline bool is_finite(const Vec3& a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
+constexpr float largest_coordinate(const Vec3& a) {
+    const float x = a.x < 0 ? -a.x : a.x, y = a.y < 0 ? -a.y : a.y, z = a.z < 0 ? -a.z : a.z;
+    return x > y ? (x > z ? x : z) : (y > z ? y : z);
+}
 /// `v` flipped, if need be, into the hemisphere of `n`.
 constexpr Vec3 face_forward(const Vec3& v, const Vec3& n) { return dot(v, n) < 0 ? -v : v; }
 

@@ -158,8 +158,7 @@ bool is_zero(const std::array<double, 3>& rgb) { return rgb[0] == 0 && rgb[1] ==
 
 Status check_frame(const FrameLayout& frame, const Rect& tile) {
     const Rect& crop = frame.crop;
-    // Part of every bound below: 28 bytes a pixel must fit EXR's 31-bit chunk size, and a pixel index 32 bits.
-    constexpr int64_t kMaxPixels = (int64_t(1) << 31) / 28 - 1;
+    constexpr int64_t kMaxPixels = kMaxPartialPixels;  // part of every bound below
     if (crop.empty() || crop.x0 < 0 || crop.y0 < 0 || crop.x1 > frame.width || crop.y1 > frame.height ||
         crop.area() > kMaxPixels) {
         return invalid_argument("partial: the crop window is empty, outside the frame or larger than " +

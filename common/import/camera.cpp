@@ -63,12 +63,7 @@ void set_film(Context* context, const std::string& kind, const ParameterList& p)
     }
     if ((bounds || window) && (film.crop[0] >= film.crop[1] || film.crop[2] >= film.crop[3]))
         fail(p.where(), p.what() + ": the crop is empty");
-    film.max_component_value = p.one_float("maxcomponentvalue", 0);
-    if (p.find_any("maxcomponentvalue")) {
-        if (!(film.max_component_value > 0)) fail(p.where(), p.what() + ": maxcomponentvalue must be positive");
-        context->diagnostics.warn(p.where(),
-                                  p.what() + ": maxcomponentvalue clamps bright samples, which darkens the picture");
-    }
+    p.ignore(&context->diagnostics, "maxcomponentvalue", "samples are not clamped, because that changes the mean");
     context->iso = p.one_float("iso", 100);
     if (!(context->iso > 0)) fail(p.where(), p.what() + ": iso must be positive");
     const std::string sensor = p.one_string("sensor", "cie1931");

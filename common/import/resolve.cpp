@@ -88,6 +88,9 @@ void add_shape(Context* context, PendingShape shape) {
         if (shape.alpha_texture.empty() && shape.alpha == 0)
             fail(shape.where,
                  "an emitting shape with alpha 0 (pbrt's invisible light) is not supported; give it a visible alpha");
+        if (attributes.alpha != kNone)
+            fail(shape.where, "an emitting shape with an alpha is not supported: the light sampled on it would be that of "
+                              "the uncut shape; cut the geometry instead");
         const bool powered = area_light_uses_power(*shape.area_light);
         if (powered && mesh) return add_powered_mesh(context, std::move(*mesh), shape);
         const double area = sphere ? 4 * kPiD * double(sphere->radius) * sphere->radius : 0;

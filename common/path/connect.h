@@ -98,7 +98,8 @@ Rgb next_event(const Scene& scene, const PathVertex* z, int t, const NextEventSa
     const Emitter& e = emitters[light.emitter];
     ++counters->rays;
     ++counters->connections;
-    if (e.is_area() ? scene.occluded(v.p, v.ng, light.position, light.normal) : scene.occluded(v.p, v.ng, light.position))
+    if (e.is_area() ? scene.occluded(v.p, v.ng, v.reach, light.position, light.normal, e.reach)
+                    : scene.occluded(v.p, v.ng, v.reach, light.position))
         return {};
     const int k = t;
     view->k = k;
@@ -130,7 +131,7 @@ inline Rgb connect(const Scene& scene, const PathVertex* y, int s, const PathVer
     if (contribution.is_black()) return {};
     ++counters->rays;
     ++counters->connections;
-    if (scene.occluded(b.p, b.ng, a.p, a.ng)) return {};
+    if (scene.occluded(b.p, b.ng, b.reach, a.p, a.ng, a.reach)) return {};
     const int k = s + t - 1;
     view->k = k;
     view_light_prefix(y, s, view);
@@ -164,7 +165,7 @@ inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, con
     if (contribution.is_black()) return {};
     ++counters->rays;
     ++counters->connections;
-    if (scene.occluded(a.p, a.ng, lens_point)) return {};
+    if (scene.occluded(a.p, a.ng, a.reach, lens_point)) return {};
     const int k = s;
     view->k = k;
     view_light_prefix(y, s, view);

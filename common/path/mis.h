@@ -27,14 +27,15 @@
 
 namespace lightloom {
 
-/// A non-negative number with its own exponent: value = mantissa * 2^(512 * shift).
+/// A non-negative number with its own exponent: value = mantissa * 2^(512 * shift). Infinity (two vertices in the same place)
+/// stays what it is.
 struct WideProduct {
     double mantissa = 1;
     int shift = 0;
 
     void multiply(double factor) {
         mantissa *= factor;
-        while (mantissa > 0x1p256) mantissa *= 0x1p-512, ++shift;
+        while (mantissa > 0x1p256 && mantissa < HUGE_VAL) mantissa *= 0x1p-512, ++shift;
         while (mantissa < 0x1p-256 && mantissa > 0) mantissa *= 0x1p512, --shift;
     }
     /// The value as a double: infinity or zero beyond its range, which is what a sum of ratios needs.

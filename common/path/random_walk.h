@@ -45,6 +45,7 @@ void arrive(const WalkRay& ray, const Vec3& previous_p, const Vec3& previous_ng,
     v->wo_local = point.shading.to_local(v->wo);
     v->alpha = ray.alpha;
     v->emitter = point.emitter;
+    v->reach = point.reach;
     v->delta = false;
     v->rev = 0;
     const float cosine = abs_dot(v->ng, v->wo);
@@ -78,7 +79,7 @@ bool leave(PathVertex* v, PathVertex* previous, const ScatterSample& u, WalkRay*
     v->delta = s.delta;
     previous->rev = double(s.pdf_rev) * v->to_previous;
     ray->pdf = s.pdf_fwd;
-    ray->origin = offset_origin(v->p, v->ng, ray->direction);
+    ray->origin = offset_origin(v->p, v->ng, ray->direction, v->reach);
     ray->from_infinite = false;
     ray->previous_hittable = true;
     return true;
@@ -113,7 +114,7 @@ inline bool start_light_path(const Scene& scene, Rng& rng, PathVertex* y0, WalkR
     ray->pdf = s.pdf_direction;
     ray->from_infinite = e.is_infinite();
     ray->previous_hittable = !e.is_delta();
-    ray->origin = e.is_area() ? offset_origin(s.position, s.normal, s.direction) : s.position;
+    ray->origin = e.is_area() ? offset_origin(s.position, s.normal, s.direction, e.reach) : s.position;
     return true;
 }
 

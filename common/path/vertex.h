@@ -22,6 +22,7 @@ struct PathVertex {
     /// [Veach 1997, 5.3]. Camera sub-paths: 1.
     float adjoint = 1;
     int32_t emitter = kNone;   ///< Emitter that this vertex lies on.
+    float reach = 0;           ///< SurfacePoint::reach.
     bool delta = false;        ///< The sub-path went on through a Dirac lobe.
 };
 

@@ -1,11 +1,13 @@
 #include "common/scene/accel.h"
 
 #include <embree3/rtcore.h>
+#include <tbb/global_control.h>
 
 #include <atomic>
 #include <cmath>
 #include <cstring>
 
+#include "common/core/math.h"
 #include "common/core/rng.h"
 
 namespace lightloom {
@@ -18,9 +20,10 @@ bool count_memory(void* user, ssize_t bytes, bool) {
     return true;
 }
 
-/// One device for the process: pinned instruction set, single-threaded builds.
+/// One device for the process, with a pinned instruction set. It must not be told a number of threads: that would be the
+/// limit of every other task of the process as long as the device lives.
 struct Device {
-    RTCDevice handle = rtcNewDevice("isa=avx2,threads=1,set_affinity=0,start_threads=0");
+    RTCDevice handle = rtcNewDevice("isa=avx2,set_affinity=0,start_threads=0");
     Device() {
         if (handle != nullptr) rtcSetDeviceMemoryMonitorFunction(handle, count_memory, &g_device_memory);
     }
@@ -32,6 +35,13 @@ struct Device {
 RTCDevice device() {
     static Device d;
     return d.handle;
+}
+
+/// Builds on the calling thread alone (accel.h says why). Embree runs its builds in a task arena of its own, so the limit has
+/// to be the process's; other tasks are merely slowed down while it lasts.
+void commit(RTCScene scene) {
+    const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+    rtcCommitScene(scene);
 }
 
 struct GeometryUser {
@@ -63,7 +73,8 @@ bool passes_through(const GeometryUser& g, uint32_t primitive, uint32_t salt, fl
     const float opacity = g.opacity(g.opacity_user, g.object, g.geometry, primitive, u, v);
     if (opacity >= 1) return false;
     if (opacity <= 0) return true;
-    const uint64_t id = (uint64_t(g.geometry * 2 + salt) << 32) | primitive;
+    // The object too: a ray that crosses two objects through identity instances meets equal geometry and primitive numbers.
+    const uint64_t id = ((uint64_t(g.geometry * 2 + salt) << 32) | primitive) ^ mix64(uint64_t(g.object + 1));
     return ray_hash(ray.org_x, ray.org_y, ray.org_z, ray.dir_x, ray.dir_y, ray.dir_z, id) >= opacity;
 }
 
@@ -100,6 +111,15 @@ int sphere_roots(const Sphere& s, const RTCRay& ray, double t[2]) {
     return 2;
 }
 
+bool sphere_passes(const SphereUser& user, uint32_t primitive, int crossing, double t, const RTCRay& ray) {
+    if (user.filter.opacity == nullptr) return false;
+    const Sphere& s = (*user.spheres)[primitive];
+    if (s.attributes.alpha == kNone) return false;
+    const Vec3 p{float(ray.org_x + t * ray.dir_x), float(ray.org_y + t * ray.dir_y), float(ray.org_z + t * ray.dir_z)};
+    const Vec2 uv = sphere_uv(s, normalize(p - s.centre));
+    return passes_through(user.filter, primitive, uint32_t(crossing), uv.x, uv.y, ray);
+}
+
 void sphere_intersect(const RTCIntersectFunctionNArguments* args) {
     if (args->valid[0] == 0) return;
     const auto& user = *static_cast<const SphereUser*>(args->geometryUserPtr);
@@ -109,7 +129,7 @@ void sphere_intersect(const RTCIntersectFunctionNArguments* args) {
     for (int i = 0; i < n; ++i) {
         if (!(t[i] > rayhit.ray.tnear && t[i] < rayhit.ray.tfar)) continue;
         const float t_hit = float(t[i]);
-        if (user.filter.opacity != nullptr && passes_through(user.filter, args->primID, uint32_t(i), 0, 0, rayhit.ray)) continue;
+        if (sphere_passes(user, args->primID, i, t[i], rayhit.ray)) continue;
         rayhit.ray.tfar = t_hit;
         rayhit.hit.geomID = args->geomID;
         rayhit.hit.primID = args->primID;
@@ -128,13 +148,20 @@ void sphere_occluded(const RTCOccludedFunctionNArguments* args) {
     const int n = sphere_roots((*user.spheres)[args->primID], ray, t);
     for (int i = 0; i < n; ++i) {
         if (!(t[i] > ray.tnear && t[i] < ray.tfar)) continue;
-        if (user.filter.opacity != nullptr && passes_through(user.filter, args->primID, uint32_t(i), 0, 0, ray)) continue;
+        if (sphere_passes(user, args->primID, i, t[i], ray)) continue;
         ray.tfar = -INFINITY;
         return;
     }
 }
 
 }  // namespace
+
+Vec2 sphere_uv(const Sphere& sphere, const Vec3& n) {
+    const Vec3 local = sphere.orientation.to_local(n);
+    double phi = math::atan2(local.y, local.x);
+    if (phi < 0) phi += 2 * kPiD;
+    return {float(phi / (2 * kPiD)), float(1 - math::acos(local.z) / kPiD)};
+}
 
 struct Accel::Impl {
     RTCScene world = nullptr;
@@ -210,7 +237,7 @@ Result<std::unique_ptr<Accel>> Accel::build(const SceneDescription& scene, Opaci
         impl.add_meshes(s, scene.objects[size_t(o)].meshes, o, opacity, opacity_user);
         impl.add_spheres(s, scene.objects[size_t(o)].spheres, uint32_t(scene.objects[size_t(o)].meshes.size()), o, opacity,
                          opacity_user);
-        rtcCommitScene(s);
+        commit(s);
     }
     impl.world = new_scene();
     impl.add_meshes(impl.world, scene.meshes, -1, opacity, opacity_user);
@@ -228,7 +255,7 @@ Result<std::unique_ptr<Accel>> Accel::build(const SceneDescription& scene, Opaci
         rtcAttachGeometryByID(impl.world, g, impl.first_instance_id + i);
         rtcReleaseGeometry(g);
     }
-    rtcCommitScene(impl.world);
+    commit(impl.world);
     if (const RTCError error = rtcGetDeviceError(device()); error != RTC_ERROR_NONE)
         return internal_error("Embree could not build the acceleration structure (error " + std::to_string(int(error)) +
                               "); the machine may be out of memory");

@@ -17,6 +17,9 @@
 
 namespace lightloom {
 
+/// Texture coordinates of a sphere, pbrt's, at the outward unit normal `n`.
+Vec2 sphere_uv(const Sphere& sphere, const Vec3& n);
+
 class Accel {
   public:
     /// Geometry index that the opacity callback gets for spheres.

@@ -150,7 +150,6 @@ struct FilmDescription {
     /// Crop window in pixels, half open: x0, x1, y0, y1; all -1 means the whole frame.
     int crop[4] = {-1, -1, -1, -1};
     float exposure_scale = 1;          ///< iso * exposure time / 100: multiplies the image.
-    float max_component_value = 0;     ///< 0: no clamp. Otherwise a named option that changes the mean.
     std::string file_name;
 };
 

@@ -28,6 +28,7 @@ struct Emitter {
     bool inward = false;
     float inv_area = 0;
     float cos_total = 0, cos_falloff = 0;  ///< kSpot.
+    float reach = 0;            ///< Area lights: largest coordinate magnitude; see offset_origin().
     int32_t light = 0;          ///< Group for reports: the area-light shape or light source it came from.
 
     bool is_area() const { return kind == EmitterKind::kTriangle || kind == EmitterKind::kSphere; }

@@ -20,15 +20,22 @@ struct RawHit {
 
 /// `p` moved off its surface to the side that `direction` points to, by a distance that is a few hundred units in the last
 /// place of each coordinate (with a floor near the origin) [Waechter and Binder 2019, A Fast and Robust Method for Avoiding
-/// Self-Intersection]. Camera and light sub-paths, next event and connections all use this one rule, so that a segment has
-/// the same visibility from either end.
-inline Vec3 offset_origin(const Vec3& p, const Vec3& geometric_normal, const Vec3& direction) {
-    constexpr float kOrigin = 1.0f / 32, kFloatScale = 1.0f / 65536, kIntScale = 256;
+/// Self-Intersection], and never less than what `reach` asks for. `reach` bounds the coordinates of the whole triangle or
+/// sphere that `p` lies on: where `p` is, and where a ray finds the surface, are known to some units in the last place of
+/// THAT, which near the origin of a large ground plane is far more than those of `p`. Camera and light sub-paths, next
+/// event and connections all use this one rule, so that a segment has the same visibility from either end.
+inline Vec3 offset_origin(const Vec3& p, const Vec3& geometric_normal, const Vec3& direction, float reach) {
+    constexpr float kOrigin = 1.0f / 32, kFloatScale = 1.0f / 65536, kIntScale = 256, kReachScale = 0x1p-20f;
     const Vec3 n = face_forward(geometric_normal, direction);
-    const auto move = [](float c, float nc) {
-        if (std::fabs(c) < kOrigin) return c + kFloatScale * nc;
-        const int32_t steps = int32_t(kIntScale * nc);
-        return std::bit_cast<float>(std::bit_cast<int32_t>(c) + (c < 0 ? -steps : steps));
+    const float least = kReachScale * reach;
+    const auto move = [least](float c, float nc) {
+        float moved = c + kFloatScale * nc;
+        if (!(std::fabs(c) < kOrigin)) {
+            const int32_t steps = int32_t(kIntScale * nc);
+            moved = std::bit_cast<float>(std::bit_cast<int32_t>(c) + (c < 0 ? -steps : steps));
+        }
+        const float asked = c + least * nc;
+        return nc > 0 ? (moved > asked ? moved : asked) : (moved < asked ? moved : asked);
     };
     return {move(p.x, n.x), move(p.y, n.y), move(p.z, n.z)};
 }

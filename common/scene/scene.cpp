@@ -1,5 +1,6 @@
 #include "common/scene/scene.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -33,6 +34,7 @@ void Scene::triangle_point(const TriangleMesh& mesh, const RawHit& hit, SurfaceP
     const Vec3 e1 = p1 - p0, e2 = p2 - p0;
     const float b1 = hit.u, b2 = hit.v, b0 = 1 - b1 - b2;
     out->p = p0 + e1 * b1 + e2 * b2;
+    out->reach = std::max({largest_coordinate(p0), largest_coordinate(p1), largest_coordinate(p2)});
     out->ng = normalize(cross(e1, e2));
     if (mesh.attributes.flip_normal) out->ng = -out->ng;
     Vec2 uv[3] = {{0, 0}, {1, 0}, {1, 1}};
@@ -73,11 +75,10 @@ bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out) const {
         }
         const Vec3 n = normalize(from + along * hit.t - s.centre);
         out->p = s.centre + n * s.radius;
+        out->reach = largest_coordinate(s.centre) + s.radius;
         out->ng = s.attributes.flip_normal ? -n : n;
         const Vec3 local = s.orientation.to_local(n);
-        double phi = math::atan2(local.y, local.x);
-        if (phi < 0) phi += 2 * kPiD;
-        out->uv = {float(phi / (2 * kPiD)), float(1 - math::acos(local.z) / kPiD)};
+        out->uv = sphere_uv(s, n);
         out->shading = frame_along(out->ng, s.orientation.to_world({-local.y, local.x, 0}));
         out->material = s.attributes.material;
         out->emitter = instanced ? kNone : sphere_emitter_[hit.primitive];
@@ -86,6 +87,10 @@ bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out) const {
         const Mat4& m = description_.instances[size_t(hit.instance)].object_to_world;
         const Mat4& inv = instance_inverse_[size_t(hit.instance)];
         out->p = m.point(out->p);
+        float reach = 0;
+        for (const auto& row : m.m)
+            reach = std::max(reach, float((std::fabs(row[0]) + std::fabs(row[1]) + std::fabs(row[2])) * out->reach + std::fabs(row[3])));
+        out->reach = reach;
         out->ng = normalize(inv.normal_by_inverse(out->ng));
         const Vec3 n = normalize(inv.normal_by_inverse(out->shading.n));
         out->shading = frame_along(n, m.vector(out->shading.s));
@@ -97,14 +102,14 @@ Bsdf Scene::bsdf_at(const SurfacePoint& point) const {
     return resolve_material(tables_, point.material, point.uv, position_hash(point.p));
 }
 
-bool Scene::occluded(const Vec3& p, const Vec3& ng_p, const Vec3& q, const Vec3& ng_q) const {
+bool Scene::occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3& q, const Vec3& ng_q, float reach_q) const {
     const Vec3 d = q - p;
-    const Vec3 from = offset_origin(p, ng_p, d), to = offset_origin(q, ng_q, -d);
+    const Vec3 from = offset_origin(p, ng_p, d, reach_p), to = offset_origin(q, ng_q, -d, reach_q);
     return accel_->occluded(from, to - from, 0.99999f);
 }
 
-bool Scene::occluded(const Vec3& p, const Vec3& ng_p, const Vec3& q) const {
-    const Vec3 from = offset_origin(p, ng_p, q - p);
+bool Scene::occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3& q) const {
+    const Vec3 from = offset_origin(p, ng_p, q - p, reach_p);
     return accel_->occluded(from, q - from, 0.99999f);
 }
 
@@ -113,7 +118,7 @@ float Scene::opacity(const void* user, int32_t object, uint32_t geometry, uint32
     const SceneDescription& d = scene.description_;
     if (geometry == Accel::kSphereGeometry) {
         const Sphere& s = (object < 0 ? d.spheres : d.objects[size_t(object)].spheres)[primitive];
-        return s.attributes.alpha == kNone ? 1 : evaluate_texture(scene.tables_, s.attributes.alpha, {0.5f, 0.5f}).r;
+        return s.attributes.alpha == kNone ? 1 : evaluate_texture(scene.tables_, s.attributes.alpha, {u, v}).r;
     }
     const TriangleMesh& mesh = (object < 0 ? d.meshes : d.objects[size_t(object)].meshes)[geometry];
     const uint32_t* index = &mesh.indices[size_t(primitive) * 3];

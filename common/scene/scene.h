@@ -47,6 +47,7 @@ struct SurfacePoint {
     Vec2 uv;
     MaterialId material = kNone;
     int32_t emitter = kNone;
+    float reach = 0;     ///< Largest coordinate magnitude of the primitive, world space; see offset_origin().
 };
 
 class Scene {
@@ -68,9 +69,9 @@ class Scene {
     /// The material of a point, textures looked up.
     Bsdf bsdf_at(const SurfacePoint& point) const;
     /// Whether the open segment between two surface points is blocked; both ends are moved off their surfaces.
-    bool occluded(const Vec3& p, const Vec3& ng_p, const Vec3& q, const Vec3& ng_q) const;
+    bool occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3& q, const Vec3& ng_q, float reach_q) const;
     /// The same where `q` is not on a surface (a lens, a point light, a point beyond the scene).
-    bool occluded(const Vec3& p, const Vec3& ng_p, const Vec3& q) const;
+    bool occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3& q) const;
 
   private:
     Scene() = default;

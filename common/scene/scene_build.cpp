@@ -1,5 +1,6 @@
 // Scene::build(): checks a description, prepares it for rendering and counts what it holds.
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -22,6 +23,9 @@ struct Checker {
             return invalid_argument(at(a) + ": no such area emission");
         if (a.emission != kNone && !may_emit)
             return invalid_argument(at(a) + ": a shape inside an object definition may not emit");
+        if (a.emission != kNone && a.alpha != kNone && !d.emissions[size_t(a.emission)].radiance.is_black())
+            return invalid_argument(at(a) + ": a shape that emits may not have an alpha, because the light sampled on it "
+                                            "would be that of the uncut shape; cut the geometry instead");
         if (a.alpha != kNone && (a.alpha < 0 || size_t(a.alpha) >= d.textures.size()))
             return invalid_argument(at(a) + ": no such alpha texture");
         return {};
@@ -116,6 +120,8 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
             e.position = mesh.positions[index[0]];
             e.edge1 = mesh.positions[index[1]] - e.position;
             e.edge2 = mesh.positions[index[2]] - e.position;
+            e.reach = std::max({largest_coordinate(e.position), largest_coordinate(mesh.positions[index[1]]),
+                                largest_coordinate(mesh.positions[index[2]])});
             const Vec3 n = cross(e.edge1, e.edge2);
             const float len = length(n);
             e.normal = n / len;
@@ -140,6 +146,7 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
         e.radiance = emission.radiance;
         e.position = s.centre;
         e.radius = s.radius;
+        e.reach = largest_coordinate(s.centre) + s.radius;
         e.inward = s.attributes.flip_normal;
         e.inv_area = 1 / (4 * kPi * s.radius * s.radius);
         e.light = new_light(s.attributes.source);

@@ -1,5 +1,7 @@
 #include "common/transport/renderer.h"
 
+#include <algorithm>
+
 #include "common/path/path_view.h"
 #include "common/transport/bdpt.h"
 #include "common/transport/light.h"
@@ -40,6 +42,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(std::shared_ptr<const Scene> 
     RouletteRule roulette;
     roulette.first_vertex = int(value("rr-start"));
     roulette.min_survival = float(value("rr-min"));
+    roulette.max_survival = std::max(roulette.max_survival, roulette.min_survival);  // rr-min=1 switches roulette off
     const auto make = [&](auto algorithm) {
         return std::unique_ptr<Renderer>(
             new UnitRenderer<decltype(algorithm)>(std::move(scene), settings, roulette, std::move(algorithm)));

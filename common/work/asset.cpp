@@ -22,6 +22,23 @@ Status bad_line(int number, std::string_view what) {
     return invalid_argument("scene file list, line " + std::to_string(number) + ": " + std::string(what));
 }
 
+/// Well-formed UTF-8 [RFC 3629]: no overlong form, no surrogate, nothing above U+10FFFF.
+bool is_utf8(std::string_view text) {
+    for (size_t i = 0; i < text.size();) {
+        const uint8_t lead = uint8_t(text[i++]);
+        if (lead < 0x80) continue;
+        const int more = lead >= 0xc2 && lead <= 0xdf ? 1 : (lead & 0xf0) == 0xe0 ? 2 : lead >= 0xf0 && lead <= 0xf4 ? 3 : 0;
+        if (more == 0 || text.size() - i < size_t(more)) return false;
+        const uint8_t second = uint8_t(text[i]);
+        if ((lead == 0xe0 && second < 0xa0) || (lead == 0xed && second > 0x9f) || (lead == 0xf0 && second < 0x90) ||
+            (lead == 0xf4 && second > 0x8f))
+            return false;
+        for (int k = 0; k < more; ++k)
+            if ((uint8_t(text[i++]) & 0xc0) != 0x80) return false;
+    }
+    return true;
+}
+
 }  // namespace
 
 Status validate_asset_path(std::string_view path) {
@@ -32,6 +49,8 @@ Status validate_asset_path(std::string_view path) {
         if (uint8_t(c) < 0x20 || c == 0x7f || c == '\\')
             return invalid_argument("file name with a control character or backslash; rename the file");
     }
+    // Manifests and status are JSON, and messages on the wire are text: neither can carry other bytes.
+    if (!is_utf8(path)) return invalid_argument("a file name in the scene is not UTF-8; rename the file");
     for (size_t begin = 0; begin <= path.size();) {
         const size_t end = std::min(path.find('/', begin), path.size());
         const std::string_view part = path.substr(begin, end - begin);

@@ -39,7 +39,7 @@ struct AssetManifest {
     static Result<AssetManifest> of_files(const std::filesystem::path& directory, const std::vector<std::string>& files);
 };
 
-/// Relative, no empty, "." or ".." component, no backslash, no control character, components up to 255 bytes.
+/// Relative, UTF-8, no empty, "." or ".." component, no backslash, no control character, components up to 255 bytes.
 Status validate_asset_path(std::string_view path);
 
 /// SHA-256 of a file. kNotFound if it cannot be read.

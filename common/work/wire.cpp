@@ -50,6 +50,7 @@ void put(const JobSpec& in, v1::JobSpec* out) {
     out->mutable_frame()->set_height(in.frame.height);
     put_rect(in.frame.crop, out->mutable_frame()->mutable_crop());
     out->set_first_hit_layers(in.first_hit_layers);
+    out->set_half_float(in.half_float);
 }
 
 Result<JobSpec> get(const v1::JobSpec& in) {
@@ -68,6 +69,7 @@ Result<JobSpec> get(const v1::JobSpec& in) {
     spec.scene_root = *root;
     spec.frame = {in.frame().width(), in.frame().height(), get_rect(in.frame().crop())};
     spec.first_hit_layers = in.first_hit_layers();
+    spec.half_float = in.half_float();
     return spec;
 }
 

@@ -20,12 +20,13 @@ constexpr int kSeeds = 32;
 const char* const kAlgorithms[] = {"path", "light", "bdpt"};
 
 /// Tests the frame and every block against one number.
-void expect_constant(const RegionMeans& means, double expected, const std::string& what, TestFamily* family) {
+void expect_constant(const RegionMeans& means, double expected, const std::string& what,
+                     TestFamily* family) {
     for (size_t r = 0; r < means.values.size(); ++r) {
         const testing::Sample sample(means.values[r]);
-        family->add(testing::one_sample_p_value(sample, expected), what + ", region " + std::to_string(r) + ": " +
-                                                                       std::to_string(sample.mean) + " +- " +
-                                                                       std::to_string(sample.standard_error()));
+        family->add(testing::one_sample_p_value(sample, expected),
+                    what + ", region " + std::to_string(r) + ": " + std::to_string(sample.mean) +
+                        " +- " + std::to_string(sample.standard_error()));
     }
 }
 
@@ -37,7 +38,8 @@ std::shared_ptr<const Scene> furnace_box(float albedo) {
     return b.build();
 }
 
-/// A closed box that emits 1 everywhere with albedo a: n edges at most make (1 - a^n) / (1 - a), everywhere. n is max_depth + 1.
+/// A closed box that emits 1 everywhere with albedo a: n edges at most make (1 - a^n) / (1 - a),
+/// everywhere. n is max_depth + 1.
 TEST(Furnace, BoxTruncatedAtEveryDepth) {
     TestFamily family;
     const double albedo = 0.5;
@@ -48,26 +50,32 @@ TEST(Furnace, BoxTruncatedAtEveryDepth) {
             expected += power;
             power *= albedo;
             const auto image = testing::catalog_image(scene, algorithm, max_depth, 16);
-            expect_constant(testing::replicate(image, scene->frame().crop, kSeeds, 100 * uint64_t(max_depth)), expected,
-                            std::string(algorithm) + ", max depth " + std::to_string(max_depth), &family);
+            expect_constant(
+                testing::replicate(image, scene->frame().crop, kSeeds, 100 * uint64_t(max_depth)),
+                expected, std::string(algorithm) + ", max depth " + std::to_string(max_depth),
+                &family);
         }
     }
     family.check();
 }
 
-/// The same for every subset of bdpt's techniques that contains hits. (Next event and connections alone have no finite
-/// variance in the corners of the box, where 1 / d^2 has no bound, and a test of their means would mean nothing.)
+/// The same for every subset of bdpt's techniques that contains hits. (Next event and connections
+/// alone have no finite variance in the corners of the box, where 1 / d^2 has no bound, and a test
+/// of their means would mean nothing.)
 TEST(Furnace, BoxWithAnyTechniqueSubset) {
     TestFamily family;
     const auto scene = furnace_box(0.5f);
     for (int mask = 0; mask < 8; ++mask) {
         MaskedSelection subset{testing::bdpt_selection(*scene)};
         subset.min_k = 2;
-        subset.next_event = mask & 1, subset.connections = mask & 2, subset.light_tracing = mask & 4;
+        subset.next_event = mask & 1, subset.connections = mask & 2,
+        subset.light_tracing = mask & 4;
         const double expected = (0.5 - std::pow(0.5, 5)) / (1 - 0.5);
-        const auto image = testing::algorithm_image(scene, BdptAlgorithm<MaskedSelection>{subset}, 4, 32);
-        expect_constant(testing::replicate(image, scene->frame().crop, kSeeds, 5000 + 100 * uint64_t(mask)), expected,
-                        "techniques " + std::to_string(mask), &family);
+        const auto image =
+            testing::algorithm_image(scene, BdptAlgorithm<MaskedSelection>{subset}, 4, 32);
+        expect_constant(
+            testing::replicate(image, scene->frame().crop, kSeeds, 5000 + 100 * uint64_t(mask)),
+            expected, "techniques " + std::to_string(mask), &family);
     }
     family.check();
 }
@@ -82,20 +90,23 @@ TEST(Furnace, WhiteSphereInConstantEnvironment) {
     b.look({0, 0, -4}, {0, 0, 0}, 40);
     const auto scene = b.build();
     for (const char* algorithm : kAlgorithms)
-        expect_constant(testing::replicate(testing::catalog_image(scene, algorithm, 3, 32), scene->frame().crop, kSeeds, 7000), 1,
-                        algorithm, &family);
+        expect_constant(testing::replicate(testing::catalog_image(scene, algorithm, 3, 32),
+                                           scene->frame().crop, kSeeds, 7000),
+                        1, algorithm, &family);
     family.check();
 }
 
-/// Form factor of two parallel unit squares, facing at distance d [Howell, A Catalog of Radiation Heat Transfer
-/// Configuration Factors, C-11].
+/// Form factor of two parallel unit squares, facing at distance d [Howell, A Catalog of Radiation
+/// Heat Transfer Configuration Factors, C-11].
 double facing_squares(double d) {
     const double x = 1 / d, x1 = 1 + x * x;
-    return 2 / (kPiD * x * x) * (std::log(std::sqrt(x1 * x1 / (1 + 2 * x * x))) + 2 * x * std::sqrt(x1) * std::atan(x / std::sqrt(x1)) -
-                                 2 * x * std::atan(x));
+    return 2 / (kPiD * x * x) *
+           (std::log(std::sqrt(x1 * x1 / (1 + 2 * x * x))) +
+            2 * x * std::sqrt(x1) * std::atan(x / std::sqrt(x1)) - 2 * x * std::atan(x));
 }
 
-/// A square lamp facing a white square that fills the frame exactly: its mean radiance is L albedo F.
+/// A square lamp facing a white square that fills the frame exactly: its mean radiance is L albedo
+/// F.
 TEST(Analytic, FacingSquares) {
     TestFamily family;
     const float d = 1.5f;
@@ -111,16 +122,19 @@ TEST(Analytic, FacingSquares) {
         EXPECT_LT(means.frame().relative_error(), 0.005) << what;
         family.add(testing::one_sample_p_value(means.frame(), expected), what);
     };
-    for (const char* algorithm : kAlgorithms) expect(testing::catalog_image(scene, algorithm, 1, 128), algorithm);
+    for (const char* algorithm : kAlgorithms)
+        expect(testing::catalog_image(scene, algorithm, 1, 128), algorithm);
     for (int s = 0; s <= 2; ++s) {
         MaskedSelection only{testing::bdpt_selection(*scene)};
         only.only_s = s;
-        expect(testing::algorithm_image(scene, BdptAlgorithm<MaskedSelection>{only}, 1, 128), "s = " + std::to_string(s));
+        expect(testing::algorithm_image(scene, BdptAlgorithm<MaskedSelection>{only}, 1, 128),
+               "s = " + std::to_string(s));
     }
     family.check();
 }
 
-/// A sphere wholly above the horizon of a plane: irradiance pi L (r / d)^2 cos(theta) at distance d of its centre.
+/// A sphere wholly above the horizon of a plane: irradiance pi L (r / d)^2 cos(theta) at distance d
+/// of its centre.
 TEST(Analytic, SphereOverPlane) {
     TestFamily family;
     SceneBuilder b;
@@ -130,40 +144,48 @@ TEST(Analytic, SphereOverPlane) {
     b.quad({-2, 0, -2}, {0, 0, 4}, {4, 0, 0}, b.diffuse(Rgb(0.6f)));
     b.sphere(centre, float(radius), b.diffuse(Rgb(0.0f)), b.emission(Rgb(2.0f)));
     b.description().camera.camera_to_world = *inverse(*look_at({0, 0.5f, 0}, {0, 0, 0}, {0, 0, 1}));
-    b.description().camera.fov_degrees = 90;  // sees [-0.5, 0.5]^2 of the plane, from below the sphere
+    b.description().camera.fov_degrees =
+        90;  // sees [-0.5, 0.5]^2 of the plane, from below the sphere
     const auto scene = b.build();
     // Mean over the square, by the midpoint rule.
     double expected = 0;
     const int n = 400;
     for (int i = 0; i < n; ++i)
         for (int j = 0; j < n; ++j) {
-            const double x = (i + 0.5) / n - 0.5 - centre.x, z = (j + 0.5) / n - 0.5 - centre.z, d2 = x * x + z * z + centre.y * centre.y;
+            const double x = (i + 0.5) / n - 0.5 - centre.x, z = (j + 0.5) / n - 0.5 - centre.z,
+                         d2 = x * x + z * z + centre.y * centre.y;
             expected += 0.6 * 2 * radius * radius / d2 * centre.y / std::sqrt(d2) / (n * n);
         }
     for (const char* algorithm : kAlgorithms) {
-        const RegionMeans means =
-            testing::replicate(testing::catalog_image(scene, algorithm, 1, 128), scene->frame().crop, kSeeds, 9000);
+        const RegionMeans means = testing::replicate(
+            testing::catalog_image(scene, algorithm, 1, 128), scene->frame().crop, kSeeds, 9000);
         EXPECT_LT(means.frame().relative_error(), 0.005) << algorithm;
         family.add(testing::one_sample_p_value(means.frame(), expected), algorithm);
     }
     family.check();
 }
 
-/// The furnaces of the shared scenes, through the importer and at their own depth of 100 bounces: 1 everywhere.
+/// The furnaces of the shared scenes, through the importer and at their own depth of 100 bounces: 1
+/// everywhere.
 TEST(Furnace, SharedScenes) {
     TestFamily family;
     for (const char* name : {"furnace-box", "furnace-sphere"}) {
-        const std::string path = LIGHTLOOM_SOURCE_DIR "/../shared/scenes/" + std::string(name) + "/scene.pbrt";
-        if (!std::filesystem::exists(path)) GTEST_SKIP() << "the shared scenes are not beside this source tree";
+        const std::string path =
+            LIGHTLOOM_SOURCE_DIR "/../shared/scenes/" + std::string(name) + "/scene.pbrt";
+        if (!std::filesystem::exists(path))
+            GTEST_SKIP() << "the shared scenes are not beside this source tree";
         Result<ImportedScene> imported = import_pbrt(path);
         ASSERT_TRUE(imported.ok()) << imported.status().message();
         const int max_depth = imported->description.max_depth;
-        Result<std::unique_ptr<Scene>> built = Scene::build(std::move(imported->description), {16, 16});
+        Result<std::unique_ptr<Scene>> built =
+            Scene::build(std::move(imported->description), {16, 16});
         ASSERT_TRUE(built.ok()) << built.status().message();
         const std::shared_ptr<const Scene> scene = std::move(built).value();
         for (const char* algorithm : kAlgorithms)
-            expect_constant(testing::replicate(testing::catalog_image(scene, algorithm, max_depth, 16), scene->frame().crop, kSeeds, 100),
-                            1, std::string(name) + ", " + algorithm, &family);
+            expect_constant(
+                testing::replicate(testing::catalog_image(scene, algorithm, max_depth, 16),
+                                   scene->frame().crop, kSeeds, 100),
+                1, std::string(name) + ", " + algorithm, &family);
     }
     family.check();
 }

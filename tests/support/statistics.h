@@ -1,6 +1,7 @@
 #pragma once
-// The statistics that tests decide by: Pearson's chi-square for samplers, Student's and Welch's t for means, and Sidak's
-// correction for many tests at once. Every decision is a p-value against a stated family-wise level; nothing is tuned.
+// The statistics that tests decide by: Pearson's chi-square for samplers, Student's and Welch's t
+// for means, and Sidak's correction for many tests at once. Every decision is a p-value against a
+// stated family-wise level; nothing is tuned.
 
 #include <gtest/gtest.h>
 
@@ -11,7 +12,8 @@
 
 namespace lightloom::testing {
 
-/// Upper regularised incomplete gamma function Q(a, x): series below a + 1, continued fraction (Lentz) above.
+/// Upper regularised incomplete gamma function Q(a, x): series below a + 1, continued fraction
+/// (Lentz) above.
 inline double upper_gamma(double a, double x) {
     if (x <= 0) return 1;
     const double scale = std::exp(a * std::log(x) - x - std::lgamma(a));
@@ -38,9 +40,10 @@ struct ChiSquare {
     double p_value = 1;
 };
 
-/// `expected` holds counts that sum to the number of samples. Cells expecting fewer than five are pooled in order,
-/// as the test's asymptotics ask.
-inline ChiSquare chi_square_test(const std::vector<double>& observed, const std::vector<double>& expected) {
+/// `expected` holds counts that sum to the number of samples. Cells expecting fewer than five are
+/// pooled in order, as the test's asymptotics ask.
+inline ChiSquare chi_square_test(const std::vector<double>& observed,
+                                 const std::vector<double>& expected) {
     ChiSquare r;
     double pooled_observed = 0, pooled_expected = 0;
     int cells = 0;
@@ -60,7 +63,8 @@ inline ChiSquare chi_square_test(const std::vector<double>& observed, const std:
             pooled_observed = pooled_expected = 0;
         }
     }
-    // What remains expects fewer than five: exact enough by the Poisson tail when it holds far more than that.
+    // What remains expects fewer than five: exact enough by the Poisson tail when it holds far more
+    // than that.
     if (pooled_observed > 30) r.p_value = 0;
     r.degrees = cells - 1;
     if (r.degrees > 0 && r.p_value > 0) r.p_value = upper_gamma(0.5 * r.degrees, 0.5 * r.statistic);
@@ -78,8 +82,9 @@ inline double incomplete_beta(double a, double b, double x) {
     if (x <= 0) return 0;
     if (x >= 1) return 1;
     if (x > (a + 1) / (a + b + 2)) return 1 - incomplete_beta(b, a, 1 - x);
-    const double scale =
-        std::exp(std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) + a * std::log(x) + b * std::log1p(-x)) / a;
+    const double scale = std::exp(std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) +
+                                  a * std::log(x) + b * std::log1p(-x)) /
+                         a;
     double c = 1, d = 1 / (1 - (a + b) * x / (a + 1)), h = d;
     for (int m = 1; m < 10000; ++m) {
         const double even = m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m));
@@ -108,20 +113,26 @@ struct Sample {
 
     explicit Sample(const std::vector<double>& values) : count(int(values.size())) {
         for (const double v : values) mean += v / count;
-        for (const double v : values) variance += (v - mean) * (v - mean) / (double(count) * (count - 1));
+        for (const double v : values)
+            variance += (v - mean) * (v - mean) / (double(count) * (count - 1));
     }
     double standard_error() const { return std::sqrt(variance); }
-    double relative_error() const { return mean != 0 ? standard_error() / std::fabs(mean) : (variance > 0 ? HUGE_VAL : 0); }
+    double relative_error() const {
+        return mean != 0 ? standard_error() / std::fabs(mean) : (variance > 0 ? HUGE_VAL : 0);
+    }
 };
 
-/// Renders carry float samples: means that differ by less than this fraction are equal whatever their variance says.
+/// Renders carry float samples: means that differ by less than this fraction are equal whatever
+/// their variance says.
 inline constexpr double kFloatResolution = 2e-6;
 
 /// Two-sided p-value of "the mean is `expected`".
 inline double one_sample_p_value(const Sample& sample, double expected) {
     const double difference = std::fabs(sample.mean - expected);
     if (difference <= kFloatResolution * std::fabs(expected)) return 1;
-    return sample.variance > 0 ? student_p_value(difference / sample.standard_error(), sample.count - 1) : 0;
+    return sample.variance > 0
+               ? student_p_value(difference / sample.standard_error(), sample.count - 1)
+               : 0;
 }
 
 /// Two-sided p-value of "both have the same mean", variances unknown and unequal [Welch 1947].
@@ -129,12 +140,14 @@ inline double welch_p_value(const Sample& a, const Sample& b) {
     const double difference = std::fabs(a.mean - b.mean), variance = a.variance + b.variance;
     if (difference <= kFloatResolution * std::max(std::fabs(a.mean), std::fabs(b.mean))) return 1;
     if (!(variance > 0)) return 0;
-    const double degrees = variance * variance / (a.variance * a.variance / (a.count - 1) + b.variance * b.variance / (b.count - 1));
+    const double degrees =
+        variance * variance /
+        (a.variance * a.variance / (a.count - 1) + b.variance * b.variance / (b.count - 1));
     return student_p_value(difference / std::sqrt(variance), degrees);
 }
 
-/// All tests that are decided together. check() fails for each p-value below Sidak's level, so that the chance of a false
-/// alarm anywhere in the family is `level`.
+/// All tests that are decided together. check() fails for each p-value below Sidak's level, so that
+/// the chance of a false alarm anywhere in the family is `level`.
 class TestFamily {
   public:
     void add(double p_value, std::string what) { tests_.push_back({p_value, std::move(what)}); }
@@ -143,8 +156,9 @@ class TestFamily {
         ASSERT_FALSE(tests_.empty());
         const double each = sidak(level, size());
         for (const Entry& test : tests_)
-            EXPECT_GE(test.p_value, each) << test.what << ": p = " << test.p_value << ", Sidak level " << each << " for "
-                                          << size() << " tests";
+            EXPECT_GE(test.p_value, each)
+                << test.what << ": p = " << test.p_value << ", Sidak level " << each << " for "
+                << size() << " tests";
     }
 
   private:

@@ -240,6 +240,7 @@ TEST(ImportLight, AreaLights) {
     expect_error("AreaLightSource \"diffuse\" \"float strength\" 2" + kShape, {"strength"});
     expect_error("AreaLightSource \"sphere\"", {"diffuse"});
     expect_error("AreaLightSource \"diffuse\" Shape \"sphere\" \"float alpha\" 0", {"alpha 0"});
+    expect_error("AreaLightSource \"diffuse\" Shape \"sphere\" \"float alpha\" 0.5", {"emitting shape with an alpha"});
     expect_error("AreaLightSource \"diffuse\" \"rgb L\" [1e30 1 1] \"float scale\" 1e30" + kShape, {"finite"});
 }
 

@@ -242,7 +242,7 @@ TEST(ImportOptions, UnsupportedOnesAreNamed) {
     refused("ColorSpace \"rec2020\"", "srgb");
     refused("Option \"bool forcediffuse\" true", "forcediffuse");
     refused("Option \"bool nonsense\" true", "nonsense");
-    warned("Film \"rgb\" \"float maxcomponentvalue\" 10", "clamps");
+    warned("Film \"rgb\" \"float maxcomponentvalue\" 10", "not clamped");
     warned("PixelFilter \"gaussian\"", "box");
     warned("PixelFilter \"box\" \"float xradius\" 1", "radius");
     warned("Integrator \"path\" \"bool regularize\" true", "regularize");

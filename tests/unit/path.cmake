@@ -4,6 +4,7 @@ lightloom_test(emitter_test LINK lt_scene)
 lightloom_test(weights_test LINK lt_transport)
 lightloom_test(transport_test LINK lt_transport)
 lightloom_test(allocation_test LINK lt_transport)
+lightloom_test(large_scene_test LINK lt_transport lt_import)
 
 add_test(NAME light_math_symbols
          COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/light_math_symbols.sh $<TARGET_FILE:lt_core> $<TARGET_FILE:lt_scene_base>

@@ -1,51 +1,30 @@
-// The weight suites: on the very same path, the weights of all techniques sum to one, and every technique describes that
-// path by the same PathView. Everything is rebuilt through production code.
+// The weight suites: on the very same path, the weights of all techniques sum to one, and every
+// technique describes that path by the same PathView. Everything is rebuilt through production
+// code.
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/transport/bdpt.h"
 #include "common/transport/light.h"
 #include "common/transport/path.h"
 #include "tests/support/path_generator.h"
+#include "tests/support/stub_algorithms.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
 namespace {
 
 using testing::FullPath;
-
-/// Vertex merging with a fixed radius on top of classic connections [Georgiev et al. 2012]: a stub that shows that the
-/// evaluator needs no change for merges.
-struct MergeStubSelection {
-    static constexpr bool kMerges = true;
-    BdptSelection connections;
-    double light_paths = 4096, radius = 0.02;
-
-    int s_min(int k) const { return connections.s_min(k); }
-    int s_max(int k) const { return connections.s_max(k); }
-    double connect_factor(const PathView& view, int s) const { return connections.connect_factor(view, s); }
-    double merge_factor(const PathView&, int) const { return light_paths * kPiD * radius * radius; }
-};
-
-/// Pairs every camera sub-path with `per_pair` light sub-paths chosen over the whole frame (matrix BDPT's shape): each light
-/// path is equally likely, so sigma of a connection is the number of pairs.
-struct PairingStubSelection {
-    static constexpr bool kMerges = false;
-    BdptSelection connections;
-    double pairs = 4;
-
-    int s_min(int k) const { return connections.s_min(k); }
-    int s_max(int k) const { return connections.s_max(k); }
-    double connect_factor(const PathView& view, int s) const {
-        return connections.connect_factor(view, s) * (s >= 2 && s < view.k ? pairs : 1);
-    }
-};
+using testing::MergeStubSelection;
+using testing::PairingStubSelection;
 
 /// Sum of the weights of all techniques that can make `path`, each from its own rebuilt view.
 template <class Selection>
-double weight_sum(const Scene& scene, const FullPath& path, const Selection& selection, Heuristic heuristic) {
+double weight_sum(const Scene& scene, const FullPath& path, const Selection& selection,
+                  Heuristic heuristic) {
     double sum = 0;
     const int k = path.k();
     std::optional<testing::Rebuilt> any;
@@ -57,15 +36,17 @@ double weight_sum(const Scene& scene, const FullPath& path, const Selection& sel
     }
     if constexpr (Selection::kMerges) {
         for (int i = 1; any && i < k; ++i)
-            if (!any->view.delta[i]) sum += mis_weight(any->view, {TechniqueKind::kMerge, i}, selection, heuristic);
+            if (!any->view.delta[i])
+                sum += mis_weight(any->view, {TechniqueKind::kMerge, i}, selection, heuristic);
     }
     return sum;
 }
 
 class Weights : public ::testing::TestWithParam<testing::NamedScene> {};
 
-/// Weights come from float densities, recomputed along directions that differ in the last bits; grazing events and
-/// refraction near the critical angle amplify that. 1e-4 must hold for nearly all paths, one per cent for all but those.
+/// Weights come from float densities, recomputed along directions that differ in the last bits;
+/// grazing events and refraction near the critical angle amplify that. 1e-4 must hold for nearly
+/// all paths, one per cent for all but those.
 struct Tally {
     uint64_t paths = 0, loose = 0, gross = 0;
     void add(double deviation) {
@@ -75,8 +56,10 @@ struct Tally {
     }
     void check(const char* what) const {
         EXPECT_GT(paths, 500u) << what;
-        EXPECT_LT(double(loose), 2e-3 * double(paths)) << what << ": " << loose << " of " << paths << " deviate by over 1e-4";
-        EXPECT_LE(double(gross), 2e-4 * double(paths)) << what << ": " << gross << " of " << paths << " deviate by over 1e-2";
+        EXPECT_LT(double(loose), 2e-3 * double(paths))
+            << what << ": " << loose << " of " << paths << " deviate by over 1e-4";
+        EXPECT_LE(double(gross), 2e-4 * double(paths))
+            << what << ": " << gross << " of " << paths << " deviate by over 1e-2";
     }
 };
 
@@ -88,56 +71,70 @@ TEST_P(Weights, SumToOneOverAllTechniques) {
     const PairingStubSelection pairing{bdpt};
     Tally tallies[6];
     std::vector<int> made(16, 0);
-    testing::for_each_path(*scene, 10000, 7, 11, [&](const FullPath& path, int s, const PathView&, const Rgb&) {
-        ++made[size_t(s)];
-        if (path.k() < 2) return;
-        tallies[0].add(weight_sum(*scene, path, bdpt, Heuristic::kBalance) - 1);
-        tallies[1].add(weight_sum(*scene, path, bdpt, Heuristic::kPower) - 1);
-        tallies[2].add(weight_sum(*scene, path, merging, Heuristic::kBalance) - 1);
-        tallies[3].add(weight_sum(*scene, path, pairing, Heuristic::kBalance) - 1);
-        if (s <= 1) tallies[4].add(weight_sum(*scene, path, PathSelection{}, Heuristic::kBalance) - 1);
-        if (s == path.k()) tallies[5].add(weight_sum(*scene, path, LightSelection{}, Heuristic::kBalance) - 1);
-    });
-    const char* names[] = {"bdpt balance", "bdpt power", "merge stub", "pairing stub", "path", "light"};
+    const auto& emitters = scene->emitters().all();
+    const bool hits = std::any_of(emitters.begin(), emitters.end(),
+                                  [](const Emitter& e) { return !e.is_delta(); });
+    // A scene without lights that can be hit has far fewer paths to offer.
+    testing::for_each_path(
+        *scene, hits ? 10000 : 30000, 7, 11,
+        [&](const FullPath& path, int s, const PathView&, const Rgb&) {
+            ++made[size_t(s)];
+            if (path.k() < 2) return;
+            tallies[0].add(weight_sum(*scene, path, bdpt, Heuristic::kBalance) - 1);
+            tallies[1].add(weight_sum(*scene, path, bdpt, Heuristic::kPower) - 1);
+            tallies[2].add(weight_sum(*scene, path, merging, Heuristic::kBalance) - 1);
+            tallies[3].add(weight_sum(*scene, path, pairing, Heuristic::kBalance) - 1);
+            if (s <= 1)
+                tallies[4].add(weight_sum(*scene, path, PathSelection{}, Heuristic::kBalance) - 1);
+            if (s == path.k())
+                tallies[5].add(weight_sum(*scene, path, LightSelection{}, Heuristic::kBalance) - 1);
+        });
+    const char* names[] = {"bdpt balance", "bdpt power", "merge stub",
+                           "pairing stub", "path",       "light"};
     for (int i = 0; i < 6; ++i) tallies[i].check(names[i]);
-    for (int s = 0; s <= 4; ++s) EXPECT_GT(made[size_t(s)], 20) << "technique s = " << s << " was hardly exercised";
+    for (int s = hits ? 0 : 1; s <= 4; ++s)
+        EXPECT_GT(made[size_t(s)], 20) << "technique s = " << s << " was hardly exercised";
 }
 
 TEST_P(Weights, EveryTechniqueSeesTheSamePath) {
     const auto scene = GetParam().make();
     Tally densities, contributions;
-    testing::for_each_path(*scene, 1500, 6, 12, [&](const FullPath& path, int own, const PathView&, const Rgb&) {
-        const int k = path.k();
-        if (k < 2) return;
-        // f = contribution * density of the technique: the same number for all of them.
-        const auto f_of = [&](const PathView& v, const Rgb& c, int s) {
-            double density = s == 1 ? v.next_event : 1;
-            for (int i = 0; i < k; ++i)
-                if (!(s == 1 && i == 0)) density *= i < s ? v.fwd[i] : v.rev[i];
-            return density * scalar_of(c);
-        };
-        const auto mine = testing::rebuild(*scene, path, own);
-        if (!mine) return;
-        const double f = f_of(mine->view, mine->contribution, own);
-        for (int s = 0; s <= k; ++s) {
-            const auto other = testing::rebuild(*scene, path, s);
-            if (!other) continue;
-            EXPECT_EQ(other->view.k, k);
-            for (int i = 0; i < k; ++i) {
-                EXPECT_EQ(other->view.delta[i], path.x[size_t(i)].delta);
-                densities.add(other->view.fwd[i] / mine->view.fwd[i] - 1);
-                if (mine->view.rev[i] > 0) densities.add(other->view.rev[i] / mine->view.rev[i] - 1);
+    testing::for_each_path(
+        *scene, 1500, 6, 12, [&](const FullPath& path, int own, const PathView&, const Rgb&) {
+            const int k = path.k();
+            if (k < 2) return;
+            // f = contribution * density of the technique: the same number for all of them.
+            const auto f_of = [&](const PathView& v, const Rgb& c, int s) {
+                double density = s == 1 ? v.next_event : 1;
+                for (int i = 0; i < k; ++i)
+                    if (!(s == 1 && i == 0)) density *= i < s ? v.fwd[i] : v.rev[i];
+                return density * scalar_of(c);
+            };
+            const auto mine = testing::rebuild(*scene, path, own);
+            if (!mine) return;
+            const double f = f_of(mine->view, mine->contribution, own);
+            for (int s = 0; s <= k; ++s) {
+                const auto other = testing::rebuild(*scene, path, s);
+                if (!other) continue;
+                EXPECT_EQ(other->view.k, k);
+                for (int i = 0; i < k; ++i) {
+                    EXPECT_EQ(other->view.delta[i], path.x[size_t(i)].delta);
+                    densities.add(other->view.fwd[i] / mine->view.fwd[i] - 1);
+                    if (mine->view.rev[i] > 0)
+                        densities.add(other->view.rev[i] / mine->view.rev[i] - 1);
+                }
+                densities.add(other->view.next_event / mine->view.next_event - 1);
+                contributions.add(f_of(other->view, other->contribution, s) / f - 1);
             }
-            densities.add(other->view.next_event / mine->view.next_event - 1);
-            contributions.add(f_of(other->view, other->contribution, s) / f - 1);
-        }
-    });
+        });
     densities.check("densities");
     contributions.check("path integrand");
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Weights, ::testing::ValuesIn(testing::kScenes),
-                         [](const ::testing::TestParamInfo<testing::NamedScene>& param) { return param.param.name; });
+                         [](const ::testing::TestParamInfo<testing::NamedScene>& param) {
+                             return param.param.name;
+                         });
 
 // Synthetic views: no geometry, exact double densities.
 
@@ -146,7 +143,9 @@ PathView synthetic_view(int k, uint64_t seed, double scale) {
     PathView view;
     view.k = k;
     // Area densities scale with 1 / length^2.
-    const auto density = [&] { return std::exp((rng.uniform_double() - 0.5) * 24) / (scale * scale); };
+    const auto density = [&] {
+        return std::exp((rng.uniform_double() - 0.5) * 24) / (scale * scale);
+    };
     for (int i = 0; i < k; ++i) {
         view.fwd[i] = density();
         view.rev[i] = density();
@@ -165,11 +164,13 @@ TEST(WeightEvaluator, PartitionOfUnityOnSyntheticPaths) {
         for (const Heuristic h : {Heuristic::kBalance, Heuristic::kPower, Heuristic::kMaximum}) {
             double sum = 0;
             for (int s = 0; s <= k; ++s) {
-                const bool blocked = (s > 0 && view.delta[s - 1]) || (s > 0 && s < k && view.delta[s]);
+                const bool blocked =
+                    (s > 0 && view.delta[s - 1]) || (s > 0 && s < k && view.delta[s]);
                 if (!blocked) sum += mis_weight(view, {TechniqueKind::kConnect, s}, selection, h);
             }
             for (int i = 1; i < k; ++i)
-                if (!view.delta[i]) sum += mis_weight(view, {TechniqueKind::kMerge, i}, selection, h);
+                if (!view.delta[i])
+                    sum += mis_weight(view, {TechniqueKind::kMerge, i}, selection, h);
             EXPECT_NEAR(sum, 1, 1e-10) << "seed " << seed << " k " << k;
         }
     }
@@ -190,12 +191,22 @@ TEST(WeightEvaluator, EqualsExplicitProducts) {
         }
         for (int s = 0; s <= k; ++s)
             if (rho[size_t(s)] > 0) {
-                EXPECT_NEAR(mis_weight(view, {TechniqueKind::kConnect, s}, selection), rho[size_t(s)] / sum, 1e-12);
+                EXPECT_NEAR(mis_weight(view, {TechniqueKind::kConnect, s}, selection),
+                            rho[size_t(s)] / sum, 1e-12);
             }
     }
 }
 
 /// Depth 64 and scenes scaled by 1e-4 and 1e4: whole-path products would leave the range of double.
+/// Two vertices in the same place have an infinite density; the evaluator once never came back from one.
+TEST(WeightEvaluator, InfiniteDensitiesEnd) {
+    WideProduct product;
+    product.multiply(HUGE_VAL);
+    EXPECT_EQ(product.value(0.5), HUGE_VAL);
+    product.multiply(0.5);
+    EXPECT_EQ(product.value(1), HUGE_VAL);
+}
+
 TEST(WeightEvaluator, LongPathsAndScaledScenesKeepTheirWeights) {
     for (uint64_t seed = 0; seed < 50; ++seed) {
         const int k = 64;
