@@ -8,12 +8,16 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "common/core/log.h"
 #include "common/core/rng.h"
 #include "server/coordinator.h"
 #include "server/local_ports.h"
 #include "worker/worker.h"
 
 namespace lightloom::testing {
+
+/// As in the programs, the log is set up before there are threads.
+inline const bool kLogging = set_up_logging("test", "info");
 
 class TempDirectory {
   public:
