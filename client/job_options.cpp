@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "client/commands.h"
+#include "common/path/path_view.h"
 #include "common/transport/catalog.h"
 
 namespace lightloom::client {
@@ -22,7 +23,7 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
     command.add_option("--set", options.settings, "Parameter of the algorithm, KEY=VALUE; may be repeated")->take_all()
         ->allow_extra_args(false);
     command.add_option("--max-depth", options.max_depth, "Bounces; paths have up to this + 1 edges (default: the scene's)")
-        ->check(CLI::Range(0, 1000));
+        ->check(CLI::Range(0, kMaxEdges - 1));
     command.add_option("--resolution", options.resolution, "WIDTHxHEIGHT in pixels (default: the scene's)");
     command.add_option("--seed", options.seed, "Another seed makes another, independent image")->capture_default_str();
 }

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "common/film/atomic_file.h"
+#include "common/path/path_view.h"
 #include "common/transport/catalog.h"
 #include "server/job_record.h"
 #include "server/results.h"
@@ -89,7 +90,8 @@ Result<JobSpec> Coordinator::canonical_spec(const JobSpec& spec) const {
     if (spec.samples_per_pixel > (1u << 24)) return invalid_argument("at most 16777216 samples per pixel");
     if (!(spec.time_limit_seconds >= 0 && spec.time_limit_seconds <= 30 * 86400.0))
         return invalid_argument("the time limit must lie between 0 and 30 days");
-    if (spec.max_depth < -1 || spec.max_depth > 1000) return invalid_argument("max depth must lie between 0 and 1000");
+    if (spec.max_depth < -1 || spec.max_depth >= kMaxEdges)
+        return invalid_argument("max depth must lie between 0 and " + std::to_string(kMaxEdges - 1));
     if (spec.width < 0 || spec.height < 0 || spec.width > 65536 || spec.height > 65536 ||
         (spec.width == 0) != (spec.height == 0))
         return invalid_argument("a resolution needs a width and a height between 1 and 65536");
@@ -275,11 +277,11 @@ void Coordinator::fail_job(JobRecord& job, const Status& why) {
     end_job(job, JobState::kFailed);
 }
 
-void Coordinator::unit_failed(JobRecord& job, const UnitKey& key, int failures, const Status& why) {
+void Coordinator::unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Failures failures, const Status& why) {
     const std::string unit = std::to_string(key.group) + "/" + std::to_string(key.tile);
-    spdlog::warn("{}: unit {} failed ({}): {}", job.id, unit, failures, why.message());
+    spdlog::warn("{}: unit {} failed ({}): {}", job.id, unit, failures.total, why.message());
     // Units are pure functions: what is wrong with the request is wrong on every worker.
-    if (failures >= kMaxUnitFailures || why.code() == StatusCode::kInvalidArgument)
+    if (failures.workers >= kMaxFailedWorkers || failures.total >= kMaxUnitFailures || why.code() == StatusCode::kInvalidArgument)
         fail_job(job, {why.code(), "unit " + unit + ": " + why.message()});
     work_changed_.notify_all();
 }

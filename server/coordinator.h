@@ -103,7 +103,7 @@ class Coordinator {
     void prepare(JobRecord& job, std::stop_token stop);
     void finish(JobRecord& job);
     void finish_if_complete(JobRecord& job);
-    void unit_failed(JobRecord& job, const UnitKey& key, int failures, const Status& why);
+    void unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Failures failures, const Status& why);
     void tick(std::stop_token stop);
     std::optional<UnitLease> next_unit(WorkerRecord& worker);
 

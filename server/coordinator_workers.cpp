@@ -130,7 +130,7 @@ Status Coordinator::release_unit(const std::string& worker_id, const UnitReferen
     if (why.ok() || blameless) {
         job->units->release(unit.key, worker->index);
     } else {
-        const int failures = job->units->fail(unit.key, worker->index);
+        const UnitTable::Failures failures = job->units->fail(unit.key, worker->index);
         unit_failed(*job, unit.key, failures, why);
     }
     work_changed_.notify_all();

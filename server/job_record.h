@@ -52,7 +52,9 @@ struct Coordinator::JobRecord {
 };
 
 inline constexpr size_t kMaxDroppedPerJob = 64;
-/// A unit that failed this often, on whatever workers, fails its job: it is the unit, not the workers.
-inline constexpr int kMaxUnitFailures = 3;
+/// A unit that failed on this many workers fails its job: it is the unit, not the workers.
+inline constexpr int kMaxFailedWorkers = 3;
+/// The same for a unit that failed this often where there are fewer workers.
+inline constexpr int kMaxUnitFailures = 10;
 
 }  // namespace lightloom

@@ -59,6 +59,12 @@ std::optional<WorkUnit> UnitTable::lease(uint32_t worker, TimePoint expiry) {
         *shuffle_ = mix64(*shuffle_ + 0x9e3779b97f4a7c15ull);
         std::advance(chosen, ptrdiff_t(*shuffle_ % uint64_t(count)));
     }
+    // One broken worker must not take the same unit again and again while others could render it.
+    const auto fresh = [&](const UnitKey& key) { return !entry(key)->failed_on.contains(worker); };
+    if (!fresh(*chosen)) {
+        const auto other = std::find_if(pending_.begin(), end, fresh);
+        if (other != end) chosen = other;
+    }
     Entry& e = *entry(*chosen);
     pending_.erase(chosen);
     leased_.insert(e.unit.key);
@@ -128,19 +134,21 @@ UnitTable::Completion UnitTable::complete(const UnitKey& key, uint32_t worker, c
     return Completion::kFirst;
 }
 
-int UnitTable::reopen(const UnitKey& key) {
+UnitTable::Failures UnitTable::reopen(const UnitKey& key) {
     Entry* e = entry(key);
-    if (!e || e->state != State::kDone) return 0;
+    if (!e || e->state != State::kDone) return {};
     --done_count_;
     make_pending(*e);
-    return ++e->failures;
+    e->failed_on.insert(e->worker);
+    return {++e->failures, int(e->failed_on.size())};
 }
 
-int UnitTable::fail(const UnitKey& key, uint32_t worker) {
+UnitTable::Failures UnitTable::fail(const UnitKey& key, uint32_t worker) {
     Entry* e = entry(key);
-    if (!e || e->state == State::kDone) return 0;
+    if (!e || e->state == State::kDone) return {};
     release(key, worker);
-    return ++e->failures;
+    e->failed_on.insert(worker);
+    return {++e->failures, int(e->failed_on.size())};
 }
 
 std::vector<UnitTable::Merged> UnitTable::merged(uint32_t groups) const {

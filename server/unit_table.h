@@ -37,10 +37,15 @@ class UnitTable {
     enum class Completion { kFirst, kDuplicateSame, kDuplicateDifferent, kUnknown };
     /// A result arrived. kFirst: the caller merges it and is the only one to be told so, unless it calls reopen().
     Completion complete(const UnitKey& key, uint32_t worker, const Digest& digest);
-    /// The result could not be merged after all; leases the unit again. Returns how often that happened to it.
-    int reopen(const UnitKey& key);
-    /// The same for a unit that a worker could not render.
-    int fail(const UnitKey& key, uint32_t worker);
+    /// How often a unit failed, and on how many different workers.
+    struct Failures {
+        int total = 0, workers = 0;
+    };
+    /// The result could not be merged after all; leases the unit again.
+    Failures reopen(const UnitKey& key);
+    /// The same for a unit that a worker could not render. Workers that failed a unit get it again only when nothing else
+    /// is left for them.
+    Failures fail(const UnitKey& key, uint32_t worker);
 
     /// The unit of an opened group.
     const WorkUnit* find(const UnitKey& key) const;
@@ -71,6 +76,7 @@ class UnitTable {
         State state = State::kPending;
         uint32_t worker = 0;
         int failures = 0;
+        std::set<uint32_t> failed_on;
         TimePoint expiry;
         Digest digest;
     };

@@ -58,7 +58,9 @@ Status Worker::sign_in(std::stop_token stop, const std::string& stale_id) {
             return {};
         }
         const StatusCode code = grant.status().code();
-        if (code != StatusCode::kUnavailable && code != StatusCode::kDeadlineExceeded) {
+        // Anything else, like a stream that broke, may be better the next time.
+        if (code == StatusCode::kFailedPrecondition || code == StatusCode::kInvalidArgument ||
+            code == StatusCode::kUnimplemented || code == StatusCode::kPermissionDenied) {
             const std::lock_guard lock(mutex_);
             refusal_ = grant.status();
             return grant.status();
@@ -114,8 +116,13 @@ void Worker::lane(std::stop_token stop) {
         const std::string worker_id = id();
         const auto leases = port_.lease_units(worker_id, kLeaseWaitSeconds, stop);
         if (leases.ok()) {
-            backoff.reset();
-            for (const UnitLease& lease : *leases) run_unit(lease, stop);
+            // A worker that cannot render (its disk is full, say) must not burn through the units of the farm.
+            for (const UnitLease& lease : *leases) {
+                if (run_unit(lease, stop))
+                    backoff.reset();
+                else
+                    wait(backoff.next(), stop);
+            }
         } else if (leases.status().code() == StatusCode::kNotFound) {
             if (!sign_in(stop, worker_id).ok()) return;
         } else if (!stop.stop_requested()) {
@@ -125,28 +132,30 @@ void Worker::lane(std::stop_token stop) {
     }
 }
 
-void Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
+bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
     const UnitReference reference = lease.reference();
     std::stop_token unit_stop;
     {
         const std::lock_guard lock(mutex_);
         const auto [item, fresh] = running_.try_emplace(reference);
-        if (!fresh) return;  // the other lane has it: its lease ran out and came back to us
+        if (!fresh) return true;  // the other lane has it: its lease ran out and came back to us
         unit_stop = item->second.stop.get_token();
     }
     double seconds = 0;
     auto partial = render(lease, unit_stop, stop, &seconds);
+    const bool able = partial.ok() || partial.status().code() == StatusCode::kCancelled;
     if (partial.ok()) {
         submit(lease, *std::move(partial), seconds, stop);
     } else {
         const Status status = port_.release_unit(id(), reference, partial.status());
         if (!status.ok()) spdlog::debug("release: {}", status.message());
-        if (partial.status().code() != StatusCode::kCancelled)
+        if (!able)
             spdlog::error("{} unit {}/{}: {}", reference.job_id, reference.key.group, reference.key.tile,
                           partial.status().message());
     }
     const std::lock_guard lock(mutex_);
     running_.erase(reference);
+    return able;
 }
 
 Result<Partial> Worker::render(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain, double* seconds) {

@@ -46,7 +46,8 @@ class Worker {
     Status sign_in(std::stop_token stop, const std::string& stale_id);
     std::string id();
     void lane(std::stop_token stop);
-    void run_unit(const UnitLease& lease, std::stop_token stop);
+    /// False when the unit could not be rendered here.
+    bool run_unit(const UnitLease& lease, std::stop_token stop);
     Result<Partial> render(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain, double* seconds);
     void submit(const UnitLease& lease, Partial partial, double seconds, std::stop_token stop);
     void heartbeats(std::stop_token stop);

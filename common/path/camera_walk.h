@@ -60,7 +60,7 @@ int trace_camera_path(const Scene& scene, CameraSampler& sampler, int px, int py
         }
         PathVertex& v = z[t];
         arrive<TransportMode::kRadiance>(ray, z[t - 1].p, z[t - 1].ng, t > 1, point, &v);
-        if (!(v.fwd > 0)) break;
+        if (!(v.fwd > 0) || !std::isfinite(v.fwd)) break;
         ++t;
         ++counters->vertices;
         if (t > max_edges) {  // only an emitter hit can still be counted: k = t - 1

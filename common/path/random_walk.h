@@ -133,7 +133,7 @@ inline int trace_light_path(const Scene& scene, Rng& rng, int max_vertices, cons
         if (!scene.intersect(ray.origin, ray.direction, &point)) break;
         PathVertex& v = path[n];
         arrive<TransportMode::kImportance>(ray, path[n - 1].p, path[n - 1].ng, n > 1 || area, point, &v);
-        if (!(v.fwd > 0) || !std::isfinite(v.adjoint)) break;
+        if (!(v.fwd > 0) || !std::isfinite(v.fwd) || !std::isfinite(v.adjoint)) break;
         v.bsdf = scene.bsdf_at(point);
         ++counters->vertices;
         ++n;
