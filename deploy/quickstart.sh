@@ -8,7 +8,7 @@ set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)
 output=${1:-quickstart-output}
-spp=${LIGHTLOOM_QUICKSTART_SPP:-24}
+spp=${LIGHTLOOM_QUICKSTART_SPP:-40}
 scene=$root/tests/scenes/quickstart.pbrt
 bin=$root/build/release/bin
 
