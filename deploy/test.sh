@@ -29,7 +29,7 @@ trap 'rm -rf "$corpus"' EXIT
 for target in pbrt ply; do
     mkdir "$corpus/$target"
     (cd "$corpus" && "$root/build/fuzz/bin/${target}_fuzz" -max_total_time="$seconds" -rss_limit_mb=2048 -timeout=20 \
-        -verbosity=0 -print_final_stats=1 "$corpus/$target" "$root/tests/fuzz/corpus/$target")
+        -verbosity=0 -print_funcs=0 -print_final_stats=1 "$corpus/$target" "$root/tests/fuzz/corpus/$target")
 done
 
 # Last and alone: the statistical tests use all processors themselves.
