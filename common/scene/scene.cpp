@@ -66,6 +66,8 @@ bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out) const {
         triangle_point(meshes[hit.geometry], hit, out);
         const int32_t first = instanced ? kNone : mesh_first_emitter_[hit.geometry];
         out->emitter = first == kNone ? kNone : first + int32_t(hit.primitive);
+        // The emitting side is the triangle's, as light sampling has it, also where interpolated normals cross its plane.
+        if (out->emitter != kNone) out->ng = face_forward(out->ng, emitters_[uint32_t(out->emitter)].normal);
     } else {
         const Sphere& s = (instanced ? object->spheres : description_.spheres)[hit.primitive];
         Vec3 from = o, along = d;
