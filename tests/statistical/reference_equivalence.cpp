@@ -11,46 +11,22 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "common/core/distributions.h"
 #include "common/film/accumulation.h"
 #include "common/film/exr_io.h"
 #include "common/film/metrics.h"
 #include "common/film/png.h"
+#include "common/film/region_means.h"
 #include "common/import/import.h"
 #include "common/transport/renderer.h"
 
 using namespace lightloom;
 
 namespace {
-
-/// Upper quantile of the normal distribution, by bisection of erfc.
-double normal_quantile(double upper_tail) {
-    double lo = 0, hi = 40;
-    for (int i = 0; i < 200; ++i) {
-        const double mid = (lo + hi) / 2;
-        (0.5 * std::erfc(mid / std::sqrt(2.0)) > upper_tail ? lo : hi) = mid;
-    }
-    return lo;
-}
-
-struct Region {
-    double sum = 0, sum2 = 0, reference = 0;
-    int groups = 0;
-    void add(double mean) { sum += mean, sum2 += mean * mean, ++groups; }
-    double mean() const { return sum / groups; }
-    double standard_error() const { return std::sqrt(std::fmax(0, sum2 / groups - mean() * mean()) / (groups - 1)); }
-};
-
-struct Interval {
-    double ratio = 0, low = 0, high = 0;
-    bool within(double bound) const { return low >= 1 - bound && high <= 1 + bound; }
-    bool excludes(double bound) const { return low > 1 + bound || high < 1 - bound; }
-    nlohmann::ordered_json json() const { return {{"ratio", ratio}, {"low", low}, {"high", high}}; }
-};
 
 struct Options {
     std::string shared, json, pictures;
@@ -59,29 +35,10 @@ struct Options {
     uint64_t seed = 1;
 };
 
-/// Luminance means of the whole image (first) and of nine regions.
-void luminance_means(const RgbImage& image, double means[10]) {
-    double count[10] = {};
-    std::fill(means, means + 10, 0.0);
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x) {
-            const float* p = &image.pixels[(size_t(y) * size_t(image.width) + size_t(x)) * 3];
-            const double l = 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2];
-            const int r = 1 + (y * 3 / image.height) * 3 + x * 3 / image.width;
-            means[0] += l, ++count[0];
-            means[r] += l, ++count[r];
-        }
-    for (int r = 0; r < 10; ++r) means[r] /= count[r];
-}
-
-Interval interval(const Region& r, double z, double relative_reference_error) {
-    const double ratio = r.mean() / r.reference;
-    const double error = std::hypot(r.standard_error() / r.reference, ratio * relative_reference_error);
-    return {ratio, ratio - z * error, ratio + z * error};
-}
+nlohmann::ordered_json to_json(const RatioInterval& i) { return {{"ratio", i.ratio}, {"low", i.low}, {"high", i.high}}; }
 
 struct Outcome {
-    Interval image, regions[9];
+    RatioInterval image, regions[9];
     uint64_t iterations = 0, dropped = 0;
     double seconds = 0;
 };
@@ -110,13 +67,14 @@ Result<Outcome> compare_means(const Options& options, const std::string& name, c
     if (reference->color.width != frame.crop.width() || reference->color.height != frame.crop.height())
         return invalid_argument(name + ": the reference has another size than the frame");
 
-    Region regions[10];
-    double means[10];
-    luminance_means(reference->color, means);
-    for (int r = 0; r < 10; ++r) regions[r].reference = means[r];
+    RegionMeans rendered(3, 3);
+    const std::vector<double> means = luminance_means(reference->color, 3, 3);
     const double reference_error = double(entry.at("mean_y_se")) / double(entry.at("mean_y"));
-    const double z_image = normal_quantile(0.5 * (1 - std::pow(0.95, 1.0 / double(tests))));
-    const double z_region = normal_quantile(0.5 * (1 - std::pow(0.95, 1.0 / double(9 * tests))));
+    const double image_level = sidak(0.05, int(tests)), region_level = sidak(0.05, int(9 * tests));
+    const auto ratio = [&](size_t r) {
+        const double error = means[r] * reference_error * (r == 0 ? 1 : 3);
+        return ratio_interval(rendered.estimates()[r], {means[r], error * error}, r == 0 ? image_level : region_level);
+    };
 
     constexpr uint32_t kIterations = 2, kLeastGroups = 16;
     Accumulation total(frame);
@@ -132,14 +90,13 @@ Result<Outcome> compare_means(const Options& options, const std::string& name, c
         LL_RETURN_IF_ERROR(sum.add(*partial));
         LL_RETURN_IF_ERROR(alone.fold(sum, kIterations));
         LL_RETURN_IF_ERROR(total.fold(sum, kIterations));
-        luminance_means(alone.develop(exposure), means);
-        for (int r = 0; r < 10; ++r) regions[r].add(means[r]);
+        rendered.add(alone.develop(exposure), kIterations);
         outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         if (group + 1 < kLeastGroups) continue;
-        outcome.image = interval(regions[0], z_image, reference_error);
+        outcome.image = ratio(0);
         bool settled = outcome.image.within(options.bound);
-        for (int r = 0; r < 9; ++r) {
-            outcome.regions[r] = interval(regions[r + 1], z_region, 3 * reference_error);
+        for (size_t r = 0; r < 9; ++r) {
+            outcome.regions[r] = ratio(r + 1);
             settled &= outcome.regions[r].within(options.region_bound);
         }
         if (settled || outcome.seconds >= options.seconds) break;
@@ -185,7 +142,7 @@ int main(int argc, char** argv) {
                 std::fprintf(stderr, "%s %s: %s\n", name.c_str(), algorithm.c_str(), outcome.status().message().c_str());
                 return 2;
             }
-            const Interval& image = outcome->image;
+            const RatioInterval& image = outcome->image;
             std::printf("%-18s %-5s %5llu %6.1f  %.4f [%.4f, %.4f] %c ", name.c_str(), algorithm.c_str(),
                         static_cast<unsigned long long>(outcome->iterations), outcome->seconds, image.ratio, image.low, image.high,
                         image.within(options.bound) ? '=' : image.excludes(options.bound) ? '!' : '?');
@@ -194,10 +151,10 @@ int main(int argc, char** argv) {
                                         {"spp", outcome->iterations},
                                         {"seconds", outcome->seconds},
                                         {"dropped", outcome->dropped},
-                                        {"image", image.json()}};
-            for (const Interval& r : outcome->regions) {
+                                        {"image", to_json(image)}};
+            for (const RatioInterval& r : outcome->regions) {
                 std::printf(" %.3f+-%.3f", r.ratio, r.high - r.ratio);
-                line["regions"].push_back(r.json());
+                line["regions"].push_back(to_json(r));
             }
             std::printf("\n");
             std::fflush(stdout);
