@@ -118,7 +118,7 @@ Result<std::vector<AlgorithmChoice>> parse_choices(const std::vector<std::string
         auto choice = parse_algorithm(text);
         if (!choice.ok()) return choice.status();
         for (const AlgorithmChoice& other : choices) {
-            if (other.text() == choice->text()) return invalid_argument("--algorithms names " + text + " twice");
+            if (other.name == choice->name && other.parameters == choice->parameters) return invalid_argument("--algorithms names " + text + " twice");
         }
         choices.push_back(std::move(choice).value());
     }
@@ -203,26 +203,27 @@ int bench(BenchOptions& options) {
     for (const BenchRun& run : runs) {
         if (const auto old = history.done.find(run.key()); old != history.done.end()) {
             done.push_back(old->second);
+            done.back()["label"] = run.algorithm.label;  // The same run may have been written differently.
             continue;
         }
         auto render = ProgressiveRender::start(
             scene, {.algorithm = run.algorithm.name, .parameters = run.algorithm.parameters, .seed = run.seed, .max_depth = max_depth});
         if (!render.ok()) return report_error(render.status());
         Json line{{"run", run.key()},
-                  {"label", run.algorithm.text()},
+                  {"label", run.algorithm.label},
                   {"scene", options.scene.scene},
                   {"reference", options.reference},
                   {"reference_algorithm", reference->attribute(exr_attribute::kAlgorithm)}};
         line.update(run.json());
         alive.push_back(std::make_unique<LiveRun>(
-            LiveRun{run.algorithm.text(), std::move(line), run, std::move(render).value(), {}, {}, 1}));
+            LiveRun{run.algorithm.label, std::move(line), run, std::move(render).value(), {}, {}, 1}));
     }
     if (!done.empty() && !options.scene.quiet)
         std::fprintf(stderr, "%zu of %zu runs are in %s already\n", done.size(), runs.size(), options.out.c_str());
     if (Status s = render_all(std::move(alive), options, reference->color, *writer, done); !s.ok()) return report_error(s);
 
     std::vector<std::string> labels;
-    for (const AlgorithmChoice& choice : *choices) labels.push_back(choice.text());
+    for (const AlgorithmChoice& choice : *choices) labels.push_back(choice.label);
     std::fputs(bench_table(labels, done, options.threshold).c_str(), stdout);
     return kSuccess;
 }

@@ -100,6 +100,8 @@ int reference(ReferenceOptions& options) {
     auto spec = make_spec(options.job, *local);
     if (!spec.ok()) return report_error(spec.status());
     if (spec->max_depth < 0) spec->max_depth = local->imported.description.max_depth;
+    const auto algorithm = find_algorithm(spec->algorithm);
+    spec->parameters = complete_parameters(**algorithm, *parse_parameters(**algorithm, spec->parameters));
     const tbb::global_control parallelism(tbb::global_control::max_allowed_parallelism, options.threads);
     auto built = Scene::build(std::move(local->imported.description), {.width = spec->width, .height = spec->height});
     if (!built.ok()) return report_error(built.status());
@@ -148,7 +150,7 @@ int reference(ReferenceOptions& options) {
     json["cross_check"] = {{"algorithm", checker.algorithm}, {"parameters", checker.parameters}, {"seed", checker.seed}};
     json["cross_check"].update(check->json());
     if (Status s = write_file_atomically(json_path.string(), json.dump(1) + "\n"); !s.ok()) return report_error(s);
-    std::printf("cross-check by %s, %llu spp\n%s", checker_choice.text().c_str(),
+    std::printf("cross-check by %s, %llu spp\n%s", checker_choice.label.c_str(),
                 static_cast<unsigned long long>(check->iterations), check->table().c_str());
     if (check->verdict() != Verdict::kDiffer) return kSuccess;
     std::fflush(stdout);

@@ -30,14 +30,8 @@ void add(UnitCounters& sum, const UnitCounters& unit) {
 
 }  // namespace
 
-std::string AlgorithmChoice::text() const {
-    std::string text = name;
-    for (const auto& [key, value] : parameters) text += ":" + key + "=" + value;
-    return text;
-}
-
 Result<AlgorithmChoice> parse_algorithm(const std::string& text) {
-    AlgorithmChoice choice;
+    AlgorithmChoice choice{.label = text};
     size_t begin = std::min(text.find(':'), text.size());
     choice.name = text.substr(0, begin);
     while (begin < text.size()) {
@@ -52,7 +46,9 @@ Result<AlgorithmChoice> parse_algorithm(const std::string& text) {
     }
     const auto info = find_algorithm(choice.name);
     if (!info.ok()) return invalid_argument(info.status().message());
-    if (const auto parameters = parse_parameters(**info, choice.parameters); !parameters.ok()) return parameters.status();
+    const auto parameters = parse_parameters(**info, choice.parameters);
+    if (!parameters.ok()) return parameters.status();
+    choice.parameters = complete_parameters(**info, *parameters);
     return choice;
 }
 

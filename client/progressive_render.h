@@ -17,12 +17,11 @@
 
 namespace lightloom::client {
 
-/// An algorithm and what was set of its parameters, as one word of a command line: "bdpt:heuristic=1:rr-start=6".
+/// An algorithm with its parameters, from one word of a command line: "bdpt:heuristic=1:rr-start=6".
 struct AlgorithmChoice {
     std::string name;
-    std::map<std::string, std::string> parameters;
-
-    std::string text() const;
+    std::map<std::string, std::string> parameters;  ///< All of them, defaults included.
+    std::string label;                              ///< The word.
 };
 
 /// "NAME[:KEY=VALUE]...", checked against the catalog.

@@ -136,7 +136,7 @@ TEST_F(Bench, MistakesAreRefusedBeforeAnythingIsRendered) {
     };
     EXPECT_EQ(bench({"--algorithms", "path"}), 2) << "neither --time nor --spp";
     EXPECT_EQ(bench({"--algorithms", "no-such", "--spp", "1"}), 2);
-    EXPECT_EQ(bench({"--algorithms", "path,path", "--spp", "1"}), 2);
+    EXPECT_EQ(bench({"--algorithms", "path,path:heuristic=0", "--spp", "1"}), 2);
     EXPECT_EQ(bench({"--algorithms", "path", "--spp", "1", "--resolution", "16x16"}), 2);
     EXPECT_EQ(bench({"--algorithms", "path", "--spp", "1", "--max-depth", "1"}), 2);
     EXPECT_NE(output().find("--max-depth 8"), std::string::npos) << output();

@@ -71,8 +71,8 @@ TEST(AlgorithmChoice, ParsesSettingsAndNamesMistakes) {
     const auto choice = parse_algorithm("bdpt:rr-start=6:heuristic=1");
     ASSERT_TRUE(choice.ok()) << choice.status().message();
     EXPECT_EQ(choice->name, "bdpt");
-    EXPECT_EQ(choice->parameters, (std::map<std::string, std::string>{{"heuristic", "1"}, {"rr-start", "6"}}));
-    EXPECT_EQ(choice->text(), "bdpt:heuristic=1:rr-start=6");
+    EXPECT_EQ(choice->parameters, (std::map<std::string, std::string>{{"heuristic", "1"}, {"rr-min", "0.05"}, {"rr-start", "6"}}));
+    EXPECT_EQ(choice->label, "bdpt:rr-start=6:heuristic=1");
     EXPECT_TRUE(parse_algorithm("path").ok());
     for (const char* wrong : {"", "no-such", "bdpt:", "bdpt:=1", "bdpt:heuristic", "bdpt:heuristic=9", "bdpt:no-such=1",
                               "bdpt:heuristic=1:heuristic=2"}) {
@@ -85,7 +85,7 @@ TEST(AlgorithmChoice, ParsesSettingsAndNamesMistakes) {
 
 BenchRun some_run() {
     BenchRun run;
-    run.scene_digest = "s", run.reference_digest = "r", run.algorithm = {"bdpt", {{"heuristic", "1"}}}, run.build = "b";
+    run.scene_digest = "s", run.reference_digest = "r", run.algorithm = {"bdpt", {{"heuristic", "1"}}, ""}, run.build = "b";
     run.width = 160, run.height = 90, run.max_depth = 10, run.time_limit = 60;
     return run;
 }
