@@ -57,6 +57,7 @@ Json done_line(Json end, std::span<const CurvePoint> curve, double threshold) {
     if (!crossing) return end;
     Json where{{"iterations", crossing->iterations}, {"seconds", crossing->seconds}};
     if (crossing->kind == Crossing::Kind::kAtMost) where["at_most"] = true;
+    if (crossing->lower_bound) where["lower_bound"] = true;
     end[capped ? "extrapolated" : "reached"] = std::move(where);
     return end;
 }

@@ -12,7 +12,7 @@ namespace {
 /// What a finished run says about the threshold.
 struct Finish {
     double iterations = 0, seconds = 0, preparation = 0;
-    bool capped = false;
+    bool capped = false, lower_bound = false;
     double rendered_iterations = 0, rendered_seconds = 0;  ///< Where a capped run ended.
 };
 
@@ -28,6 +28,7 @@ Finish finish_of(const Json& done) {
     f.rendered_seconds = number(done, "seconds");
     f.capped = !done.contains("reached");
     const Json where = done.value(f.capped ? "extrapolated" : "reached", Json::object());
+    f.lower_bound = where.contains("lower_bound");
     f.iterations = number(where, "iterations");
     f.seconds = number(where, "seconds");
     return f;
@@ -78,7 +79,8 @@ std::string bench_table(const std::vector<std::string>& algorithms, const std::v
         const double preparation = median(runs, [](const Finish& f) { return f.preparation; });
         const double together = median(runs, [](const Finish& f) { return f.seconds + f.preparation; });
         if (name == algorithms.front()) first_iterations = iterations, first_seconds = together;
-        const char* mark = estimate ? "~" : "";
+        const bool bound = std::any_of(runs.begin(), runs.end(), [](const Finish& f) { return f.lower_bound; });
+        const char* mark = !estimate ? "" : bound ? ">~" : "~";
         table += format("%-*s %5zu %6zu %12s %10s %10.2f %10s %11.2f %11.2f\n", int(width), name.c_str(), runs.size(),
                         size_t(capped), format("%s%.1f", mark, iterations).c_str(), format("%s%.2f", mark, seconds).c_str(),
                         preparation, format("%s%.2f", mark, together).c_str(), first_iterations / iterations,
@@ -90,7 +92,8 @@ std::string bench_table(const std::vector<std::string>& algorithms, const std::v
         }
     }
     if (any_capped)
-        table += "~ extrapolated by error ~ n^-1/2 from runs that ended above the threshold; a bias breaks that law\n";
+        table += "~ extrapolated by error ~ n^-1/2 from runs that ended above the threshold; a bias breaks that law\n"
+                 ">~ the same where the error does not fall like that yet: at least so much\n";
     return table;
 }
 

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "client/bench_log.h"
+#include "client/bench_reference.h"
 #include "client/commands.h"
 #include "client/job_options.h"
 #include "client/run_job.h"
@@ -27,8 +28,8 @@ constexpr const char* kFooter = R"(Examples:
       --stop-at-threshold 10 --threads 2 --out room.jsonl --resume
 
 FILE gets one JSON line per checkpoint (iterations 1, 2, 3, 4, 5, 7, 9, 12, ... at the ends of groups) with MAPE, relMSE,
-seconds and rays, and a last line per run with "done": true: where the MAPE first fell to the threshold (a straight line
-between checkpoints in log-log coordinates), or, for a run that ended above it, an extrapolation. The table at the end
+seconds and rays, and a last line per run with "done": true: where the MAPE fell to the threshold for good (a straight
+line between checkpoints in log-log coordinates), or, for a run that ended above it, an extrapolation. The table at the end
 shows medians over the seeds. `seconds` is light transport alone, `preparation_seconds` what an algorithm computes before its
 first sample; both count towards --time.
 
@@ -125,29 +126,6 @@ Result<std::vector<AlgorithmChoice>> parse_choices(const std::vector<std::string
     return choices;
 }
 
-/// Refuses a reference that cannot be what the runs converge to, and says aloud what may hide or distort an error.
-Status check_reference(const BenchOptions& options, const ExrImage& reference, const FrameLayout& frame, int max_depth,
-                       const std::string& scene_digest, const std::vector<AlgorithmChoice>& choices) {
-    LL_RETURN_IF_ERROR(check_comparable({.frame = frame}, reference));
-    if (const auto finite = compute_pixel_metrics(reference.color, reference.color); !finite.ok())
-        return invalid_argument(options.reference + ": " + finite.status().message());
-    const std::string depth = reference.attribute(exr_attribute::kMaxDepth);
-    if (!depth.empty() && depth != std::to_string(max_depth)) {
-        return invalid_argument(options.reference + " was rendered with --max-depth " + depth + ", the runs have " +
-                                std::to_string(max_depth) + "; give the same");
-    }
-    const auto warn = [&](const std::string& text) {
-        std::fprintf(stderr, "lightloom bench: warning: %s: %s\n", options.reference.c_str(), text.c_str());
-    };
-    const std::string digest = reference.attribute(exr_attribute::kScene), maker = reference.attribute(exr_attribute::kAlgorithm);
-    if (!digest.empty() && digest != scene_digest) warn("made from another version of the scene's files");
-    for (const AlgorithmChoice& choice : choices) {
-        if (choice.name == maker)
-            warn("made by \"" + maker + "\", which is also tested: a bias that it has is in the reference too");
-    }
-    return {};
-}
-
 int bench(BenchOptions& options) {
     (void)interrupt_token();
     const auto choices = parse_choices(options.algorithms);
@@ -174,8 +152,10 @@ int bench(BenchOptions& options) {
     if (!built.ok()) return report_error(built.status());
     const std::shared_ptr<const Scene> scene = std::move(built).value();
     const FrameLayout frame = scene->frame();
-    if (Status s = check_reference(options, *reference, frame, max_depth, spec->scene_root.hex(), *choices); !s.ok())
-        return report_error(s);
+    const auto warnings =
+        check_reference(options.reference, *reference, {frame, max_depth, spec->scene_root.hex(), *choices, options.threshold});
+    if (!warnings.ok()) return report_error(warnings.status());
+    for (const std::string& warning : *warnings) std::fprintf(stderr, "lightloom bench: warning: %s\n", warning.c_str());
 
     std::vector<BenchRun> runs;
     std::set<std::string> keys;

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "client/bench_log.h"
+#include "client/bench_reference.h"
 #include "common/film/atomic_file.h"
 
 namespace lightloom::client {
@@ -31,11 +32,26 @@ TEST(ErrorCurve, APointOnTheThresholdIsTheCrossing) {
     EXPECT_DOUBLE_EQ(find_crossing(curve, 12)->iterations, 2);
 }
 
-TEST(ErrorCurve, TheFirstCrossingCountsWhereNoiseMakesSeveral) {
+TEST(ErrorCurve, TheCrossingIsTheOneAfterWhichTheErrorStaysBelow) {
     const std::vector<CurvePoint> curve{{1, 1, 20}, {10, 10, 11}, {12, 12, 14}, {100, 100, 5}};
     const double n = find_crossing(curve, 12)->iterations;
-    EXPECT_GT(n, 1);
-    EXPECT_LT(n, 10);
+    EXPECT_GT(n, 12);
+    EXPECT_LT(n, 100);
+}
+
+TEST(ErrorCurve, AnErrorThatRisesFirstIsNeitherReachedNorExtrapolatedAsIfItFell) {
+    // Nearly black, hence nearly right, until the first bright paths are found.
+    std::vector<CurvePoint> curve{{1, 1, 11}, {2, 2, 13}, {4, 4, 15}, {8, 8, 19}};
+    auto crossing = find_crossing(curve, 12);
+    EXPECT_EQ(crossing->kind, Crossing::Kind::kExtrapolated);
+    EXPECT_TRUE(crossing->lower_bound);
+    EXPECT_GT(*final_slope(curve), 0);
+    for (const double n : {100., 150., 225., 337.}) curve.push_back({n, n, 300 / std::sqrt(n)});
+    crossing = find_crossing(curve, 12);
+    EXPECT_EQ(crossing->kind, Crossing::Kind::kExtrapolated);
+    EXPECT_FALSE(crossing->lower_bound);
+    EXPECT_NEAR(*final_slope(curve), -0.5, 1e-9);
+    EXPECT_FALSE(final_slope({curve.data(), 2}));
 }
 
 TEST(ErrorCurve, AnEasySceneIsReachedAtMostAtItsFirstPoint) {
@@ -187,6 +203,37 @@ TEST(BenchTable, MarksWhatIsExtrapolated) {
     EXPECT_NE(table.find("~400.0"), std::string::npos) << table;
     EXPECT_NE(table.find("> 100 iterations, > 100.00 s"), std::string::npos) << table;
     EXPECT_NE(table.find("~ extrapolated"), std::string::npos) << table;
+}
+
+ExrImage grey(float value, float variance) {
+    const FrameLayout frame{8, 8, {0, 0, 8, 8}};
+    const std::vector<float> pixels(8 * 8 * 3, value);
+    return {frame, {8, 8, pixels}, {{"variance", "RGB", std::vector<float>(pixels.size(), variance)}},
+            {{exr_attribute::kAlgorithm, "bdpt"}, {exr_attribute::kMaxDepth, "5"}, {exr_attribute::kScene, "digest"}}};
+}
+
+TEST(BenchReference, IsRefusedWhereItCannotJudge) {
+    const BenchSubject subject{{8, 8, {0, 0, 8, 8}}, 5, "digest", {{"path", {}, "path"}}, 12};
+    const auto good = check_reference("ref.exr", grey(1, 1e-4f), subject);
+    ASSERT_TRUE(good.ok()) << good.status().message();
+    EXPECT_TRUE(good->empty());
+    BenchSubject other = subject;
+    other.max_depth = 6;
+    EXPECT_FALSE(check_reference("ref.exr", grey(1, 0), other).ok());
+    other = subject;
+    other.frame.width = 9;
+    EXPECT_FALSE(check_reference("ref.exr", grey(1, 0), other).ok());
+    EXPECT_FALSE(check_reference("ref.exr", grey(NAN, 0), subject).ok());
+    const auto dark = check_reference("ref.exr", grey(0.001f, 0), subject);
+    ASSERT_FALSE(dark.ok()) << "0.001 / 0.011 is 9 %, and so is what a black image shows";
+    EXPECT_NE(dark.status().message().find("black"), std::string::npos);
+}
+
+TEST(BenchReference, IsWarnedOfWhereItMayMislead) {
+    const BenchSubject subject{{8, 8, {0, 0, 8, 8}}, 5, "another", {{"bdpt", {}, "bdpt"}}, 12};
+    // Standard deviation 0.1 of 1: MAPE 100 % * sqrt(2 / pi) * 0.1 / 1.01 = 7.9 %.
+    EXPECT_NEAR(noise_mape(grey(1, 0.01f)), 7.9, 0.01);
+    EXPECT_EQ(check_reference("ref.exr", grey(1, 0.01f), subject)->size(), 3u);
 }
 
 }  // namespace
