@@ -101,6 +101,8 @@ Status render_all(std::vector<std::unique_ptr<LiveRun>> alive, const BenchOption
     for (double goal = options.slice; !alive.empty(); goal += options.slice) {
         for (std::unique_ptr<LiveRun>& live : alive) {
             const auto ended = advance(*live, goal, reference, writer);
+            if (ended.status().code() == StatusCode::kCancelled)
+                return {StatusCode::kCancelled, "interrupted; finished runs are in " + options.out + ", --resume does the others"};
             if (!ended.ok()) return {ended.status().code(), live->label + ": " + ended.status().message()};
             if (!*ended) continue;
             done.push_back(done_line(live->last_checkpoint, live->curve, live->run.threshold));
