@@ -188,8 +188,10 @@ int bench(BenchOptions& options) {
             done.back()["label"] = run.algorithm.label;  // The same run may have been written differently.
             continue;
         }
-        auto render = ProgressiveRender::start(
-            scene, {.algorithm = run.algorithm.name, .parameters = run.algorithm.parameters, .seed = run.seed, .max_depth = max_depth});
+        const RenderSettings settings{run.algorithm.name, run.algorithm.parameters, run.seed, max_depth};
+        const auto preparation = prepare(*scene, settings, interrupt_token());
+        if (!preparation.ok()) return report_error(preparation.status());
+        auto render = ProgressiveRender::start(scene, settings, *preparation);
         if (!render.ok()) return report_error(render.status());
         Json line{{"run", run.key()},
                   {"label", run.algorithm.label},

@@ -111,7 +111,9 @@ int reference(ReferenceOptions& options) {
         return report_error(invalid_argument("a reference has at least 3 x 3 pixels"));
 
     const RenderSettings settings{spec->algorithm, spec->parameters, spec->seed, spec->max_depth};
-    auto progressive = ProgressiveRender::start(scene, settings);
+    const auto preparation = prepare(*scene, settings, interrupt_token());
+    if (!preparation.ok()) return report_error(preparation.status());
+    auto progressive = ProgressiveRender::start(scene, settings, *preparation);
     if (!progressive.ok()) return report_error(progressive.status());
     const auto means = render(*progressive, *spec, options.job.quiet);
     if (!means.ok()) return report_error(means.status());

@@ -108,11 +108,13 @@ Estimate LengthMeans::estimate(size_t first, size_t last) const {
 
 Result<LengthMeans> measure_lengths(const std::shared_ptr<const Scene>& scene, const RenderSettings& settings, double seconds,
                                     std::stop_token stop) {
+    const auto preparation = prepare(*scene, settings, stop);
+    if (!preparation.ok()) return preparation.status();
     std::vector<ProgressiveRender> renders;
     for (int depth = 0; depth <= settings.max_depth; ++depth) {
         RenderSettings restricted = settings;
         restricted.max_depth = depth;
-        auto render = ProgressiveRender::start(scene, restricted);
+        auto render = ProgressiveRender::start(scene, restricted, *preparation);
         if (!render.ok()) return render.status();
         renders.push_back(std::move(render).value());
     }
@@ -139,7 +141,9 @@ Result<LengthMeans> measure_lengths(const std::shared_ptr<const Scene>& scene, c
 Result<CrossCheck> cross_check(const std::shared_ptr<const Scene>& scene, const RenderSettings& producer,
                                const std::vector<Estimate>& made, const RenderSettings& checker, double seconds,
                                std::stop_token stop) {
-    auto render = ProgressiveRender::start(scene, checker);
+    const auto preparation = prepare(*scene, checker, stop);
+    if (!preparation.ok()) return preparation.status();
+    auto render = ProgressiveRender::start(scene, checker, *preparation);
     if (!render.ok()) return render.status();
     RegionMeans checked(kCheckColumns, kCheckRows);
     while (render->seconds() < seconds || render->groups() < kLeastGroups) {

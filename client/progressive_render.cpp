@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "common/transport/catalog.h"
+#include "common/transport/training.h"
 
 namespace lightloom::client {
 namespace {
@@ -52,7 +53,19 @@ Result<AlgorithmChoice> parse_algorithm(const std::string& text) {
     return choice;
 }
 
-Result<ProgressiveRender> ProgressiveRender::start(std::shared_ptr<const Scene> scene, const RenderSettings& settings) {
+Result<Preparation> prepare(const Scene& scene, const RenderSettings& settings, std::stop_token stop) {
+    const auto info = find_algorithm(settings.algorithm);
+    if (!info.ok()) return invalid_argument(info.status().message());
+    if (!(*info)->needs_tables) return Preparation{};
+    const auto begin = Clock::now();
+    TrainingReport report;
+    auto tables = make_tables(scene, settings, std::move(stop), &report);
+    if (!tables.ok()) return tables.status();
+    return Preparation{std::make_shared<const SubspaceTables>(std::move(tables).value()), seconds_since(begin)};
+}
+
+Result<ProgressiveRender> ProgressiveRender::start(std::shared_ptr<const Scene> scene, const RenderSettings& settings,
+                                                   const Preparation& preparation) {
     const auto info = find_algorithm(settings.algorithm);
     if (!info.ok()) return invalid_argument(info.status().message());
     const auto parameters = parse_parameters(**info, settings.parameters);
@@ -60,10 +73,10 @@ Result<ProgressiveRender> ProgressiveRender::start(std::shared_ptr<const Scene> 
     const FrameLayout frame = scene->frame();
     const float exposure_scale = scene->description().film.exposure_scale;
     const auto begin = Clock::now();
-    auto renderer = Renderer::create(std::move(scene), settings);
+    auto renderer = Renderer::create(std::move(scene), settings, preparation.tables);
     if (!renderer.ok()) return renderer.status();
     return ProgressiveRender(std::move(renderer).value(), frame, Plan(frame, light_paths_per_pixel(**info, *parameters)),
-                             exposure_scale, seconds_since(begin));
+                             exposure_scale, preparation.seconds + seconds_since(begin));
 }
 
 ProgressiveRender::ProgressiveRender(std::unique_ptr<const Renderer> renderer, const FrameLayout& frame, const Plan& plan,

@@ -27,10 +27,20 @@ struct AlgorithmChoice {
 /// "NAME[:KEY=VALUE]...", checked against the catalog.
 Result<AlgorithmChoice> parse_algorithm(const std::string& text);
 
+/// What an algorithm computes before its first sample.
+struct Preparation {
+    std::shared_ptr<const SubspaceTables> tables;  ///< Null for algorithms that need none.
+    double seconds = 0;
+};
+
+/// Trains the tables of an algorithm that needs some, on the threads of the calling arena. kCancelled after a stop request.
+Result<Preparation> prepare(const Scene& scene, const RenderSettings& settings, std::stop_token stop);
+
 class ProgressiveRender {
   public:
-    /// Makes the algorithm ready for the scene and measures how long that takes; all renderings may share the scene.
-    static Result<ProgressiveRender> start(std::shared_ptr<const Scene> scene, const RenderSettings& settings);
+    /// Renderings may share the scene, and also a preparation: tables of longer paths serve shorter ones.
+    static Result<ProgressiveRender> start(std::shared_ptr<const Scene> scene, const RenderSettings& settings,
+                                           const Preparation& preparation);
     /// `preparation_seconds` were spent on `renderer`; `plan` and `exposure_scale` are those of a job on `frame`.
     ProgressiveRender(std::unique_ptr<const Renderer> renderer, const FrameLayout& frame, const Plan& plan,
                       float exposure_scale, double preparation_seconds);

@@ -89,7 +89,7 @@ std::shared_ptr<const Scene> small_scene() {
 }
 
 TEST(ProgressiveRender, GrowsByGroupsUpToItsLimit) {
-    auto render = ProgressiveRender::start(small_scene(), {.algorithm = "bdpt", .max_depth = 3});
+    auto render = ProgressiveRender::start(small_scene(), {.algorithm = "bdpt", .max_depth = 3}, {});
     ASSERT_TRUE(render.ok()) << render.status().message();
     EXPECT_FALSE(render->last_group_image().ok());
     double seconds = 0;
@@ -103,7 +103,7 @@ TEST(ProgressiveRender, GrowsByGroupsUpToItsLimit) {
     EXPECT_EQ(render->advance(45).code(), StatusCode::kFailedPrecondition);
     std::stop_source stopped;
     stopped.request_stop();
-    auto other = ProgressiveRender::start(small_scene(), {.algorithm = "bdpt", .max_depth = 3});
+    auto other = ProgressiveRender::start(small_scene(), {.algorithm = "bdpt", .max_depth = 3}, {});
     EXPECT_EQ(other->advance(10, stopped.get_token()).code(), StatusCode::kCancelled);
     EXPECT_EQ(other->iterations(), 0u);
 }
@@ -114,12 +114,12 @@ TEST(MeasureLengths, AddUpToTheImageAndAgreeBetweenAlgorithms) {
     const auto lengths = measure_lengths(scene, path, 0, {});
     ASSERT_TRUE(lengths.ok()) << lengths.status().message();
     ASSERT_EQ(lengths->groups.size(), kLeastGroups);
-    auto render = ProgressiveRender::start(scene, path);
+    auto render = ProgressiveRender::start(scene, path, {});
     while (render->groups() < kLeastGroups) ASSERT_TRUE(render->advance().ok());
     EXPECT_NEAR(lengths->estimate(1, 4).mean, luminance_means(render->image(), 1, 1)[0], 1e-5);
 
     RegionMeans made(kCheckColumns, kCheckRows);
-    auto reference = ProgressiveRender::start(scene, path);
+    auto reference = ProgressiveRender::start(scene, path, {});
     while (reference->groups() < 3 * kLeastGroups) {
         ASSERT_TRUE(reference->advance().ok());
         made.add(*reference->last_group_image(), reference->last_group_iterations());
