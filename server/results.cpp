@@ -75,7 +75,7 @@ std::string to_json(const Manifest& m) {
     for (const ManifestWorker& w : m.workers) {
         Json units = Json::array();  // pairs [group, tile]
         for (const UnitTable::Merged& u : m.units) {
-            if (u.worker == w.index) units.push_back({u.unit.key.group, u.unit.key.tile});
+            if (u.worker == w.index) units.push_back({u.unit.group, u.unit.tile});
         }
         workers.push_back({{"worker", w.worker_id},
                            {"host", w.host},

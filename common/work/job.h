@@ -87,6 +87,8 @@ class Plan {
     uint32_t max_group_iterations() const { return max_group_iterations_; }
     /// The groups that make exactly `iterations` iterations; the last one is cut short where need be.
     std::vector<Group> groups_for(uint64_t iterations) const;
+    /// How many groups these are, without making them.
+    uint32_t group_count(uint64_t iterations) const;
     /// The units of a group, tile by tile.
     std::vector<WorkUnit> units(const Group& group) const;
     uint32_t tile_count() const { return uint32_t(tiles_.size()); }
