@@ -29,8 +29,8 @@ for preset in "${presets[@]}"; do
     tests=(-LE statistical)
     targets=(all)
     if [ "$preset" = tsan ]; then
-        tests=(-R '^(coordinator|worker|process|work|transport)_test\.')
-        targets=(coordinator_test worker_test process_test work_test transport_test)
+        tests=(-R '^(coordinator|bookkeeping|client|worker|process|work|transport)_test\.')
+        targets=(coordinator_test bookkeeping_test client_test worker_test process_test work_test transport_test)
     fi
     "${run[@]}" cmake --build --preset "$preset" --target "${targets[@]}"
     reports="$root/build/$preset/reports"

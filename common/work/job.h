@@ -25,7 +25,6 @@ struct JobSpec {
     Digest scene_root;               ///< Of the scene's file list (asset manifest).
     FrameLayout frame;               ///< Filled from the scene when the job is accepted.
     bool first_hit_layers = false;   ///< Also write albedo, normal and depth of the first hit.
-    bool half_float = false;         ///< Store colour as half; a value beyond its range fails the job.
 
     /// Digest of everything that decides the bytes of the image except how many iterations are rendered.
     Digest image_digest() const;
