@@ -183,16 +183,33 @@ bool EmitterSet::sample_next_event(const Vec3& reference, double pick, Vec2 u, N
         } else {
             out->position = e.position;
         }
-        const Vec3 to_light = out->position - reference;
+        if (!connect_point(reference, out->position, out->normal, out)) return false;
+        out->pdf = pdf_next_event(e, reference, out->position, out->normal, out->wi);
+        return out->pdf > 0;
+    }
+    out->radiance = emitted(e, out->normal, -out->wi);
+    return out->pdf > 0 && !out->radiance.is_black();
+}
+
+bool EmitterSet::connect_point(const Vec3& reference, const Vec3& position, const Vec3& normal_or_travel,
+                               NextEventSample* out) const {
+    const Emitter& e = emitters_[out->emitter];
+    out->normal = normal_or_travel;
+    if (e.is_infinite()) {
+        out->wi = -normal_or_travel;
+        out->position = reference + out->wi * (2 * scene_radius_);
+        out->geometry = 1;
+    } else {
+        out->position = position;
+        const Vec3 to_light = position - reference;
         const float d2 = length_squared(to_light);
         if (!(d2 > 0)) return false;
         out->wi = to_light / std::sqrt(d2);
         if (!e.is_area()) out->normal = -out->wi;
         out->geometry = (e.is_area() ? abs_dot(out->normal, out->wi) : 1.0f) / d2;
-        out->pdf = pdf_next_event(e, reference, out->position, out->normal, out->wi);
     }
     out->radiance = emitted(e, out->normal, -out->wi);
-    return out->pdf > 0 && out->geometry > 0 && !out->radiance.is_black();
+    return out->geometry > 0 && !out->radiance.is_black();
 }
 
 float EmitterSet::pdf_next_event(const Emitter& e, const Vec3& reference, const Vec3& position, const Vec3& normal,
