@@ -191,6 +191,8 @@ int bench(BenchOptions& options) {
         const RenderSettings settings{run.algorithm.name, run.algorithm.parameters, run.seed, max_depth};
         const auto preparation = prepare(*scene, settings, interrupt_token());
         if (!preparation.ok()) return report_error(preparation.status());
+        if (!preparation->note.empty())
+            std::fprintf(stderr, "lightloom bench: warning: %s: %s\n", run.algorithm.label.c_str(), preparation->note.c_str());
         auto render = ProgressiveRender::start(scene, settings, *preparation);
         if (!render.ok()) return report_error(render.status());
         Json line{{"run", run.key()},

@@ -113,6 +113,8 @@ int reference(ReferenceOptions& options) {
     const RenderSettings settings{spec->algorithm, spec->parameters, spec->seed, spec->max_depth};
     const auto preparation = prepare(*scene, settings, interrupt_token());
     if (!preparation.ok()) return report_error(preparation.status());
+    if (!preparation->note.empty())
+        std::fprintf(stderr, "lightloom reference: warning: %s\n", preparation->note.c_str());
     auto progressive = ProgressiveRender::start(scene, settings, *preparation);
     if (!progressive.ok()) return report_error(progressive.status());
     const auto means = render(*progressive, *spec, options.job.quiet);

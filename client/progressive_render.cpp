@@ -61,7 +61,7 @@ Result<Preparation> prepare(const Scene& scene, const RenderSettings& settings, 
     TrainingReport report;
     auto tables = make_tables(scene, settings, std::move(stop), &report);
     if (!tables.ok()) return tables.status();
-    return Preparation{std::make_shared<const SubspaceTables>(std::move(tables).value()), seconds_since(begin)};
+    return Preparation{std::make_shared<const SubspaceTables>(std::move(tables).value()), seconds_since(begin), report.note};
 }
 
 Result<ProgressiveRender> ProgressiveRender::start(std::shared_ptr<const Scene> scene, const RenderSettings& settings,

@@ -31,6 +31,7 @@ Result<AlgorithmChoice> parse_algorithm(const std::string& text);
 struct Preparation {
     std::shared_ptr<const SubspaceTables> tables;  ///< Null for algorithms that need none.
     double seconds = 0;
+    std::string note;  ///< One line where the tables are simpler than asked; empty otherwise.
 };
 
 /// Trains the tables of an algorithm that needs some, on the threads of the calling arena. kCancelled after a stop request.

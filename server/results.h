@@ -38,7 +38,7 @@ struct Manifest {
     uint64_t expired_leases = 0, rejected_results = 0;
 };
 
-/// Command line that renders one dropped sample again; its unit for a splat, which is known only by where it would have landed.
+/// Command line for a shell that renders one dropped sample again; its unit for a splat, which is known only by where it would have landed.
 std::string replay_command(const JobSpec& spec, const std::string& scene, const ManifestDropped& dropped);
 /// The manifest as JSON text.
 std::string to_json(const Manifest& manifest);

@@ -9,10 +9,14 @@ namespace {
 
 constexpr float kInvFourPi = 0.07957747154594766788f;
 
-float spot_falloff(const Emitter& e, float cos_theta) {
-    if (cos_theta < e.cos_total) return 0;
-    if (cos_theta >= e.cos_falloff) return 1;
-    const float x = (cos_theta - e.cos_total) / (e.cos_falloff - e.cos_total);
+/// 1 - cos of the angle between unit vectors, without cancellation.
+float height_between(const Vec3& a, const Vec3& b) { return 0.5f * length_squared(a - b); }
+
+float spot_falloff(const Emitter& e, const Vec3& w) {
+    const float height = height_between(e.normal, w);
+    if (height > e.total_height) return 0;
+    if (height <= e.falloff_height) return 1;
+    const float x = (e.total_height - height) / (e.total_height - e.falloff_height);
     return x * x * (3 - 2 * x);
 }
 
@@ -46,7 +50,7 @@ double EmitterSet::power(const Emitter& e) const {
         case EmitterKind::kSphere: return kPiD * scalar_of(e.radiance) / e.inv_area * (e.two_sided ? 2 : 1);
         case EmitterKind::kPoint: return 4 * kPiD * scalar_of(e.radiance);
         case EmitterKind::kSpot:
-            return 2 * kPiD * scalar_of(e.radiance) * ((1 - double(e.cos_falloff)) + (double(e.cos_falloff) - e.cos_total) / 2);
+            return kPiD * scalar_of(e.radiance) * (double(e.falloff_height) + double(e.total_height));
         case EmitterKind::kDistant: return scalar_of(e.radiance) * disc;
         case EmitterKind::kEnvironment: return environment_.integrated_radiance() * disc;
     }
@@ -58,7 +62,7 @@ Rgb EmitterSet::emitted(const Emitter& e, const Vec3& normal, const Vec3& w) con
         case EmitterKind::kTriangle:
         case EmitterKind::kSphere: return e.two_sided || dot(normal, w) > 0 ? e.radiance : Rgb{};
         case EmitterKind::kPoint: return e.radiance;
-        case EmitterKind::kSpot: return e.radiance * spot_falloff(e, dot(e.normal, w));
+        case EmitterKind::kSpot: return e.radiance * spot_falloff(e, w);
         case EmitterKind::kDistant: return e.radiance;
         case EmitterKind::kEnvironment: return environment_.radiance(-w);
     }
@@ -80,7 +84,7 @@ float EmitterSet::pdf_direction(const Emitter& e, const Vec3& normal, const Vec3
             return c > 0 ? c * kInvPi : 0;
         }
         case EmitterKind::kPoint: return kInvFourPi;
-        case EmitterKind::kSpot: return dot(e.normal, w) >= e.cos_total ? 1 / (kTwoPi * (1 - e.cos_total)) : 0;
+        case EmitterKind::kSpot: return height_between(e.normal, w) <= e.total_height ? 1 / (kTwoPi * e.total_height) : 0;
         case EmitterKind::kDistant:
         case EmitterKind::kEnvironment: return disc_pdf_;
     }
@@ -114,8 +118,8 @@ bool EmitterSet::sample_emission(double pick, Vec2 u_position, Vec2 u_direction,
             out->direction = out->normal = sample_sphere(u_direction);
             break;
         case EmitterKind::kSpot: {
-            const float z = 1 - u_direction.x * (1 - e.cos_total);
-            const float r = safe_sqrt(1 - z * z);
+            const float height = u_direction.x * e.total_height;
+            const float z = 1 - height, r = safe_sqrt(height * (2 - height));
             const math::SinCos sc = math::sincos_turns(u_direction.y);
             out->position = e.position;
             out->direction = out->normal = Frame(e.normal).to_world({r * float(sc.cos), r * float(sc.sin), z});

@@ -27,7 +27,7 @@ struct Emitter {
     float radius = 0;           ///< kSphere; negative-free. `inward` flips its emitting side.
     bool inward = false;
     float inv_area = 0;
-    float cos_total = 0, cos_falloff = 0;  ///< kSpot.
+    float total_height = 0, falloff_height = 0;  ///< kSpot; see SpotLight.
     float reach = 0;            ///< Area lights: largest coordinate magnitude; see offset_origin().
     int32_t light = 0;          ///< Group for reports: the area-light shape or light source it came from.
 
