@@ -23,6 +23,7 @@
 #include "common/film/region_means.h"
 #include "common/import/import.h"
 #include "common/transport/renderer.h"
+#include "common/transport/training.h"
 
 using namespace lightloom;
 
@@ -59,7 +60,7 @@ Result<Outcome> compare_means(const Options& options, const std::string& name, c
     auto built = Scene::build(std::move(imported->description), scene_options);
     if (!built.ok()) return built.status();
     const std::shared_ptr<const Scene> scene = std::move(built).value();
-    auto renderer = Renderer::create(scene, settings);
+    auto renderer = create_with_tables(scene, settings, {});
     if (!renderer.ok()) return renderer.status();
     auto reference = read_exr(options.shared + "/refs/" + name + ".exr");
     if (!reference.ok()) return reference.status();
