@@ -22,7 +22,10 @@ using testing::rebuild;
 
 constexpr int kEdges = 7;
 
-/// Deviations of single-precision quantities; see weights_test.cpp for what the two bounds mean.
+/// Deviations of single-precision quantities; see weights_test.cpp for what the two bounds mean. What was traced is compared with
+/// what is rebuilt: directions that were sampled, and throughput that was accumulated along the other sub-path, so that narrow
+/// lobes and total reflection amplify the last bits more often than there. The tail of that falls as one over the deviation; a
+/// wrong factor would show up in a good part of the paths.
 struct Tally {
     uint64_t count = 0, loose = 0, gross = 0;
     void add(double deviation) {
@@ -32,8 +35,8 @@ struct Tally {
     }
     void check(const std::string& what, uint64_t at_least = 500) const {
         EXPECT_GE(count, at_least) << what;
-        EXPECT_LT(double(loose), 2e-3 * double(count)) << what << ": " << loose << " of " << count << " deviate by over 1e-4";
-        EXPECT_LE(double(gross), 2e-4 * double(count)) << what << ": " << gross << " of " << count << " deviate by over 1e-2";
+        EXPECT_LT(double(loose), 1e-2 * double(count)) << what << ": " << loose << " of " << count << " deviate by over 1e-4";
+        EXPECT_LE(double(gross), 5e-4 * double(count)) << what << ": " << gross << " of " << count << " deviate by over 1e-2";
     }
 };
 
@@ -65,7 +68,7 @@ TEST_P(SubspaceWeights, SumToOneWhateverTheTablesHold) {
         knowing.cache_paths = 50;
         const SubspaceLabeller labeller{blind.prepared->tables, scene->emitters()};
         testing::for_each_path(
-            *scene, can_be_hit(*scene) ? 1500 : 6000, kEdges, 40 + seed,
+            *scene, can_be_hit(*scene) ? 4000 : 8000, kEdges, 40 + seed,
             [&](const FullPath& path, int own, const PathView& view, const Rgb&) {
                 ++made[size_t(own)];
                 const int k = path.k();
@@ -104,7 +107,7 @@ TEST_P(SubspaceWeights, EveryTechniqueSeesTheSameLabelsAndThroughput) {
     const SubspaceLabeller labeller{tables, scene->emitters()};
     Tally throughput, labels;
     testing::for_each_path(
-        *scene, can_be_hit(*scene) ? 1500 : 6000, kEdges, 51,
+        *scene, can_be_hit(*scene) ? 4000 : 8000, kEdges, 51,
         [&](const FullPath& path, int, const PathView& traced, const Rgb&) {
             const int k = path.k();
             if (k < 2) return;
