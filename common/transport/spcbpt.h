@@ -137,8 +137,7 @@ struct SpcbptAlgorithm {
         Rgb sum;
         CameraSampler sampler(context.seed, context.iteration, context.pixel);
         const auto hit_weight = [&](int t, const Vec3& towards) {
-            if (view.k == 1) return 1.0f;
-            label.complete(nullptr, 0, z, t, towards, &view);
+            if (view.k >= 2) label.complete(nullptr, 0, z, t, towards, &view);
             return weight(view, 0);
         };
         const auto visit = [&](int t) {
