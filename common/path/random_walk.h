@@ -84,6 +84,7 @@ template <TransportMode mode>
 bool leave(PathVertex* v, PathVertex* previous, const ScatterSample& u, WalkRay* ray) {
     BsdfSample s;
     if (!v->bsdf.sample(v->wo_local, u.lobe, u.direction, mode, &s)) return false;
+    if (!(s.pdf_fwd > 0)) return false;  // exactly grazing: weights divide by this density
     ray->direction = v->shading.to_world(s.wi);
     Rgb weight = s.weight;
     if constexpr (mode == TransportMode::kImportance) {

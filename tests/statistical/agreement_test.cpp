@@ -1,12 +1,10 @@
-// `path`, `light` and `bdpt` agree on every scene, for every path length and in every region. An
+// All algorithms of the catalog agree on every scene, for every path length and in every region. An
 // image of max_depth d has all paths of up to d + 1 edges, and the same seed makes the same shorter
 // ones, so the difference of two depths is the image of one length.
 
 #include <gtest/gtest.h>
 
-#include <sstream>
-
-#include "tests/support/estimates.h"
+#include "tests/support/table_render.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
@@ -20,6 +18,8 @@ constexpr uint32_t kSamplesPerPixel = 16;
 /// Estimates of the lengths 1 .. kMaxLength, from independent seeds.
 std::vector<RegionMeans> lengths_of(const std::shared_ptr<const Scene>& scene,
                                     const std::string& algorithm, uint64_t first_seed) {
+    if ((*find_algorithm(algorithm))->needs_tables)
+        return testing::lengths_with_tables(scene, algorithm, kMaxLength, kSamplesPerPixel / 2, 2 * kSeeds, first_seed);
     std::vector<RegionMeans> lengths(kMaxLength);
     const Rect& crop = scene->frame().crop;
     for (int i = 0; i < kSeeds; ++i) {
@@ -42,9 +42,7 @@ TEST(Agreement, EveryLengthHasTheSameMeanInEveryAlgorithm) {
     int frames = 0, tested = 0;
     for (const testing::NamedScene& named : testing::kScenes) {
         const auto scene = named.make();
-        std::vector<std::string> algorithms;
-        std::istringstream list(named.complete);
-        for (std::string name; list >> name;) algorithms.push_back(name);
+        const std::vector<std::string> algorithms = testing::algorithms_of(named.complete);
         std::vector<std::vector<RegionMeans>> estimates;
         for (size_t a = 0; a < algorithms.size(); ++a)
             estimates.push_back(lengths_of(scene, algorithms[a], 1000 * (a + 1)));

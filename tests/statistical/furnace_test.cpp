@@ -17,7 +17,7 @@ using testing::SceneBuilder;
 using testing::TestFamily;
 
 constexpr int kSeeds = 32;
-const char* const kAlgorithms[] = {"path", "light", "bdpt"};
+const char* const kAlgorithms[] = {"path", "light", "bdpt", "lvcbpt", "spcbpt"};
 
 /// Tests the frame and every block against one number.
 void expect_constant(const RegionMeans& means, double expected, const std::string& what,

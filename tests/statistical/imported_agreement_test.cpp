@@ -1,9 +1,7 @@
-// The scenes of tests/scenes through the importer: `path`, `light` and `bdpt` have the same mean in
-// every region.
+// The scenes of tests/scenes through the importer: all algorithms of the catalog that sample all of
+// their paths have the same mean in every region.
 
 #include <gtest/gtest.h>
-
-#include <sstream>
 
 #include "common/import/import.h"
 #include "tests/support/estimates.h"
@@ -49,15 +47,12 @@ TEST(ImportedScenes, HaveTheSameMeanInEveryAlgorithm) {
             Scene::build(std::move(imported->description), {32, 32});
         ASSERT_TRUE(built.ok()) << built.status().message();
         const std::shared_ptr<const Scene> scene = std::move(built).value();
-        std::vector<std::string> algorithms;
+        const std::vector<std::string> algorithms = testing::algorithms_of(file.complete);
         std::vector<RegionMeans> estimates;
-        std::istringstream list(file.complete);
-        for (std::string name; list >> name;) {
-            algorithms.push_back(name);
+        for (const std::string& name : algorithms)
             estimates.push_back(testing::replicate(testing::catalog_image(scene, name, 5, 16),
                                                    scene->frame().crop, 32,
-                                                   1000 * algorithms.size()));
-        }
+                                                   1000 * (estimates.size() + 1)));
         for (size_t a = 0; a < algorithms.size(); ++a)
             for (size_t b = a + 1; b < algorithms.size(); ++b) {
                 ++pairs;

@@ -28,6 +28,8 @@ TEST(MissingPaths, CausticOfAPointLight) {
                                                 scene->frame().crop, kSeeds, 700);
     testing::TestFamily family;
     EXPECT_TRUE(testing::compare(light, bdpt, "light and bdpt", &family));
+    for (const char* algorithm : {"lvcbpt", "spcbpt"})
+        family.add(testing::welch_p_value(light.frame(), estimate(scene, algorithm).frame()), algorithm);
     family.check();
     const double missing = light.frame().mean - path.frame().mean;
     EXPECT_GT(missing, 6 * std::sqrt(light.frame().variance + path.frame().variance));
@@ -60,7 +62,7 @@ std::shared_ptr<const Scene> behind_glass_in_a_mirror(bool point) {
 TEST(MissingPaths, SpecularDiffuseSpecular) {
     const auto with_point = behind_glass_in_a_mirror(true),
                with_lamp = behind_glass_in_a_mirror(false);
-    for (const char* algorithm : {"path", "light", "bdpt"})
+    for (const char* algorithm : {"path", "light", "bdpt", "lvcbpt", "spcbpt"})
         EXPECT_EQ(estimate(with_point, algorithm).frame().mean, 0)
             << algorithm << " should not be able to see this point light";
     // The lamp can be hit: both algorithms with hits see it, and agree; light tracing still does
@@ -72,6 +74,8 @@ TEST(MissingPaths, SpecularDiffuseSpecular) {
     EXPECT_GT(path.frame().mean, 0);
     testing::TestFamily family;
     family.add(testing::welch_p_value(path.frame(), bdpt.frame()), "path and bdpt");
+    for (const char* algorithm : {"lvcbpt", "spcbpt"})
+        family.add(testing::welch_p_value(path.frame(), estimate(with_lamp, algorithm).frame()), algorithm);
     family.check();
 }
 

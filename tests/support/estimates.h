@@ -1,8 +1,10 @@
 #pragma once
 // Independent replications of renders, reduced to the means of a few regions, and their comparison.
 
+#include <algorithm>
 #include <functional>
 #include <map>
+#include <sstream>
 
 #include "common/transport/bdpt.h"
 #include "common/transport/light.h"
@@ -36,15 +38,40 @@ inline UnitWork whole_frame(const Scene& scene, uint32_t samples_per_pixel) {
     return {0, samples_per_pixel, 0, crop, 0, uint64_t(samples_per_pixel) * uint64_t(crop.area())};
 }
 
+/// Training and caches that suit 32 x 32 pixels, for the rows of the catalog that have them; what is set already stays.
+inline std::map<std::string, std::string> with_small_training(const std::string& algorithm,
+                                                              std::map<std::string, std::string> parameters) {
+    const Result<const AlgorithmInfo*> row = find_algorithm(algorithm);
+    if (!row.ok()) return parameters;
+    for (const auto& [name, value] : {std::pair<const char*, const char*>{"training-paths", "1500"},
+                                      {"cache", "1500"},
+                                      {"light-subspaces", "40"},
+                                      {"eye-subspaces", "30"}})
+        if (has_parameter(**row, name)) parameters.insert({name, value});
+    return parameters;
+}
+
+/// A list of algorithms as the tables of test scenes hold it, space-separated. Methods with tables sample what `bdpt` samples:
+/// where that is in the list, every one of the catalog is.
+inline std::vector<std::string> algorithms_of(const std::string& list) {
+    std::vector<std::string> names;
+    std::istringstream words(list);
+    for (std::string name; words >> name;) names.push_back(name);
+    if (std::find(names.begin(), names.end(), "bdpt") != names.end())
+        for (const AlgorithmInfo& row : catalog())
+            if (row.needs_tables) names.emplace_back(row.name);
+    return names;
+}
+
 /// Makes the image of one seed.
 using ImageOfSeed = std::function<std::vector<double>(uint64_t seed)>;
 
-/// A production algorithm from the catalog.
+/// A production algorithm from the catalog. Every seed makes its own tables.
 inline ImageOfSeed catalog_image(std::shared_ptr<const Scene> scene, const std::string& algorithm,
                                  int max_depth, uint32_t samples_per_pixel,
                                  std::map<std::string, std::string> parameters = {}) {
     return [=](uint64_t seed) {
-        RenderSettings settings{algorithm, parameters, seed, max_depth};
+        RenderSettings settings{algorithm, with_small_training(algorithm, parameters), seed, max_depth};
         Result<std::unique_ptr<Renderer>> renderer = create_with_tables(scene, settings, {});
         if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
         Result<Partial> partial = (*renderer)->render(whole_frame(*scene, samples_per_pixel), {});

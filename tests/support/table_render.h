@@ -2,6 +2,7 @@
 // Renders of the methods with a light-vertex cache from given tables, and with some of their techniques switched off.
 
 #include "common/transport/lvcbpt.h"
+#include "common/transport/parameters.h"
 #include "common/transport/spcbpt.h"
 #include "tests/support/estimates.h"
 #include "tests/support/random_tables.h"
@@ -73,6 +74,45 @@ inline ImageOfSeed lvcbpt_image(const std::shared_ptr<const Scene>& scene, doubl
     const UniformSelection selection{o.light_paths * double(scene->frame().crop.area()), o.connections / vertices_per_path};
     const LvcbptAlgorithm<> algorithm{selection, Heuristic::kBalance, o.connections, o.paths};
     return cache_image(scene, algorithm, max_depth, samples_per_pixel, o.light_paths);
+}
+
+/// Estimates of the path lengths 1 .. max_length, each from an image of its own, by a method of the catalog with tables. (Its
+/// images of different depths share no samples, so that their difference is far noisier than the length.)
+inline std::vector<RegionMeans> lengths_with_tables(const std::shared_ptr<const Scene>& scene, const std::string& name,
+                                                    int max_length, uint32_t samples_per_pixel, int seeds, uint64_t first_seed) {
+    std::vector<RegionMeans> lengths(static_cast<size_t>(max_length));
+    for (uint64_t seed = first_seed; seed < first_seed + uint64_t(seeds); ++seed) {
+        const RenderSettings settings{name, with_small_training(name, {}), seed, max_length - 1};
+        TrainingReport report;
+        Result<SubspaceTables> tables = make_tables(*scene, settings, {}, &report);
+        const Result<TransportParameters> p = TransportParameters::read(settings);
+        if (!tables.ok() || !p.ok()) throw std::runtime_error("no tables for " + name);
+        CacheOptions options;
+        options.connections = p->connections, options.paths = p->minimum_paths;
+        options.light_paths = p->light_paths, options.ris_aware = p->ris_aware;
+        const double vertices = tables->vertices_per_path, frame_paths = p->light_paths * double(scene->frame().crop.area());
+        const MaskedCacheSelection<UniformSelection> uniform{{frame_paths, p->connections / vertices}};
+        const MaskedCacheSelection<SubspaceSelection> subspaces{subspace_selection(*scene, *std::move(tables), options)};
+        const auto render = [&](auto selection, auto make, int k) {
+            selection.min_k = selection.max_k = k;
+            const auto image = cache_image(scene, make(selection), k - 1, samples_per_pixel, options.light_paths);
+            lengths[size_t(k - 1)].add(image(seed), scene->frame().crop);
+        };
+        for (int k = 1; k <= max_length; ++k) {
+            if (name == "lvcbpt")
+                render(uniform, [&](const auto& s) {
+                    return LvcbptAlgorithm<MaskedCacheSelection<UniformSelection>>{s, p->heuristic, p->connections, p->minimum_paths};
+                }, k);
+            else if (name == "spcbpt")
+                render(subspaces, [&](const auto& s) {
+                    return SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>>{s, p->heuristic, p->connections,
+                                                                                   p->minimum_paths};
+                }, k);
+            else
+                throw std::runtime_error("no masked selection for '" + name + "' yet: add it here");
+        }
+    }
+    return lengths;
 }
 
 }  // namespace lightloom::testing

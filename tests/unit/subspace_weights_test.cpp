@@ -137,6 +137,30 @@ TEST_P(SubspaceWeights, EveryTechniqueSeesTheSameLabelsAndThroughput) {
 INSTANTIATE_TEST_SUITE_P(Scenes, SubspaceWeights, ::testing::ValuesIn(testing::kScenes),
                          [](const ::testing::TestParamInfo<testing::NamedScene>& param) { return param.param.name; });
 
+/// Directions in the very plane of a surface have density zero. A ray that left along one and escaped to the sky had no weight.
+TEST(Walk, DoesNotFollowDirectionsOfZeroDensity) {
+    PathVertex before, v;
+    v.ng = {0, 0, 1};
+    v.shading = Frame(v.ng);
+    v.wo = v.wo_local = normalize(Vec3{0.3f, 0.2f, 1});
+    v.alpha = Rgb(1.0f);
+    v.bsdf.kind = BsdfKind::kDiffuse;
+    v.bsdf.reflectance = Rgb(0.5f);
+    for (int i = 0; i < 64; ++i)
+        for (const float edge : {0.0f, 1 - 0x1p-24f, 0.5f}) {
+            const float along = float(i) / 64;
+            for (const Vec2 u : {Vec2{edge, along}, Vec2{along, edge}}) {
+                WalkRay ray;
+                if (leave<TransportMode::kRadiance>(&v, &before, {0.5f, u}, &ray)) {
+                    EXPECT_GT(ray.pdf, 0);
+                }
+                if (leave<TransportMode::kImportance>(&v, &before, {0.5f, u}, &ray)) {
+                    EXPECT_GT(ray.pdf, 0);
+                }
+            }
+        }
+}
+
 /// Numbers of subspaces are names: the weights do not know them.
 TEST(Labels, PermutedWithTheirRowsKeepEveryWeight) {
     const auto scene = testing::glossy();

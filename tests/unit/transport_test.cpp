@@ -21,10 +21,11 @@ using testing::SceneBuilder;
 using testing::whole_frame;
 
 const char* const kAlgorithms[] = {"path", "light", "bdpt"};
+const char* const kAllAlgorithms[] = {"path", "light", "bdpt", "lvcbpt", "spcbpt"};
 
 Partial render(const std::shared_ptr<const Scene>& scene, const std::string& algorithm,
-               const UnitWork& work, uint64_t seed = 5) {
-    RenderSettings settings{algorithm, {}, seed, 5};
+               const UnitWork& work, uint64_t seed = 5, std::map<std::string, std::string> parameters = {}) {
+    RenderSettings settings{algorithm, testing::with_small_training(algorithm, std::move(parameters)), seed, 5};
     Result<std::unique_ptr<Renderer>> renderer = create_with_tables(scene, settings, {});
     if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
     Result<Partial> partial = (*renderer)->render(work, {});
@@ -67,7 +68,7 @@ TEST(Determinism, OneTwoAndEightThreadsMakeTheSameBytes) {
     for (const auto make : {testing::diffuse_box, testing::environment_lit, coplanar_duplicates}) {
         // The scene is built twice: its acceleration structure must come out the same.
         const auto scene = make(), again = make();
-        for (const char* algorithm : kAlgorithms) {
+        for (const char* algorithm : kAllAlgorithms) {
             const UnitWork work = whole_frame(*scene, 4);
             Partial alone;
             tbb::task_arena(1).execute([&] { alone = render(scene, algorithm, work); });
@@ -87,7 +88,7 @@ TEST(Determinism, OneTwoAndEightThreadsMakeTheSameBytes) {
 
 TEST(Determinism, SeedsAndIterationsMakeDifferentSamples) {
     const auto scene = testing::diffuse_box();
-    for (const char* algorithm : {"path", "bdpt"}) {
+    for (const char* algorithm : {"path", "bdpt", "lvcbpt", "spcbpt"}) {
         const Partial a = render(scene, algorithm, whole_frame(*scene, 1));
         const Partial b = render(scene, algorithm, whole_frame(*scene, 1), 6);
         UnitWork later = whole_frame(*scene, 1);
@@ -150,9 +151,12 @@ TEST(Tiles, OfAnySizeKeepTheMean) {
     const std::shared_ptr<const Scene> scene = b.build();
     const Rect crop = scene->frame().crop;
     testing::TestFamily family;
-    for (const std::string algorithm : {"light", "bdpt"}) {
+    for (const std::string algorithm : {"light", "bdpt", "lvcbpt", "spcbpt"}) {
+        // Tables per tile, so they are poor ones, and caches of a few hundred paths.
+        std::map<std::string, std::string> poor;
+        if (algorithm == "lvcbpt" || algorithm == "spcbpt") poor = {{"training-paths", "200"}, {"cache", "300"}};
         const auto tiled = [&](uint64_t seed) {
-            Partial sum = render(scene, algorithm, whole_frame(*scene, 1), seed);
+            Partial sum = render(scene, algorithm, whole_frame(*scene, 1), seed, poor);
             sum.camera.assign(sum.camera.size(), 0);
             sum.splats.clear();
             sum.samples_per_pixel = 4;
@@ -163,7 +167,7 @@ TEST(Tiles, OfAnySizeKeepTheMean) {
                                     std::min(y0 + 5, crop.height())};
                     const uint64_t paths = 4 * uint64_t(tile.area());
                     const Partial part =
-                        render(scene, algorithm, {0, 4, 0, tile, sum.light_paths, paths}, seed);
+                        render(scene, algorithm, {0, 4, 0, tile, sum.light_paths, paths}, seed, poor);
                     sum.light_paths += paths;
                     for (int64_t i = 0; i < tile.area(); ++i) {
                         const int64_t p = crop.index(tile.x0 + int(i % tile.width()),
