@@ -36,7 +36,7 @@ struct BdptContribution {
     const PathVertex *y = nullptr, *z = nullptr;
     Vec3 position, normal;  ///< Of x_0; for an infinite light a point outside of the scene and the direction of travel.
     uint32_t emitter = 0;
-    Vec2 film;              ///< t = 1 only.
+    Vec2 film;              ///< Connections to the lens only (t = 1, s >= 2).
 };
 
 /// Traces one camera sample and one light sub-path and calls contribute(contribution, view) for everything that they give.
@@ -101,7 +101,7 @@ struct BdptAlgorithm {
             context, [](const PathVertex*, int) {},
             [&](const BdptContribution& c, const PathView& view) {
                 const Rgb weighted = c.value * float(mis_weight(view, {TechniqueKind::kConnect, c.s}, selection, heuristic));
-                if (c.t == 1)
+                if (c.t == 1 && c.s > 0)  // not the sky behind the first camera ray
                     context.splat(c.film, weighted);
                 else
                     sum += weighted;

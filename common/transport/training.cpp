@@ -154,7 +154,7 @@ Result<TrainingData> trace_training(const Scene& scene, const RenderSettings& se
                     context, [&](const PathVertex* y, int count) { keep_light_path(y, count, context.max_edges, &data); },
                     [&](const BdptContribution& found, PathView& view) {
                         // A light path may land in any pixel, a camera sample in one: the scale of algorithms.md 0, N1.
-                        const bool splat = found.t == 1;
+                        const bool splat = found.t == 1 && found.s > 0;
                         const double scale = splat ? 1 / double(crop.area()) : 1;
                         const uint32_t block = splat ? blocks.at(int(found.film.x), int(found.film.y)) : camera_block;
                         Reservoir& reservoir = splat ? from_light : from_camera;

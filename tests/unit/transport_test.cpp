@@ -353,19 +353,33 @@ TEST(Roulette, CanBeSwitchedOff) {
     EXPECT_EQ(partial->counters.vertices, partial->counters.camera_samples * 21);
 }
 
-/// The three algorithms in a few seconds; tests/statistical does the same per path length on many
+/// Every pixel of a view of nothing but the sky holds its radiance, whichever technique an escaped first ray is taken for.
+TEST(Means, TheSkyAloneFillsEveryPixel) {
+    SceneBuilder b;
+    b.description().film.width = b.description().film.height = 16;
+    b.description().infinite_lights.push_back({.radiance = Rgb(0.5f)});
+    b.sphere({0, 0, -50}, 0.01f, b.diffuse(Rgb(0.5f)));  // behind the camera
+    b.look({0, 0, 0}, {0, 0, 1}, 60);
+    const auto scene = b.build();
+    for (const char* algorithm : kAllAlgorithms)
+        for (const double v : testing::catalog_image(scene, algorithm, 5, 2)(3)) EXPECT_NEAR(v, 0.5, 1e-6) << algorithm;
+}
+
+/// All algorithms in a few seconds; tests/statistical does the same per path length on many
 /// scenes.
-TEST(Means, OfTheThreeAlgorithmsAgree) {
+TEST(Means, OfAllAlgorithmsAgree) {
     testing::TestFamily family;
-    const auto scene = testing::diffuse_box();
-    const Rect crop = scene->frame().crop;
-    std::vector<testing::RegionMeans> estimates;
-    for (const char* algorithm : kAlgorithms)
-        estimates.push_back(testing::replicate(testing::catalog_image(scene, algorithm, 5, 8), crop,
-                                               32, 1000 * (estimates.size() + 1)));
-    for (size_t i = 0; i < 3; ++i)
-        EXPECT_TRUE(testing::compare(estimates[i], estimates[(i + 1) % 3],
-                                     std::string(kAlgorithms[i]) + " and the next", &family));
+    for (const auto make : {testing::diffuse_box, testing::environment_lit}) {
+        const auto scene = make();
+        const Rect crop = scene->frame().crop;
+        std::vector<testing::RegionMeans> estimates;
+        for (const char* algorithm : kAllAlgorithms)
+            estimates.push_back(testing::replicate(testing::catalog_image(scene, algorithm, 5, 8), crop,
+                                                   32, 1000 * (estimates.size() + 1)));
+        for (size_t i = 0; i < estimates.size(); ++i)
+            EXPECT_TRUE(testing::compare(estimates[i], estimates[(i + 1) % estimates.size()],
+                                         std::string(kAllAlgorithms[i]) + " and the next", &family));
+    }
     family.check();
 }
 
