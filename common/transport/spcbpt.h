@@ -63,8 +63,10 @@ struct SubspaceSelection {
     }
 };
 
+/// A selection with fewer techniques (connect_factor 0) makes an algorithm of those that remain.
+template <class Selection = SubspaceSelection>
 struct SpcbptAlgorithm {
-    SubspaceSelection selection;
+    Selection selection;
     Heuristic heuristic = Heuristic::kBalance;
     int connections = 3;         ///< N
     uint64_t minimum_paths = 1;  ///< Of a unit's cache.
