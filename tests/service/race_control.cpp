@@ -18,13 +18,14 @@ namespace lightloom {
 namespace {
 
 char racy_bytes[256];
+volatile size_t racy_size = sizeof racy_bytes;  // not a constant: the copy must be a call
 
 void racy_plain_store(int round) { racy_bytes[0] = char(racy_bytes[0] + round); }
 
 void racy_copy(int round) {
     char source[sizeof racy_bytes];
     std::memset(source, round, sizeof source);
-    std::memcpy(racy_bytes, source, sizeof source);
+    std::memcpy(racy_bytes, source, racy_size);
 }
 
 class RacyService final : public v1::JobService::Service {
