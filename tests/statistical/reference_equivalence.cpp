@@ -3,7 +3,8 @@
 //
 //   reference_equivalence SHARED_DIR [--only house,door] [--algorithms path,bdpt] [--seconds 60] [--json OUT.jsonl]
 //   reference_equivalence SHARED_DIR --own             also our algorithms against each other
-//   reference_equivalence SHARED_DIR --missing         what bdpt can sample by hits only, on the sds scenes
+//   reference_equivalence SHARED_DIR --spectral        instead: RGB against spectra, which the references are made with
+//   reference_equivalence SHARED_DIR --missing         instead: what bdpt can sample by hits only, on the sds scenes
 //
 // SHARED_DIR holds scenes/NAME/scene.pbrt, refs/NAME.exr and refs/refs.json. The intervals are two-sided at 95 %,
 // Sidak-corrected over all scenes and algorithms (and regions), from the spread of independent group images, and include the
@@ -13,9 +14,13 @@
 
 #include "tests/statistical/reference_equivalence.h"
 
+#include <tbb/global_control.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <map>
 
 #include "common/film/exr_io.h"
 #include "common/film/metrics.h"
@@ -123,6 +128,11 @@ int run(const Options& options) {
                 "regions (ratio +- half width)");
     for (const auto& [name, entry] : refs.items()) {
         if (!options.only.empty() && std::find(options.only.begin(), options.only.end(), name) == options.only.end()) continue;
+        if (options.spectral) {
+            if (const Status status = print_spectral_ratio(options, name, entry.at("resolution")); !status.ok())
+                return failed(name, status);
+            continue;
+        }
         auto loaded = load_scene(options, name, entry.at("resolution"));
         if (!loaded.ok()) return failed(name, loaded.status());
         std::map<std::string, Mean> means;
@@ -166,10 +176,14 @@ int main(int argc, char** argv) {
     app.add_option("--bound", options.bound, "of the image mean");
     app.add_option("--region-bound", options.region_bound, "of a region's mean");
     app.add_option("--seed", options.seed);
+    app.add_option("--threads", options.threads, "0: all");
     app.add_option("--json", options.json, "one object per line");
     app.add_option("--pictures", options.pictures, "directory for the image and the signed error");
     app.add_flag("--own", options.own, "also compare light with what bdpt and it have in common");
     app.add_flag("--missing", options.missing, "only list the energy that bdpt can make by hits alone");
+    app.add_flag("--spectral", options.spectral, "only compare rendering in RGB with rendering in spectra");
     CLI11_PARSE(app, argc, argv);
+    const size_t all = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, options.threads > 0 ? options.threads : all);
     return run(options);
 }

@@ -21,7 +21,8 @@ struct Options {
     std::vector<std::string> only, algorithms{"path", "bdpt"};
     double seconds = 60, bound = 0.01, region_bound = 0.05;
     uint64_t seed = 1;
-    bool own = false, missing = false;
+    size_t threads = 0;  ///< 0: all.
+    bool own = false, missing = false, spectral = false;
 };
 
 /// Upper quantile of the normal distribution.
@@ -83,5 +84,9 @@ Result<Interval> light_against_bdpt(const Options& options, const LoadedScene& l
 
 /// Prints the energy of paths that no technique of `bdpt` but hitting the emitter can make (specular - diffuse - specular).
 Status print_missing_energy(const Options& options);
+
+/// Prints the mean of `path` in RGB over that of `path` in spectra, as pbrt-v4 makes them from RGB: the whole with its standard
+/// error, its channels, and nine regions.
+Status print_spectral_ratio(const Options& options, const std::string& name, const std::string& resolution);
 
 }  // namespace lightloom::equivalence

@@ -104,7 +104,7 @@ Status print_missing_energy(const Options& options) {
         const double own = total->parts[kImage].mean(), only = hits->parts[kImage].mean();
         const double all = points ? own + only : own;
         const double error = sidak_factor(names.size()) * hits->parts[kImage].standard_error();
-        std::printf("%-26s %-18s %10.5f %12.5f  %.4f [%.4f, %.4f]\n", name.c_str(), points ? "points (missing)" : "can be hit", own,
+        std::printf("%-26s %-18s %10.5f %12.6f  %.5f [%.5f, %.5f]\n", name.c_str(), points ? "points (missing)" : "can be hit", own,
                     only, only / all, (only - error) / all, (only + error) / all);
         std::fflush(stdout);
         if (!options.json.empty())
