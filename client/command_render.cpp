@@ -92,7 +92,7 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count) {
     for (std::jthread& thread : running) thread.request_stop();
     running.clear();
     if (!ended.ok()) return report_error(ended.status());
-    return fetch(jobs, *ended, options, times);
+    return fetch(jobs, *ended, options, times, AfterFetch::kImageGoes);
 }
 
 }  // namespace

@@ -68,7 +68,7 @@ int submit_job(const ServiceOptions& options) {
     const auto ended = watch(port, job->job_id, options.job.quiet, true);
     times.wait_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     if (!ended.ok()) return service_error(options, ended.status());
-    return fetch(port, *ended, options.job, times);
+    return fetch(port, *ended, options.job, times, AfterFetch::kImageStays);
 }
 
 int list_jobs(const ServiceOptions& options) {
@@ -103,7 +103,7 @@ int fetch_job(const ServiceOptions& options) {
     if (job->state != JobState::kSucceeded)
         return report_error(failed_precondition("job " + options.job_id + " is " + std::string(to_string(job->state)) +
                                                 (job->message.empty() ? "" : ": " + job->message)));
-    return fetch(port, *job, output, {});
+    return fetch(port, *job, output, {}, AfterFetch::kImageStays);
 }
 
 int cancel_job(const ServiceOptions& options) {
@@ -129,7 +129,8 @@ void add_service_commands(CLI::App& app, int* exit_code) {
         command->footer(kSubmitFooter);
         add_render_settings(*command, options->job);
         add_output_settings(*command, options->job);
-        command->add_flag("--detach", options->detach, "Print the job's id and return at once");
+        command->add_flag("--detach", options->detach, "Print the job's id and return at once")
+            ->excludes(command->get_option("--half"));  // `fetch` has its own
     }
     {
         const auto [command, options] = add("watch", "Show a job's progress until it ends", watch_job);
@@ -140,6 +141,7 @@ void add_service_commands(CLI::App& app, int* exit_code) {
         const auto [command, options] = add("fetch", "Write the image and manifest of a finished job", fetch_job);
         command->add_option("JOB", options->job_id, "Id from `submit --detach` or `list`")->required();
         command->add_option("-o,--output", options->job.output, "EXR to write (default: JOB.exr)");
+        add_half_setting(*command, options->job);
         command->add_option("--png", options->job.png, "Also write an 8-bit sRGB picture");
         command->add_option("--json", options->job.json, "Write statistics to this file");
         command->add_flag("-q,--quiet", options->job.quiet, "Errors only");

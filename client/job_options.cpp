@@ -28,13 +28,18 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
     command.add_option("--seed", options.seed, "Another seed makes another, independent image")->capture_default_str();
 }
 
+CLI::Option* add_half_setting(CLI::App& command, JobOptions& options) {
+    return command.add_flag("--half", options.half,
+                            "Write colour as half floats; refused where a value is beyond their range, and nothing is lost");
+}
+
 void add_output_settings(CLI::App& command, JobOptions& options) {
     command.add_option("-o,--output", options.output, "EXR to write; the manifest goes beside it (default: SCENE's name.exr)");
     command.add_option("--png", options.png, "Also write an 8-bit sRGB picture");
     command.add_option("--exposure", options.exposure, "Stops by which the picture is brightened (the EXR never is)")
         ->check(CLI::Range(-30.0, 30.0));
     command.add_flag("--layers", options.layers, "Also store albedo, normal and depth of what the camera sees first");
-    command.add_flag("--half", options.half, "Store colour as half floats; fails where a value is beyond their range");
+    add_half_setting(command, options);
     auto* spp = command.add_option("--spp", options.samples_per_pixel, "Samples per pixel (default: the scene's)")
                     ->check(CLI::Range(1u, 1u << 24));
     command.add_option("--time", options.time_seconds,
@@ -86,7 +91,6 @@ Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
         spec.samples_per_pixel = uint32_t(std::max(1, scene.imported.description.samples_per_pixel));
     spec.max_depth = options.max_depth;
     spec.first_hit_layers = options.layers;
-    spec.half_float = options.half;
     if (!options.resolution.empty()) {
         int used = 0;
         const bool parsed = std::sscanf(options.resolution.c_str(), "%6dx%6d%n", &spec.width, &spec.height, &used) == 2;

@@ -30,13 +30,13 @@ std::string random_id() {
     return text;
 }
 
-Status write_statistics(const std::string& path, const JobInfo& job, const ClientTimes& times) {
+Status write_statistics(const std::string& path, const JobInfo& job, const Digest& digest, const ClientTimes& times) {
     const double seconds = job.render_seconds > 0 ? job.render_seconds : 1e-9;
     const Json json = {
         {"job", job.job_id},
         {"algorithm", job.spec.algorithm},
         {"state", to_string(job.state)},
-        {"sha256", job.image_digest.hex()},
+        {"sha256", digest.hex()},
         {"samples_per_pixel", job.samples_per_pixel_done},
         {"width", job.spec.frame.crop.width()},
         {"height", job.spec.frame.crop.height()},
@@ -69,6 +69,28 @@ void report_dropped(const JobInfo& job, const std::string& manifest) {
     if (json.is_discarded() || !json.contains("dropped")) return;
     for (const Json& sample : json["dropped"]["first"])
         std::fprintf(stderr, "  %s\n", sample.value("replay", std::string()).c_str());
+}
+
+/// An image as it is written: the EXR, its manifest, and the EXR's digest, which the manifest names.
+struct ImageFiles {
+    std::string exr, manifest;
+    Digest digest;
+};
+
+/// The same image with half colours.
+Result<ImageFiles> as_half(const ImageFiles& files, const std::string& name) {
+    const auto image = decode_exr(files.exr, name);
+    if (!image.ok()) return image.status();
+    auto exr = encode_exr(*image, ExrPixelType::kHalf);
+    if (!exr.ok()) return exr.status();
+    Json json = Json::parse(files.manifest, nullptr, false);
+    if (json.is_discarded() || !json["image"].is_object()) return data_loss("the manifest that arrived is damaged; fetch it again");
+    const Digest digest = sha256(*exr);
+    json["image"]["sha256"] = digest.hex();
+    json["image"]["size_bytes"] = exr->size();
+    json["image"]["colour"] = "half";
+    json["image"]["float_sha256"] = files.digest.hex();
+    return ImageFiles{*std::move(exr), json.dump(1) + "\n", digest};
 }
 
 }  // namespace
@@ -137,7 +159,9 @@ Result<JobInfo> submit(JobPort& port, const JobSpec& spec) {
     const std::string request_id = random_id();
     for (int attempt = 0;; ++attempt) {
         auto job = port.submit_job(request_id, spec);
-        if (job.ok() || job.status().code() != StatusCode::kUnavailable || attempt == 3) return job;
+        const StatusCode code = job.status().code();
+        const bool lost = code == StatusCode::kUnavailable || code == StatusCode::kDeadlineExceeded;
+        if (job.ok() || !lost || attempt == 3) return job;
         std::this_thread::sleep_for(std::chrono::milliseconds(200 << attempt));
     }
 }
@@ -163,34 +187,49 @@ Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool
     return job;
 }
 
-int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTimes times) {
+int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTimes times, AfterFetch after) {
     const auto begin = Clock::now();
-    const auto image = port.image(job.job_id, ImageKind::kFinal);
+    auto image = port.image(job.job_id, ImageKind::kFinal);
     if (!image.ok()) return report_error(image.status());
     if (sha256(*image) != job.image_digest)
         return report_error(data_loss("the image that arrived differs from the one that was written; fetch it again"));
-    const auto manifest = port.manifest(job.job_id);
+    auto manifest = port.manifest(job.job_id);
     if (!manifest.ok()) return report_error(manifest.status());
-    const std::filesystem::path output = output_path(options);
+    ImageFiles files{*std::move(image), *std::move(manifest), job.image_digest};
+    std::filesystem::path output = output_path(options);
+    Status half_refused;
+    if (options.half) {
+        if (auto halves = as_half(files, output.string()); halves.ok()) {
+            files = *std::move(halves);
+        } else if (after == AfterFetch::kImageStays) {
+            return report_error(failed_precondition(halves.status().message() + "; nothing is lost: `lightloom fetch " +
+                                                    job.job_id + "` without --half writes it as float"));
+        } else {
+            output.replace_extension(".float.exr");
+            half_refused = failed_precondition(halves.status().message() +
+                                               "; so that nothing is lost it was written as float to " + output.string());
+        }
+    }
     std::filesystem::path manifest_path = output;
     manifest_path.replace_extension(".manifest.json");
-    Status status = write_file_atomically(output.string(), *image);
-    if (status.ok()) status = write_file_atomically(manifest_path.string(), *manifest);
+    Status status = write_file_atomically(output.string(), files.exr);
+    if (status.ok()) status = write_file_atomically(manifest_path.string(), files.manifest);
     if (status.ok() && !options.png.empty()) {
-        const auto decoded = decode_exr(*image, output.string());
+        const auto decoded = decode_exr(files.exr, output.string());
         status = decoded.ok() ? write_png(options.png, decoded->color, options.exposure) : decoded.status();
     }
     times.fetch_seconds = seconds_since(begin);
-    if (status.ok() && !options.json.empty()) status = write_statistics(options.json, job, times);
+    if (status.ok() && !options.json.empty()) status = write_statistics(options.json, job, files.digest, times);
+    if (status.ok()) status = half_refused;
     if (!status.ok()) return report_error(status);
     if (!options.quiet) {
         std::printf("%s  %llu spp in %s  sha256 %s\n", output.string().c_str(),
                     static_cast<unsigned long long>(job.samples_per_pixel_done),
-                    duration_text(job.render_seconds).c_str(), job.image_digest.hex().c_str());
+                    duration_text(job.render_seconds).c_str(), files.digest.hex().c_str());
         if (!options.png.empty()) std::printf("%s\n", options.png.c_str());
     }
     if (job.dropped_samples > 0) {
-        report_dropped(job, *manifest);
+        report_dropped(job, files.manifest);
         if (options.strict) return kDroppedSamples;
     }
     return kSuccess;

@@ -25,7 +25,10 @@ Status upload_scene(JobPort& port, const LocalScene& scene);
 Result<JobInfo> submit(JobPort& port, const JobSpec& spec);
 /// Watches until the end; on an interrupt, cancels the job if `cancel_on_interrupt` is set.
 Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool cancel_on_interrupt);
-/// Fetches image and manifest of a succeeded job and writes them as options ask; reports dropped samples. The exit code.
-int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTimes times);
+/// Whether the image can be fetched again: not from a service that ends with this process.
+enum class AfterFetch { kImageStays, kImageGoes };
+/// Fetches image and manifest of a succeeded job and writes them as options ask; reports dropped samples. Where --half is
+/// refused, an image that would be lost is written as float beside OUTPUT. The exit code.
+int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTimes times, AfterFetch after);
 
 }  // namespace lightloom::client

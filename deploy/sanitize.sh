@@ -2,7 +2,8 @@
 # Builds with sanitizers and runs what each of them is for:
 #
 #   asan   AddressSanitizer, LeakSanitizer, UndefinedBehaviorSanitizer: the whole suite without the statistical tests
-#   tsan   ThreadSanitizer: the service tests, the work plan and the transport of light on several threads
+#   tsan   ThreadSanitizer: the service tests, the work plan and the transport of light on several threads; and a control that
+#          races on purpose in handlers of gRPC and fails the run unless that is reported
 #
 #   deploy/sanitize.sh                 both
 #   deploy/sanitize.sh tsan -R Workers one of them; what follows goes to ctest
@@ -29,8 +30,9 @@ for preset in "${presets[@]}"; do
     tests=(-LE statistical)
     targets=(all)
     if [ "$preset" = tsan ]; then
-        tests=(-R '^(coordinator|worker|process|work|transport)_test\.')
-        targets=(coordinator_test worker_test process_test work_test transport_test)
+        tests=(-R '^((coordinator|bookkeeping|client|worker|process|work|transport)_test|race_control)\.')
+        targets=(coordinator_test bookkeeping_test client_test worker_test process_test work_test transport_test
+                 race_control)
     fi
     "${run[@]}" cmake --build --preset "$preset" --target "${targets[@]}"
     reports="$root/build/$preset/reports"

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <random>
@@ -39,10 +40,12 @@ bool same_request(const JobSpec& a, const JobSpec& b) {
     return a.algorithm == b.algorithm && a.parameters == b.parameters && a.seed == b.seed &&
            a.samples_per_pixel == b.samples_per_pixel && a.time_limit_seconds == b.time_limit_seconds &&
            a.max_depth == b.max_depth && a.width == b.width && a.height == b.height && a.scene_root == b.scene_root &&
-           a.first_hit_layers == b.first_hit_layers && a.half_float == b.half_float;
+           a.first_hit_layers == b.first_hit_layers;
 }
 
-Status no_job(const std::string& id) { return not_found("no job " + id + "; `lightloom list` shows those that exist"); }
+Status no_job(const std::string& id) {
+    return not_found("no job " + id + "; `lightloom list` shows those that exist (the oldest that ended are forgotten)");
+}
 
 }  // namespace
 
@@ -66,9 +69,9 @@ TimePoint Coordinator::after(double seconds) const {
     return options_.clock() + std::chrono::duration_cast<TimePoint::duration>(std::chrono::duration<double>(seconds));
 }
 
-Coordinator::JobRecord* Coordinator::find_job(const std::string& job_id) const {
+std::shared_ptr<Coordinator::JobRecord> Coordinator::find_job(const std::string& job_id) const {
     for (const auto& job : jobs_) {
-        if (job->id == job_id) return job.get();
+        if (job->id == job_id) return job;
     }
     return nullptr;
 }
@@ -133,9 +136,10 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
 
     const std::lock_guard lock(mutex_);
     if (auto answer = repeated()) return *answer;
-    if (jobs_.size() >= options_.max_jobs)
-        return Status(StatusCode::kResourceExhausted, "the coordinator holds as many jobs as it may");
-    auto record = std::make_unique<JobRecord>();
+    const auto unended = std::count_if(jobs_.begin(), jobs_.end(), [](const auto& j) { return !is_terminal(j->state); });
+    if (size_t(unended) >= options_.max_jobs)
+        return Status(StatusCode::kResourceExhausted, "the coordinator holds as many jobs as it may; submit again when some ended");
+    auto record = std::make_shared<JobRecord>();
     JobRecord& job = *record;
     job.id = new_id("job");
     job.request_id = request_id;
@@ -147,13 +151,14 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     jobs_.push_back(std::move(record));
     requests_[request_id] = &job;
     spdlog::info("{}: accepted, {} {}", job.id, spec.algorithm, job.spec.scene_root.hex().substr(0, 12));
+    ++job.running_tasks;
     job.prepare_task = std::jthread([this, &job](std::stop_token stop) { prepare(job, stop); });
     return snapshot(job);
 }
 
 Result<JobInfo> Coordinator::get_job(const std::string& job_id) const {
     const std::lock_guard lock(mutex_);
-    const JobRecord* job = find_job(job_id);
+    const auto job = find_job(job_id);
     return job ? Result<JobInfo>(snapshot(*job)) : no_job(job_id);
 }
 
@@ -166,7 +171,7 @@ std::vector<JobInfo> Coordinator::list_jobs() const {
 
 Result<JobInfo> Coordinator::cancel_job(const std::string& job_id) {
     const std::lock_guard lock(mutex_);
-    JobRecord* job = find_job(job_id);
+    const auto job = find_job(job_id);
     if (!job) return no_job(job_id);
     if (!is_terminal(job->state)) {
         job->prepare_task.request_stop();
@@ -177,7 +182,7 @@ Result<JobInfo> Coordinator::cancel_job(const std::string& job_id) {
 
 Result<JobInfo> Coordinator::wait_job(const std::string& job_id, uint64_t after_revision, double timeout_seconds) const {
     std::unique_lock lock(mutex_);
-    const JobRecord* job = find_job(job_id);
+    const std::shared_ptr<const JobRecord> job = find_job(job_id);
     if (!job) return no_job(job_id);
     job_changed_.wait_for(lock, std::chrono::duration<double>(timeout_seconds),
                           [&] { return closing_ || job->revision > after_revision; });
@@ -191,7 +196,7 @@ Result<std::string> Coordinator::image(const std::string& job_id, ImageKind kind
     float scale = 1;
     {
         const std::lock_guard lock(mutex_);
-        const JobRecord* job = find_job(job_id);
+        const auto job = find_job(job_id);
         if (!job) return no_job(job_id);
         if (kind == ImageKind::kFinal && job->state != JobState::kSucceeded)
             return failed_precondition("job " + job_id + " is " + std::string(to_string(job->state)) +
@@ -210,7 +215,7 @@ Result<std::string> Coordinator::manifest(const std::string& job_id) const {
     std::filesystem::path directory;
     {
         const std::lock_guard lock(mutex_);
-        const JobRecord* job = find_job(job_id);
+        const auto job = find_job(job_id);
         if (!job) return no_job(job_id);
         if (job->state != JobState::kSucceeded)
             return failed_precondition("job " + job_id + " is " + std::string(to_string(job->state)) +
@@ -232,10 +237,13 @@ JobInfo Coordinator::snapshot(const JobRecord& job) const {
         info.unit_total = job.units->unit_total();
         info.unit_done = job.units->done_count();
         info.unit_leased = job.units->leased_count();
+    } else {
+        info.unit_total = job.ended_units.total;
+        info.unit_done = job.ended_units.done;
     }
     info.samples_per_pixel_done = job.merged_iterations;
     const bool ended = is_terminal(job.state);
-    if (job.state != JobState::kPreparing && !(ended && !job.units))
+    if (job.prepared != TimePoint())
         info.prepare_seconds = seconds_between(job.created, job.prepared);
     if (job.rendering) {
         const bool over = ended || job.state == JobState::kFinishing;
@@ -265,8 +273,14 @@ void Coordinator::end_job(JobRecord& job, JobState state) {
     if (job.state == JobState::kPreparing || job.state == JobState::kRunning) job.finishing = options_.clock();
     job.state = state;
     job.ended = options_.clock();
-    if (job.units) job.units->close();
-    if (state != JobState::kSucceeded) job.reducer.reset();
+    if (job.units) {
+        job.ended_units = {job.units->unit_total(), job.units->done_count()};
+        discarded_.push_back(std::make_shared<UnitTable>(*std::move(job.units)));
+        job.units.reset();
+    }
+    if (job.reducer) discarded_.push_back(std::move(job.reducer));
+    discarded_.push_back(std::make_shared<std::vector<ImageLayer>>(std::move(job.layers)));
+    job.reducer.reset();
     spdlog::info("{}: {}{}{}", job.id, to_string(state), job.message.empty() ? "" : ": ", job.message);
     changed(job);
 }
@@ -284,6 +298,21 @@ void Coordinator::unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Fai
     if (failures.workers >= kMaxFailedWorkers || failures.total >= kMaxUnitFailures || why.code() == StatusCode::kInvalidArgument)
         fail_job(job, {why.code(), "unit " + unit + ": " + why.message()});
     work_changed_.notify_all();
+}
+
+void Coordinator::forget_old_jobs() {
+    size_t ended = 0;
+    for (const auto& job : jobs_) ended += is_terminal(job->state);
+    if (ended <= options_.kept_jobs) return;
+    size_t surplus = ended - options_.kept_jobs;
+    std::erase_if(jobs_, [&](const std::shared_ptr<JobRecord>& job) {
+        if (surplus == 0 || !is_terminal(job->state) || job->running_tasks > 0) return false;
+        --surplus;
+        requests_.erase(job->request_id);
+        spdlog::info("{}: forgotten; {} newer jobs have ended", job->id, options_.kept_jobs);
+        discarded_.push_back(job);
+        return true;
+    });
 }
 
 void Coordinator::tick(std::stop_token stop) {
@@ -305,6 +334,13 @@ void Coordinator::tick(std::stop_token stop) {
                 finish_if_complete(*job);
             }
         }
+        forget_old_jobs();
+        if (discarded_.empty()) continue;
+        auto garbage = std::move(discarded_);
+        discarded_.clear();
+        lock.unlock();
+        garbage.clear();
+        lock.lock();
     }
 }
 

@@ -39,7 +39,8 @@ struct CoordinatorOptions {
     std::optional<uint64_t> shuffle_seed;          ///< Lease units in a random order (tests).
     std::function<TimePoint()> clock = [] { return std::chrono::steady_clock::now(); };
     uint64_t waiting_bytes = uint64_t(512) << 20;  ///< Room for partials that wait for earlier groups.
-    size_t max_jobs = 10000;
+    size_t max_jobs = 10000;  ///< That have not ended.
+    size_t kept_jobs = 1000;  ///< Ended jobs that are remembered; the oldest are forgotten, their files stay.
 };
 
 struct WorkerStatus {
@@ -90,7 +91,8 @@ class Coordinator {
     struct WorkerRecord;
     struct JobRecord;
 
-    JobRecord* find_job(const std::string& job_id) const;
+    /// Shared, because a job may be forgotten while a caller works without the mutex.
+    std::shared_ptr<JobRecord> find_job(const std::string& job_id) const;
     WorkerRecord* find_worker(const std::string& worker_id) const;
     TimePoint after(double seconds) const;
     static double seconds_between(TimePoint a, TimePoint b) { return std::chrono::duration<double>(b - a).count(); }
@@ -101,7 +103,11 @@ class Coordinator {
     void fail_job(JobRecord& job, const Status& why);
     void end_job(JobRecord& job, JobState state);
     void prepare(JobRecord& job, std::stop_token stop);
+    void plan_units(JobRecord& job, JobSpec spec, SceneFacts facts);
+    void size_window(JobRecord& job) const;
     void finish(JobRecord& job);
+    void write_results(JobRecord& job);
+    void forget_old_jobs();
     void finish_if_complete(JobRecord& job);
     void unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Failures failures, const Status& why);
     void tick(std::stop_token stop);
@@ -111,7 +117,8 @@ class Coordinator {
     AssetStore assets_;
     mutable std::mutex mutex_;
     mutable std::condition_variable work_changed_, job_changed_;
-    std::vector<std::unique_ptr<JobRecord>> jobs_;            // oldest first
+    std::vector<std::shared_ptr<JobRecord>> jobs_;            // oldest first
+    std::vector<std::shared_ptr<void>> discarded_;            // large things that the ticker frees without the mutex
     std::map<std::string, JobRecord*> requests_;              // by request id
     std::vector<std::unique_ptr<WorkerRecord>> workers_;      // never removed: units refer to them by index
     bool closing_ = false;

@@ -2,7 +2,8 @@
 
 #include <spdlog/spdlog.h>
 
-#include <charconv>
+#include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <new>
 
@@ -14,11 +15,7 @@
 namespace lightloom {
 namespace {
 
-/// How many groups may be open: what fits into the room for waiting partials, within reason.
-uint32_t group_window(const FrameLayout& frame, bool splats, uint64_t waiting_bytes) {
-    const uint64_t group_bytes = uint64_t(frame.crop.area()) * (splats ? 56 : 24);
-    return uint32_t(std::clamp<uint64_t>(waiting_bytes / std::max<uint64_t>(group_bytes, 1), 4, 256));
-}
+constexpr uint64_t kMaxWindow = 256;
 
 std::string utc(std::time_t time) {
     std::tm parts{};
@@ -26,17 +23,6 @@ std::string utc(std::time_t time) {
     char text[32];
     std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
     return text;
-}
-
-/// All parameters with their values, so that the manifest and the EXR say what was rendered even where defaults applied.
-std::map<std::string, std::string> complete_parameters(const AlgorithmInfo& algorithm, const AlgorithmParameters& values) {
-    std::map<std::string, std::string> out;
-    for (size_t i = 0; i < algorithm.parameters.size(); ++i) {
-        char text[64];
-        const auto end = std::to_chars(text, text + sizeof text, values.values[i]).ptr;
-        out[std::string(algorithm.parameters[i].name)] = std::string(text, end);
-    }
-    return out;
 }
 
 }  // namespace
@@ -48,35 +34,71 @@ void Coordinator::prepare(JobRecord& job, std::stop_token stop) {
         spec = job.spec;
     }
     auto facts = options_.read_scene(assets_, spec, stop);
+    if (facts.ok()) {
+        plan_units(job, std::move(spec), *std::move(facts));
+    } else {
+        const std::lock_guard lock(mutex_);
+        fail_job(job, facts.status());
+    }
+    const std::lock_guard lock(mutex_);
+    --job.running_tasks;
+}
+
+void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts) {
+    const FrameLayout frame = facts.frame;
+    Status problem;
+    if (frame.crop.empty() || frame.crop.area() > kMaxPartialPixels)
+        problem = invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) + " pixels");
     const auto algorithm = find_algorithm(spec.algorithm);
     const auto parameters = parse_parameters(**algorithm, spec.parameters);
+    spec.frame = frame;
+    spec.parameters = complete_parameters(**algorithm, *parameters);
+    if (spec.max_depth < 0) spec.max_depth = facts.max_depth;
+
+    // Gigabytes for a large frame: made before anybody has to wait for the mutex.
+    std::optional<UnitTable> units;
+    std::shared_ptr<Reducer> reducer;
+    double unit_light_paths = 0;
+    if (problem.ok()) {
+        const Plan plan(frame, light_paths_per_pixel(**algorithm, *parameters));
+        unit_light_paths = light_paths_per_pixel(**algorithm, *parameters) * plan.max_group_iterations() *
+                           double(frame.crop.area()) / plan.tile_count();
+        units.emplace(plan, spec.samples_per_pixel, 1, options_.shuffle_seed);
+        try {
+            reducer = std::make_shared<Reducer>(frame, plan.tile_count());
+        } catch (const std::bad_alloc&) {  // one job too large must not end the coordinator and all others
+            problem = {StatusCode::kResourceExhausted, "the coordinator has no memory for the sums of a frame this large"};
+        }
+    }
 
     const std::lock_guard lock(mutex_);
     if (job.state != JobState::kPreparing) return;
+    if (!problem.ok()) return fail_job(job, problem);
     job.prepared = options_.clock();
-    if (!facts.ok()) return fail_job(job, facts.status());
-    const FrameLayout& frame = facts->frame;
-    if (frame.crop.empty() || frame.crop.area() > kMaxPartialPixels)
-        return fail_job(job, invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) +
-                                              " pixels"));
-    job.spec.frame = frame;
-    job.spec.parameters = complete_parameters(**algorithm, *parameters);
-    if (job.spec.max_depth < 0) job.spec.max_depth = facts->max_depth;
-    job.exposure_scale = facts->exposure_scale;
-    job.layers = std::move(facts->layers);
-    const double light_paths = light_paths_per_pixel(**algorithm, *parameters);
-    const uint32_t window = group_window(frame, light_paths > 0, options_.waiting_bytes);
-    job.units.emplace(Plan(frame, light_paths), job.spec.samples_per_pixel, window, options_.shuffle_seed);
-    try {
-        job.reducer = std::make_shared<Reducer>(frame, job.units->tile_count());
-    } catch (const std::bad_alloc&) {  // one job too large must not end the coordinator and all others
-        return fail_job(job, {StatusCode::kResourceExhausted, "the coordinator has no memory for the sums of a frame this large"});
-    }
+    job.spec = std::move(spec);
+    job.exposure_scale = facts.exposure_scale;
+    job.layers = std::move(facts.layers);
+    job.units = std::move(units);
+    job.reducer = std::move(reducer);
+    job.unit_light_paths = unit_light_paths;
+    size_window(job);
     job.state = JobState::kRunning;
     spdlog::info("{}: {}x{}, {} tile(s), {} unit(s)", job.id, frame.crop.width(), frame.crop.height(),
                  job.units->tile_count(), job.units->unit_total());
     changed(job);
     work_changed_.notify_all();
+}
+
+void Coordinator::size_window(JobRecord& job) const {
+    // One group is summed as it comes; the partials of those after it wait as they are. How many splats these hold is known
+    // by experience only; before there is any, it is the most that fits into a partial.
+    const double area = double(job.spec.frame.crop.area());
+    double splats = 0;
+    if (job.unit_light_paths > 0)
+        splats = std::min(area, job.splats_per_path.value_or(area) * job.unit_light_paths);
+    const double group_bytes = 3 * sizeof(double) * area + double(job.units->tile_count()) * splats * sizeof(SplatSum);
+    const double waiting_groups = std::floor(double(options_.waiting_bytes) / group_bytes);
+    job.units->set_window(uint32_t(std::min(1 + waiting_groups, double(kMaxWindow))));
 }
 
 void Coordinator::finish_if_complete(JobRecord& job) {
@@ -89,10 +111,17 @@ void Coordinator::finish_if_complete(JobRecord& job) {
     job.finishing = options_.clock();
     job.units->close();
     changed(job);
+    ++job.running_tasks;
     job.finish_task = std::jthread([this, &job] { finish(job); });
 }
 
 void Coordinator::finish(JobRecord& job) {
+    write_results(job);
+    const std::lock_guard lock(mutex_);
+    --job.running_tasks;
+}
+
+void Coordinator::write_results(JobRecord& job) {
     std::shared_ptr<Reducer> reducer;
     JobSpec spec;
     float scale = 1;
@@ -121,13 +150,18 @@ void Coordinator::finish(JobRecord& job) {
         job.image_size = image->size();
         job.merged_groups = reducer->folded_groups();
         job.merged_iterations = reducer->iterations();
+        // What came of groups that are not in the image is not of the image either; what was summed just before freeze() is.
+        job.units->advance(job.merged_groups);
+        manifest.units = job.units->merged();
+        for (const UnitTable::Merged& unit : manifest.units) job.workers.insert(unit.worker);
+        job.dropped = reducer->dropped();
+        std::erase_if(job.dropped_samples, [&](const auto& d) { return d.unit.group >= job.merged_groups; });
         manifest.job = snapshot(job);
         manifest.identity = options_.identity;
         manifest.created_at = job.created_at;
         manifest.finished_at = utc(std::time(nullptr));
         manifest.groups = job.merged_groups;
         manifest.iterations = job.merged_iterations;
-        manifest.units = job.units->merged(job.merged_groups);
         for (const uint32_t index : job.workers) {
             const WorkerRecord& w = *workers_[index];
             manifest.workers.push_back({index, w.id, w.hello.host, w.hello.process_id, w.hello.thread_count});
@@ -147,7 +181,6 @@ void Coordinator::finish(JobRecord& job) {
     const std::lock_guard lock(mutex_);
     if (job.state != JobState::kFinishing) return;
     if (!status.ok()) return fail_job(job, status);
-    job.reducer.reset();
     end_job(job, JobState::kSucceeded);
 }
 

@@ -69,6 +69,7 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
 
 Result<std::vector<UnitLease>> Coordinator::lease_units(const std::string& worker_id, double wait_seconds,
                                                         const std::function<bool()>& cancelled) {
+    if (!(wait_seconds >= 0)) return invalid_argument("a worker waits for 0 or more seconds");
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(std::min(wait_seconds, 5.0));
     std::unique_lock lock(mutex_);
     WorkerRecord* worker = find_worker(worker_id);
@@ -99,7 +100,7 @@ Result<std::vector<UnitReference>> Coordinator::heartbeat(const std::string& wor
     std::vector<UnitReference> revoked;
     std::set<UnitReference> held;
     for (const RunningUnit& item : running) {
-        JobRecord* job = find_job(item.unit.job_id);
+        const auto job = find_job(item.unit.job_id);
         if (!job || job->state != JobState::kRunning ||
             !job->units->renew(item.unit.key, worker->index, after(options_.lease_seconds))) {
             revoked.push_back(item.unit);
@@ -122,7 +123,7 @@ Status Coordinator::release_unit(const std::string& worker_id, const UnitReferen
     WorkerRecord* worker = find_worker(worker_id);
     if (!worker) return no_worker(worker_id);
     worker->held.erase(unit);
-    JobRecord* job = find_job(unit.job_id);
+    const auto job = find_job(unit.job_id);
     if (!job || job->state != JobState::kRunning) return {};
     // What a network did to a worker says nothing about the unit: it costs time only.
     const bool blameless = why.code() == StatusCode::kCancelled || why.code() == StatusCode::kUnavailable ||
@@ -153,10 +154,10 @@ Status Coordinator::goodbye(const std::string& worker_id) {
 
 Result<PartialExpectation> Coordinator::expected_partial(const UnitReference& reference) const {
     const std::lock_guard lock(mutex_);
-    const JobRecord* job = find_job(reference.job_id);
+    const auto job = find_job(reference.job_id);
     if (!job || job->state != JobState::kRunning)
         return not_found("job " + reference.job_id + " is not running (any more)");
-    const WorkUnit* unit = job->units->find(reference.key);
+    const auto unit = job->units->find(reference.key);
     if (!unit) return invalid_argument("job " + reference.job_id + " has leased no such unit");
     return PartialExpectation{job->spec.frame, unit->tile, unit->iteration_count, unit->light_path_count};
 }
@@ -175,7 +176,7 @@ Result<SubmitAck> Coordinator::submit_payload(const std::string& worker_id, cons
     WorkerRecord* worker = find_worker(worker_id);
     if (!worker) return no_worker(worker_id);
     worker->held.erase(unit);
-    if (JobRecord* job = find_job(unit.job_id); job && job->state == JobState::kRunning) {
+    if (const auto job = find_job(unit.job_id); job && job->state == JobState::kRunning) {
         ++job->rejected;
         unit_failed(*job, unit.key, job->units->fail(unit.key, worker->index), partial.status());
     }
@@ -185,7 +186,7 @@ Result<SubmitAck> Coordinator::submit_payload(const std::string& worker_id, cons
 Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, const UnitReference& reference,
                                               const Digest& digest, Partial partial) {
     std::shared_ptr<Reducer> reducer;
-    JobRecord* job = nullptr;
+    std::shared_ptr<JobRecord> job;
     uint32_t index = 0;
     WorkUnit unit;
     {
@@ -198,7 +199,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
         if (!job || job->state != JobState::kRunning)
             return SubmitAck{SubmitOutcome::kStale, "job " + reference.job_id + " is not running (any more)"};
         index = worker->index;
-        const WorkUnit* known = job->units->find(reference.key);
+        const auto known = job->units->find(reference.key);
         switch (job->units->complete(reference.key, index, digest)) {
             case UnitTable::Completion::kUnknown:
                 return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};
@@ -221,14 +222,27 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     const UnitCounters counters = partial.counters;
     const uint64_t dropped = partial.dropped_count;
     const std::vector<DroppedSample> samples = partial.dropped;
-    const Status merged = reducer->add(unit, std::move(partial));
+    const double splats_per_path = unit.light_path_count > 0 ? double(partial.splats.size()) / double(unit.light_path_count) : 0;
+    const auto refused = reducer->add(unit, std::move(partial));
 
     const std::lock_guard lock(mutex_);
     if (job->state != JobState::kRunning) return SubmitAck{SubmitOutcome::kStale, "the job ended meanwhile"};
-    if (!merged.ok()) {
+    if (!refused.ok()) {
+        fail_job(*job, refused.status());
+        return SubmitAck{SubmitOutcome::kRejected, refused.status().message()};
+    }
+    Status own;
+    for (const Reducer::Refusal& refusal : *refused) {
+        if (job->state != JobState::kRunning) break;  // failed by the one before
         ++job->rejected;
-        unit_failed(*job, unit.key, job->units->reopen(unit.key), merged);
-        return SubmitAck{SubmitOutcome::kRejected, merged.message()};
+        if (refusal.unit == unit.key) own = refusal.why;
+        unit_failed(*job, refusal.unit, job->units->reopen(refusal.unit), refusal.why);
+    }
+    if (!own.ok()) return SubmitAck{SubmitOutcome::kRejected, own.message()};
+    if (job->state != JobState::kRunning) return SubmitAck{SubmitOutcome::kStale, "the job failed meanwhile: " + job->message};
+    if (unit.light_path_count > 0 && splats_per_path > job->splats_per_path.value_or(-1)) {
+        job->splats_per_path = splats_per_path;
+        size_window(*job);
     }
     ++workers_[index]->merged;
     job->workers.insert(index);

@@ -32,7 +32,12 @@ struct Coordinator::JobRecord {
     std::string created_at;  ///< UTC, for the manifest only.
     float exposure_scale = 1;
     std::vector<ImageLayer> layers;  ///< First-hit layers, until the image is written.
-    std::optional<UnitTable> units;
+    std::optional<UnitTable> units;    ///< Until the job ends; then `ended_units` is left of it.
+    struct UnitCounts {
+        uint64_t total = 0, done = 0;
+    } ended_units;
+    double unit_light_paths = 0;           ///< Of a unit of the largest groups, about.
+    std::optional<double> splats_per_path;  ///< The most that a partial had so far.
     std::shared_ptr<Reducer> reducer;  ///< Has its own lock; used without ours.
     uint32_t merged_groups = 0;        ///< Complete groups merged so far.
     uint64_t merged_iterations = 0;    ///< Iterations of these.
@@ -49,6 +54,7 @@ struct Coordinator::JobRecord {
     uint64_t image_size = 0;
     std::filesystem::path directory;
     std::jthread prepare_task, finish_task;
+    int running_tasks = 0;  ///< Of these. A job is forgotten only without any, so that nobody waits for one under the mutex.
 };
 
 inline constexpr size_t kMaxDroppedPerJob = 64;

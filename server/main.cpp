@@ -10,6 +10,7 @@
 #include "common/core/log.h"
 #include "common/film/atomic_file.h"
 #include "common/work/identity.h"
+#include "server/data_lock.h"
 #include "server/grpc_services.h"
 #include "server/scene_reader.h"
 #include "server/status_http.h"
@@ -87,6 +88,11 @@ int main(int argc, char** argv) {
     std::filesystem::create_directories(data, error);
     if (error) {
         spdlog::error("{}: {}", data, error.message());
+        return 1;
+    }
+    const auto lock = DataLock::take(data);
+    if (!lock.ok()) {
+        spdlog::error("{}", lock.status().message());
         return 1;
     }
     Coordinator coordinator(std::move(options));

@@ -5,36 +5,44 @@ namespace lightloom {
 Reducer::Reducer(const FrameLayout& frame, uint32_t tile_count)
     : frame_(frame), tile_count_(tile_count), accumulation_(frame), current_(frame) {}
 
-Status Reducer::add(const WorkUnit& unit, Partial partial) {
+Result<std::vector<Reducer::Refusal>> Reducer::add(const WorkUnit& unit, Partial partial) {
     const std::lock_guard lock(mutex_);
-    if (frozen_) return {StatusCode::kCancelled, "the image is being finished"};
-    if (unit.key.group < accumulation_.group_count())
-        return internal_error("unit " + std::to_string(unit.key.group) + "/" + std::to_string(unit.key.tile) +
-                              " was merged twice");
-    if (partial.tile != unit.tile || partial.samples_per_pixel != unit.iteration_count ||
-        partial.light_paths != unit.light_path_count)
-        return data_loss("the partial is of another unit");
-    if (unit.key.group > accumulation_.group_count()) {
-        if (const auto checked = check_partial(partial, frame_); !checked.ok()) return checked.status();
-        waiting_[unit.key.group].emplace_back(unit, std::move(partial));
-        return {};
+    if (frozen_) return Status(StatusCode::kCancelled, "the image is being finished");
+    std::vector<Refusal> refused;
+    if (unit.key.group < accumulation_.group_count()) {
+        refused.push_back({unit.key, internal_error("the unit was merged twice")});
+        return refused;
     }
-    LL_RETURN_IF_ERROR(add_to_current(unit, partial));
+    if (partial.tile != unit.tile || partial.samples_per_pixel != unit.iteration_count ||
+        partial.light_paths != unit.light_path_count) {
+        refused.push_back({unit.key, data_loss("the partial is of another unit")});
+        return refused;
+    }
+    if (unit.key.group > accumulation_.group_count()) {
+        if (const auto checked = check_partial(partial, frame_); !checked.ok()) {
+            refused.push_back({unit.key, checked.status()});
+        } else {
+            waiting_[unit.key.group].emplace_back(unit, std::move(partial));
+        }
+        return refused;
+    }
+    LL_RETURN_IF_ERROR(add_to_current(unit, partial, refused));
     // A group that has just been folded may have been all that complete later ones waited for.
     for (auto next = waiting_.find(accumulation_.group_count()); next != waiting_.end();
          next = waiting_.find(accumulation_.group_count())) {
         const auto partials = std::move(next->second);
         waiting_.erase(next);
-        const uint32_t before = accumulation_.group_count();
         for (const auto& [waiting_unit, waiting_partial] : partials)
-            LL_RETURN_IF_ERROR(add_to_current(waiting_unit, waiting_partial));
-        if (accumulation_.group_count() == before) break;  // not complete yet
+            LL_RETURN_IF_ERROR(add_to_current(waiting_unit, waiting_partial, refused));
     }
-    return {};
+    return refused;
 }
 
-Status Reducer::add_to_current(const WorkUnit& unit, const Partial& partial) {
-    LL_RETURN_IF_ERROR(current_.add(partial));
+Status Reducer::add_to_current(const WorkUnit& unit, const Partial& partial, std::vector<Refusal>& refused) {
+    if (const Status added = current_.add(partial); !added.ok()) {
+        refused.push_back({unit.key, added});
+        return {};
+    }
     if (++current_units_ < tile_count_) return {};
     LL_RETURN_IF_ERROR(accumulation_.fold(current_, unit.iteration_count));
     current_ = GroupSum(frame_);
@@ -56,6 +64,11 @@ uint32_t Reducer::folded_groups() const {
 uint64_t Reducer::iterations() const {
     const std::lock_guard lock(mutex_);
     return accumulation_.iterations();
+}
+
+uint64_t Reducer::dropped() const {
+    const std::lock_guard lock(mutex_);
+    return accumulation_.dropped();
 }
 
 Result<RgbImage> Reducer::image(float scale) const {

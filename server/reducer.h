@@ -17,20 +17,29 @@ class Reducer {
   public:
     Reducer(const FrameLayout& frame, uint32_t tile_count);
 
-    /// Takes the partial of `unit` in. kDataLoss (and nothing was merged) if it is not one; kCancelled after freeze().
-    Status add(const WorkUnit& unit, Partial partial);
+    /// A unit whose partial is not part of the sums after all: it has to be rendered again.
+    struct Refusal {
+        UnitKey unit;
+        Status why;
+    };
+    /// Takes the partial of `unit` in. Returns the units that were refused: this one, or others that had waited for it, whose
+    /// sums leave the range only now. An error is the end of all sums (a complete group does not fit them); kCancelled after
+    /// freeze().
+    Result<std::vector<Refusal>> add(const WorkUnit& unit, Partial partial);
     /// Nothing is merged any more.
     void freeze();
 
     /// Complete groups merged so far: always a prefix of the plan.
     uint32_t folded_groups() const;
     uint64_t iterations() const;
+    /// Non-finite samples that were dropped from these groups.
+    uint64_t dropped() const;
     /// Developed complete groups; kFailedPrecondition before the first.
     Result<RgbImage> image(float scale) const;
     Result<RgbImage> variance(float scale) const;
 
   private:
-    Status add_to_current(const WorkUnit& unit, const Partial& partial);
+    Status add_to_current(const WorkUnit& unit, const Partial& partial, std::vector<Refusal>& refused);
 
     const FrameLayout frame_;
     const uint32_t tile_count_;

@@ -1,5 +1,6 @@
 #include "server/results.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "common/film/atomic_file.h"
@@ -10,12 +11,28 @@ namespace lightloom {
 
 using Json = nlohmann::ordered_json;
 
+namespace {
+
+/// A word as a POSIX shell takes it for itself.
+std::string shell_word(const std::string& word) {
+    const auto plain = [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+               std::string_view("_-./,:=+@%").find(c) != std::string_view::npos;
+    };
+    if (!word.empty() && std::all_of(word.begin(), word.end(), plain)) return word;
+    std::string out = "'";
+    for (const char c : word) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return out + "'";
+}
+
+}  // namespace
+
 std::string replay_command(const JobSpec& spec, const std::string& scene, const ManifestDropped& dropped) {
     const DroppedSample& sample = dropped.sample;
     const int width = spec.frame.crop.width();
     const int x = spec.frame.crop.x0 + int(sample.pixel) % width, y = spec.frame.crop.y0 + int(sample.pixel) / width;
-    std::string command = "lightloom replay " + scene + " --algorithm " + spec.algorithm;
-    for (const auto& [key, value] : spec.parameters) command += " --set " + key + "=" + value;
+    std::string command = "lightloom replay " + shell_word(scene) + " --algorithm " + shell_word(spec.algorithm);
+    for (const auto& [key, value] : spec.parameters) command += " --set " + shell_word(key + "=" + value);
     command += " --seed " + std::to_string(spec.seed) + " --max-depth " + std::to_string(spec.max_depth);
     if (spec.width > 0) command += " --resolution " + std::to_string(spec.width) + "x" + std::to_string(spec.height);
     if (sample.splat)
@@ -31,6 +48,7 @@ std::string to_json(const Manifest& m) {
     json["job"] = m.job.job_id;
     json["image"] = {{"sha256", m.job.image_digest.hex()},
                      {"size_bytes", m.job.image_size_bytes},
+                     {"colour", "float"},
                      {"samples_per_pixel", m.iterations},
                      {"groups", m.groups},
                      {"spec_digest", spec.image_digest().hex()}};
@@ -75,7 +93,7 @@ std::string to_json(const Manifest& m) {
     for (const ManifestWorker& w : m.workers) {
         Json units = Json::array();  // pairs [group, tile]
         for (const UnitTable::Merged& u : m.units) {
-            if (u.worker == w.index) units.push_back({u.unit.key.group, u.unit.key.tile});
+            if (u.worker == w.index) units.push_back({u.unit.group, u.unit.tile});
         }
         workers.push_back({{"worker", w.worker_id},
                            {"host", w.host},
@@ -87,28 +105,33 @@ std::string to_json(const Manifest& m) {
     return json.dump(1) + "\n";
 }
 
+Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers) {
+    std::string parameters;
+    for (const auto& [key, value] : spec.parameters) parameters += (parameters.empty() ? "" : " ") + key + "=" + value;
+    ExrImage image;
+    image.frame = spec.frame;
+    image.color = std::move(developed.color);
+    image.layers = std::move(layers);
+    image.layers.push_back({"variance", "RGB", std::move(developed.variance.pixels)});
+    image.attributes = {{exr_attribute::kAlgorithm, spec.algorithm},
+                        {exr_attribute::kParameters, parameters},
+                        {exr_attribute::kSeed, std::to_string(spec.seed)},
+                        {exr_attribute::kMaxDepth, std::to_string(spec.max_depth)},
+                        {exr_attribute::kSamples, std::to_string(developed.iterations)},
+                        {"lightloom.groups", std::to_string(developed.groups)},
+                        {exr_attribute::kScene, spec.scene_root.hex()},
+                        {"lightloom.specDigest", spec.image_digest().hex()}};
+    return encode_exr(image);
+}
+
 Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, float exposure_scale,
                                  std::vector<ImageLayer> layers) {
     auto color = reducer.image(exposure_scale);
     if (!color.ok()) return color.status();
     auto variance = reducer.variance(exposure_scale);
     if (!variance.ok()) return variance.status();
-    std::string parameters;
-    for (const auto& [key, value] : spec.parameters) parameters += (parameters.empty() ? "" : " ") + key + "=" + value;
-    ExrImage image;
-    image.frame = spec.frame;
-    image.color = *std::move(color);
-    image.layers = std::move(layers);
-    image.layers.push_back({"variance", "RGB", std::move(variance->pixels)});
-    image.attributes = {{exr_attribute::kAlgorithm, spec.algorithm},
-                        {exr_attribute::kParameters, parameters},
-                        {exr_attribute::kSeed, std::to_string(spec.seed)},
-                        {exr_attribute::kMaxDepth, std::to_string(spec.max_depth)},
-                        {exr_attribute::kSamples, std::to_string(reducer.iterations())},
-                        {"lightloom.groups", std::to_string(reducer.folded_groups())},
-                        {exr_attribute::kScene, spec.scene_root.hex()},
-                        {"lightloom.specDigest", spec.image_digest().hex()}};
-    return encode_exr(image, spec.half_float ? ExrPixelType::kHalf : ExrPixelType::kFloat);
+    return encode_image(spec, {*std::move(color), *std::move(variance), reducer.iterations(), reducer.folded_groups()},
+                        std::move(layers));
 }
 
 Result<std::string> read_image(const std::filesystem::path& job_directory) {

@@ -38,12 +38,21 @@ struct Manifest {
     uint64_t expired_leases = 0, rejected_results = 0;
 };
 
-/// Command line that renders one dropped sample again; its unit for a splat, which is known only by where it would have landed.
+/// Command line for a shell that renders one dropped sample again; its unit for a splat, which is known only by where it would have landed.
 std::string replay_command(const JobSpec& spec, const std::string& scene, const ManifestDropped& dropped);
 /// The manifest as JSON text.
 std::string to_json(const Manifest& manifest);
 
-/// The EXR's bytes for the merged groups of `reducer`: colour, its variance, and `layers`.
+/// Complete groups, developed.
+struct DevelopedImage {
+    RgbImage color, variance;
+    uint64_t iterations = 0;
+    uint32_t groups = 0;
+};
+
+/// The EXR's bytes: colour, its variance, and `layers`. Who rendered it, and how, does not enter.
+Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers);
+/// The same for the merged groups of `reducer`.
 Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, float exposure_scale,
                                  std::vector<ImageLayer> layers);
 Result<std::string> read_image(const std::filesystem::path& job_directory);

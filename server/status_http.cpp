@@ -2,6 +2,7 @@
 
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <nlohmann/json.hpp>
@@ -19,6 +20,7 @@ using Json = nlohmann::ordered_json;
 constexpr int kMaxConnections = 64;
 constexpr uint32_t kMaxHeaderBytes = 8 * 1024;
 constexpr auto kTimeout = std::chrono::seconds(5);
+constexpr auto kPause = std::chrono::milliseconds(100);
 
 std::string status_json(const Coordinator& coordinator) {
     Json jobs = Json::array();
@@ -123,7 +125,12 @@ struct StatusHttp::Impl {
             // Above the limit a connection is closed unanswered: this endpoint must never starve the renderer.
             if (!error && connections < kMaxConnections)
                 std::make_shared<Session>(std::move(socket), coordinator, connections)->start();
-            accept();
+            if (!error) return accept();
+            // An error that stays (no descriptor is left) must not make this a busy loop.
+            pause.expires_after(kPause);
+            pause.async_wait([this](beast::error_code cancelled) {
+                if (!cancelled) accept();
+            });
         });
     }
 
@@ -131,6 +138,7 @@ struct StatusHttp::Impl {
     int connections = 0;  // of the one thread; before `context`, whose end destroys the sessions
     asio::io_context context{1};
     tcp::acceptor acceptor;
+    asio::steady_timer pause{context};
     std::thread thread;
 };
 

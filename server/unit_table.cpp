@@ -9,34 +9,52 @@ namespace lightloom {
 UnitTable::UnitTable(Plan plan, uint64_t iterations, uint32_t window, std::optional<uint64_t> shuffle_seed)
     : plan_(std::move(plan)), iterations_(iterations), window_(std::max(window, 1u)), shuffle_(shuffle_seed) {
     if (iterations_ > 0) {
-        group_total_ = uint32_t(plan_.groups_for(iterations_).size());
+        group_total_ = plan_.group_count(iterations_);
         unit_total_ = uint64_t(group_total_) * plan_.tile_count();
     }
 }
 
-UnitTable::Entry* UnitTable::entry(const UnitKey& key) {
-    if (key.group >= groups_.size() || key.tile >= groups_[key.group].size()) return nullptr;
-    return &groups_[key.group][key.tile];
+uint64_t UnitTable::prefix(const Digest& digest) {
+    uint64_t out = 0;
+    for (int i = 0; i < 8; ++i) out = out << 8 | digest.bytes[size_t(i)];
+    return out;
 }
 
-const WorkUnit* UnitTable::find(const UnitKey& key) const {
-    const Entry* e = const_cast<UnitTable*>(this)->entry(key);
-    return e ? &e->unit : nullptr;
+UnitTable::Entry* UnitTable::entry(const UnitKey& key) {
+    if (key.group < merged_groups_ || key.group >= opened_groups() || key.tile >= tile_count()) return nullptr;
+    return &open_[key.group - merged_groups_][key.tile];
+}
+
+Group UnitTable::group(uint32_t index) const {
+    Group out = plan_.group(index);
+    if (iterations_ > 0)
+        out.iteration_count = uint32_t(std::min<uint64_t>(out.iteration_count, iterations_ - out.first_iteration));
+    return out;
+}
+
+std::optional<WorkUnit> UnitTable::find(const UnitKey& key) const {
+    if (key.group >= opened_groups() || key.tile >= tile_count()) return std::nullopt;
+    if (key.group < merged_groups_) return plan_.units(group(key.group))[key.tile];
+    return open_[key.group - merged_groups_][key.tile].unit;
 }
 
 bool UnitTable::open_group() {
-    if (closed_ || groups_.size() >= group_limit_ || groups_.size() >= size_t(merged_groups_) + window_) return false;
-    if (iterations_ > 0 && opened_iterations_ >= iterations_) return false;
-    Group group = plan_.group(uint32_t(groups_.size()));
-    if (iterations_ > 0)
-        group.iteration_count = uint32_t(std::min<uint64_t>(group.iteration_count, iterations_ - opened_iterations_));
-    opened_iterations_ += group.iteration_count;
-    std::vector<Entry>& entries = groups_.emplace_back();
-    for (const WorkUnit& unit : plan_.units(group)) {
+    const uint32_t next = opened_groups();
+    if (closed_ || next >= group_limit_ || open_.size() >= window_) return false;
+    if (iterations_ > 0 && next >= group_total_) return false;
+    std::vector<Entry>& entries = open_.emplace_back();
+    for (const WorkUnit& unit : plan_.units(group(next))) {
         entries.push_back({.unit = unit});
         pending_.insert(unit.key);
     }
     return true;
+}
+
+void UnitTable::advance(uint32_t count) {
+    for (; merged_groups_ < count && !open_.empty(); ++merged_groups_) {
+        for (const Entry& e : open_.front()) done_.push_back({prefix(e.digest), e.worker});
+        open_.pop_front();
+    }
 }
 
 bool UnitTable::has_more_than(size_t n) {
@@ -118,6 +136,10 @@ size_t UnitTable::expire(TimePoint now) {
 }
 
 UnitTable::Completion UnitTable::complete(const UnitKey& key, uint32_t worker, const Digest& digest) {
+    if (key.group < merged_groups_ && key.tile < tile_count()) {
+        const Done& done = done_[size_t(key.group) * tile_count() + key.tile];
+        return done.digest_prefix == prefix(digest) ? Completion::kDuplicateSame : Completion::kDuplicateDifferent;
+    }
     Entry* e = entry(key);
     if (!e) return Completion::kUnknown;
     if (e->state == State::kDone)
@@ -151,11 +173,11 @@ UnitTable::Failures UnitTable::fail(const UnitKey& key, uint32_t worker) {
     return {++e->failures, int(e->failed_on.size())};
 }
 
-std::vector<UnitTable::Merged> UnitTable::merged(uint32_t groups) const {
+std::vector<UnitTable::Merged> UnitTable::merged() const {
     std::vector<Merged> out;
-    for (uint32_t g = 0; g < groups && g < groups_.size(); ++g) {
-        for (const Entry& e : groups_[g]) out.push_back({e.unit, e.worker});
-    }
+    out.reserve(done_.size());
+    for (size_t i = 0; i < done_.size(); ++i)
+        out.push_back({{uint32_t(i / tile_count()), uint32_t(i % tile_count())}, done_[i].worker});
     return out;
 }
 

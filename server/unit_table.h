@@ -1,7 +1,9 @@
 #pragma once
 // UnitTable: which units of one job are pending, leased or merged. No locks, no clock of its own: the caller passes the time.
-// Leases only save work; correctness rests on complete() answering "first" exactly once per unit.
+// Leases only save work; correctness rests on complete() answering "first" exactly once per unit. Memory: a full record for
+// each unit of an open group, 16 bytes for each unit of a merged one.
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <deque>
@@ -48,9 +50,11 @@ class UnitTable {
     Failures fail(const UnitKey& key, uint32_t worker);
 
     /// The unit of an opened group.
-    const WorkUnit* find(const UnitKey& key) const;
-    /// Groups below `count` are merged: the window moves on.
-    void advance(uint32_t count) { merged_groups_ = count; }
+    std::optional<WorkUnit> find(const UnitKey& key) const;
+    /// Groups below `count` are merged: the window moves on, and of their units only worker and digest are kept.
+    void advance(uint32_t count);
+    /// How many groups may be open from now on; at least 1.
+    void set_window(uint32_t window) { window_ = std::max(window, 1u); }
     /// Leases nothing more.
     void close() { closed_ = true; }
     /// Leases units of the first `count` groups only.
@@ -63,11 +67,11 @@ class UnitTable {
     uint32_t tile_count() const { return plan_.tile_count(); }
 
     struct Merged {
-        WorkUnit unit;
+        UnitKey unit;
         uint32_t worker = 0;
     };
-    /// Who rendered what, over the first `groups` groups.
-    std::vector<Merged> merged(uint32_t groups) const;
+    /// Who rendered what, over the merged groups.
+    std::vector<Merged> merged() const;
 
   private:
     enum class State : uint8_t { kPending, kLeased, kDone };
@@ -80,6 +84,17 @@ class UnitTable {
         TimePoint expiry;
         Digest digest;
     };
+    /// What is left of a merged unit: who rendered it, and enough of the digest to tell a repeated result from another one.
+    struct Done {
+        uint64_t digest_prefix = 0;
+        uint32_t worker = 0;
+    };
+    static uint64_t prefix(const Digest& digest);
+    /// Groups opened so far.
+    uint32_t opened_groups() const { return merged_groups_ + uint32_t(open_.size()); }
+    /// Group `index` as the job has it: the last one may be cut short.
+    Group group(uint32_t index) const;
+    /// The record of a unit of an open group.
     Entry* entry(const UnitKey& key);
     bool open_group();
     void make_pending(Entry& e);
@@ -88,9 +103,9 @@ class UnitTable {
     uint64_t iterations_;
     uint32_t window_;
     std::optional<uint64_t> shuffle_;
-    std::deque<std::vector<Entry>> groups_;  // opened so far, by index
+    std::deque<std::vector<Entry>> open_;  // group merged_groups_ and those after it
+    std::vector<Done> done_;               // merged groups, tile by tile
     std::set<UnitKey> pending_, leased_;
-    uint64_t opened_iterations_ = 0;
     uint64_t unit_total_ = 0;
     uint32_t group_total_ = 0;
     uint64_t done_count_ = 0, leased_count_ = 0;

@@ -1,5 +1,6 @@
 #include "server/worker_service.h"
 
+#include "common/core/utf8.h"
 #include "common/work/wire.h"
 
 namespace lightloom {
@@ -83,7 +84,7 @@ grpc::Status WorkerServiceImpl::ReleaseUnit(grpc::ServerContext*, const v1::Rele
     int code = request->status_code();
     if (code < 0 || code > int(StatusCode::kDataLoss)) code = int(StatusCode::kUnknown);
     return wire::to_grpc(coordinator_.release_unit(request->worker_id(), wire::get(request->unit()),
-                                                   {StatusCode(code), request->message().substr(0, 2000)}));
+                                                   {StatusCode(code), clipped_utf8(request->message(), wire::kMaxMessageBytes)}));
 }
 
 grpc::Status WorkerServiceImpl::Goodbye(grpc::ServerContext*, const v1::GoodbyeRequest* request, v1::GoodbyeResponse*) {

@@ -4,10 +4,14 @@
 
 #include <chrono>
 
+#include "common/core/utf8.h"
 #include "common/work/wire.h"
 
 namespace lightloom {
 namespace {
+
+/// A slower connection than this counts as broken.
+constexpr double kSlowestBytesPerSecond = 1e6;
 
 void set_deadline(grpc::ClientContext& context, double seconds) {
     context.set_deadline(std::chrono::system_clock::now() +
@@ -75,7 +79,7 @@ Result<SubmitAck> GrpcWorkerPort::submit_result(const std::string& worker_id, co
     const auto encoded = encode_partial(partial, lease.spec.frame);
     if (!encoded.ok()) return encoded.status();
     grpc::ClientContext context;
-    set_deadline(context, 120);
+    set_deadline(context, 120 + double(encoded->payload.size()) / kSlowestBytesPerSecond);
     v1::SubmitResultResponse response;
     const auto writer = worker_->SubmitResult(&context, &response);
     v1::SubmitResultRequest message;
@@ -106,7 +110,7 @@ Status GrpcWorkerPort::release_unit(const std::string& worker_id, const UnitRefe
     request.set_worker_id(worker_id);
     wire::put(unit, request.mutable_unit());
     request.set_status_code(int(why.code()));
-    request.set_message(why.message().substr(0, 2000));
+    request.set_message(clipped_utf8(why.message(), wire::kMaxMessageBytes));
     v1::ReleaseUnitResponse response;
     return wire::from_grpc(worker_->ReleaseUnit(&context, request, &response));
 }

@@ -84,7 +84,7 @@ Status check_values(const std::vector<float>& values, size_t channels, const Rec
                                   ", " + std::to_string(crop.y0 + int(p / size_t(crop.width()))) + ")";
         if (!std::isfinite(v)) return data_loss(where + " is NaN or infinite");
         return invalid_argument(where + " is " + std::to_string(v) +
-                                ", beyond the 65504 of half; write float or lower the exposure");
+                                ", beyond the 65504 of half");
     }
     return Status::ok_status();
 }

@@ -88,25 +88,30 @@ void point_light(Context* context, const ParameterList& p, const Mat4& m) {
 
 void spot_light(Context* context, const ParameterList& p, const Mat4& m) {
     const float cone = p.one_float("coneangle", 30), delta = p.one_float("conedeltaangle", 5);
-    if (!(cone > 0) || !(cone <= 180) || !(delta >= 0) || !(delta <= cone))
-        fail(p.where(), p.what() + ": coneangle must lie in (0, 180] degrees and conedeltaangle between 0 and it");
+    // Below this, directions in single precision do not tell the axis from the rim.
+    constexpr float kNarrowest = 0.01f;
+    if (!(cone >= kNarrowest) || !(cone <= 180) || !(delta >= 0) || !(delta <= cone))
+        fail(p.where(), p.what() + ": coneangle must lie in [0.01, 180] degrees and conedeltaangle between 0 and it");
     if (!similarity_scale(m))
         fail(p.where(), p.what() +
                             ": its transformation is not a similarity, so the cone would not be round; remove the "
                             "uneven scale or shear");
-    const double cos_total = math::cos(double(cone) * kPiD / 180),
-                 cos_falloff = math::cos((double(cone) - delta) * kPiD / 180);
+    const auto height = [](double degrees) {  // 1 - cosine
+        const double s = math::sin(degrees * kPiD / 360);
+        return 2 * s * s;
+    };
+    const double total_height = height(cone), falloff_height = height(double(cone) - delta);
     double scale = light_scale(p);
     // The flux of unit intensity on the axis: the smoothstep's mean over its band is one half.
     if (const double power = magnitude(p, "power"); power > 0)
-        scale *= power / (2 * kPiD * ((1 - cos_falloff) + (cos_falloff - cos_total) / 2));
+        scale *= power / (kPiD * (falloff_height + total_height));
     const Vec3 from = p.one_point3("from").value_or(Vec3{0, 0, 0}), to = p.one_point3("to").value_or(Vec3{0, 0, 1});
     SpotLight light;
     light.position = light_position(p, m, from);
     light.axes = Frame(unit_vector(p, m, from, to));
     light.intensity = checked(p, light_colour(context, p, "I"), scale);
-    light.cos_total = float(cos_total);
-    light.cos_falloff = float(cos_falloff);
+    light.total_height = float(total_height);
+    light.falloff_height = float(falloff_height);
     context->scene.spot_lights.push_back(light);
 }
 

@@ -71,7 +71,7 @@ int trace_camera_path(const Scene& scene, CameraSampler& sampler, int px, int py
         v.bsdf = scene.bsdf_at(point);
         visit(t);
         if (!leave<TransportMode::kRadiance>(&v, &z[t - 2], sampler.scattering(t), &ray)) break;
-        if (!survive(rule, t, 1.0f, sampler.roulette(), &ray.alpha)) break;
+        if (!survive(rule, t, 1.0f, sampler.roulette(), &ray)) break;
     }
     return t;
 }

@@ -29,13 +29,29 @@ inline void view_camera_suffix(const PathVertex* z, int t, int k, PathView* view
     }
 }
 
-/// Which entries of the PathView a caller's techniques read: all, or only those of x_0 and x_1 (s = 0 and s = 1, where
-/// filling in the rest would cost more than the weight).
-enum class ViewDetail : uint8_t { kFull, kLightEnd };
+/// Which entries of the PathView a caller's techniques read: all densities; only those of x_0 and x_1 (s = 0 and s = 1, where
+/// filling in the rest would cost more than the weight); or all densities and what throughput.h needs of the technique's own
+/// end vertices (start and step), for methods that select by the light's throughput.
+enum class ViewDetail : uint8_t { kFull, kLightEnd, kSubspace };
+
+/// start[] of a path whose x_0 lies on `e` and emits along `w`; fwd[0] must be set. `direction_pdf` as pdf_direction().
+inline void view_start(const EmitterSet& emitters, const Emitter& e, const Vec3& normal, const Vec3& w, float direction_pdf,
+                       PathView* view) {
+    const float inv_position = float(1 / view->fwd[0]);
+    view->start[0] = emitters.strength(e, w) * inv_position;
+    const float cosine = e.is_area() ? abs_dot(normal, w) : 1;
+    view->start[1] = direction_pdf > 0 ? emitters.emitted(e, normal, w) * (cosine * inv_position / direction_pdf) : Rgb{};
+}
+
+/// PathVertex::step of a camera vertex that a connection leaves towards the light along `w`.
+inline Rgb light_step(const PathVertex& v, const Scatter& s, const Vec3& w) {
+    const float factor = abs_dot(v.ng, v.wo) / (abs_dot(v.ng, w) * s.pdf_rev);
+    return std::isfinite(factor) ? s.value * factor : Rgb{};
+}
 
 template <ViewDetail detail>
 void view_suffix(const PathVertex* z, int t, int k, PathView* view) {
-    if constexpr (detail == ViewDetail::kFull) {
+    if constexpr (detail != ViewDetail::kLightEnd) {
         view_camera_suffix(z, t, k, view);
     } else {
         for (int j = t - 1; j >= 1 && j >= t - 2; --j) {
@@ -59,7 +75,9 @@ Rgb emitter_hit(const Scene& scene, const PathVertex* z, int t, PathView* view) 
     view->delta[0] = false;
     view->fwd[0] = emitters.pdf_position(e, v.wo);
     if (k >= 2) {
-        view->fwd[1] = double(emitters.pdf_direction(e, v.ng, v.wo)) * v.to_previous;
+        const float direction_pdf = emitters.pdf_direction(e, v.ng, v.wo);
+        if constexpr (detail == ViewDetail::kSubspace) view_start(emitters, e, v.ng, v.wo, direction_pdf, view);
+        view->fwd[1] = double(direction_pdf) * v.to_previous;
         view->next_event = emitters.pdf_next_event(e, z[t - 2].p, v.p, v.ng, -v.wo);
     }
     return v.alpha * radiance;
@@ -80,7 +98,9 @@ Rgb environment_hit(const Scene& scene, const PathVertex* z, int t, const WalkRa
     view->rev[0] = ray.pdf;
     view->fwd[0] = emitters.pdf_position(e, -ray.direction);
     if (k >= 2) {
-        view->fwd[1] = double(emitters.pdf_direction(e, {}, -ray.direction)) * abs_dot(z[t - 1].ng, ray.direction);
+        const float direction_pdf = emitters.pdf_direction(e, {}, -ray.direction);
+        if constexpr (detail == ViewDetail::kSubspace) view_start(emitters, e, {}, -ray.direction, direction_pdf, view);
+        view->fwd[1] = double(direction_pdf) * abs_dot(z[t - 1].ng, ray.direction);
         view->next_event = view->fwd[0];
     }
     return ray.alpha * radiance;
@@ -110,13 +130,19 @@ Rgb next_event(const Scene& scene, const PathVertex* z, int t, const NextEventSa
     view->next_event = light.pdf;
     const float receiver = abs_dot(v.ng, light.wi);
     const float inv_d2 = e.is_infinite() ? 1.0f : 1 / length_squared(light.position - v.p);
-    view->fwd[1] = double(emitters.pdf_direction(e, light.normal, -light.wi)) * (receiver * inv_d2);
+    const float direction_pdf = emitters.pdf_direction(e, light.normal, -light.wi);
+    view->fwd[1] = double(direction_pdf) * (receiver * inv_d2);
+    if constexpr (detail == ViewDetail::kSubspace) {
+        view_start(emitters, e, light.normal, -light.wi, direction_pdf, view);
+        view->step[1] = light_step(v, s, light.wi);
+    }
     if (k >= 3) view->fwd[2] = double(s.pdf_rev) * v.to_previous;
     return contribution;
 }
 
 /// 2 <= s, 2 <= t: connects y_{s-1} and z_{t-1}.
-inline Rgb connect(const Scene& scene, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view,
+template <ViewDetail detail = ViewDetail::kFull>
+Rgb connect(const Scene& scene, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view,
                    WalkCounters* counters) {
     const PathVertex &a = y[s - 1], &b = z[t - 1];
     const Vec3 d = a.p - b.p;
@@ -141,6 +167,10 @@ inline Rgb connect(const Scene& scene, const PathVertex* y, int s, const PathVer
     view->rev[s - 2] = double(at_light.pdf_rev) * a.to_previous;
     view->fwd[s] = double(at_light.pdf_fwd) * (abs_dot(b.ng, w) * inv_d2);
     if (t >= 3) view->fwd[s + 1] = double(at_camera.pdf_rev) * b.to_previous;
+    if constexpr (detail == ViewDetail::kSubspace) {
+        view->step[s - 1] = at_light.pdf_fwd > 0 ? at_light.value / at_light.pdf_fwd : Rgb{};
+        view->step[s] = light_step(b, at_camera, w);
+    }
     // Next event would have chosen x_0 from x_1; both are on the light sub-path.
     const Emitter& e = scene.emitters()[uint32_t(y[0].emitter)];
     view->next_event = scene.emitters().pdf_next_event(e, y[1].p, y[0].p, y[0].ng, y[1].wo);

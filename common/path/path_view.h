@@ -4,6 +4,8 @@
 
 #include <cstdint>
 
+#include "common/core/vec.h"
+
 namespace lightloom {
 
 /// Longest path, in edges. Scenes that ask for more are refused by name.
@@ -18,6 +20,15 @@ struct PathView {
     double rev[kMaxEdges + 1];
     /// x_i's scattering event is a Dirac lobe (0 < i < k); false at both ends.
     bool delta[kMaxEdges + 1];
+    /// What follows is filled in by ViewDetail::kSubspace only (connect.h) and, where marked *, by the method's own tables.
+    /// F(1) / C(1) and F(2) / C(2) of the light prefixes of one and two vertices: throughput without Russian roulette.
+    Rgb start[2];
+    /// step[i], 1 <= i <= k-2: F(i+2) / C(i+2) = step[i] * F(i+1) / C(i+1), channel by channel.
+    Rgb step[kMaxEdges + 1];
+    /// Scalar of F(s) / C(s), s = 1 .. k-1.
+    double light_throughput[kMaxEdges + 1];
+    uint16_t light_label[kMaxEdges + 1];  ///< * Light subspace of the prefix x_0 .. x_{s-1}.
+    uint16_t eye_label[kMaxEdges + 1];    ///< * Eye subspace of the suffix x_s .. x_k.
     /// Density of x_0 under next event estimation from x_1, native measure, pmf included.
     double next_event = 0;
 };

@@ -28,6 +28,7 @@ struct WalkRay {
     double pdf = 0;             ///< Density of the direction, solid angle; for an infinite light: area on its disc.
     bool from_infinite = false;
     bool previous_hittable = true;  ///< False leaving a light that cannot be hit: its reverse density is zero.
+    float survival = 1;             ///< See PathVertex.
 };
 
 struct WalkCounters {
@@ -48,6 +49,8 @@ void arrive(const WalkRay& ray, const Vec3& previous_p, const Vec3& previous_ng,
     v->reach = point.reach;
     v->delta = false;
     v->rev = 0;
+    v->survival = ray.survival;
+    v->label = v->reverse_label = kNoLabel;
     const float cosine = abs_dot(v->ng, v->wo);
     if (ray.from_infinite) {
         v->fwd = ray.pdf * cosine;
@@ -62,6 +65,20 @@ void arrive(const WalkRay& ray, const Vec3& previous_p, const Vec3& previous_ng,
     v->adjoint = mode == TransportMode::kImportance ? std::fabs(v->wo_local.z) / cosine : 1.0f;
 }
 
+/// PathVertex::step of a camera vertex that scattered towards the light by `s`: F gains f |l.ns| / |l.ng| |c.ng| (light side l,
+/// camera side c), C gains the density of c from l. The common factor |cos| / d^2 of F's G and C's area density is left out of
+/// both. A Dirac lobe gives up its squared index ratio, which is the camera's alone [Veach 1997, 5.2].
+inline Rgb light_step(const PathVertex& v, const BsdfSample& s, const Vec3& to_light) {
+    float factor = s.pdf_fwd * abs_dot(v.ng, v.wo) / (abs_dot(v.ng, to_light) * s.pdf_rev);
+    if (s.delta) {
+        factor *= std::fabs(s.wi.z / v.wo_local.z);
+        if (v.bsdf.kind == BsdfKind::kDielectric && s.wi.z * v.wo_local.z < 0)
+            factor *= v.wo_local.z > 0 ? v.bsdf.eta * v.bsdf.eta : 1 / (v.bsdf.eta * v.bsdf.eta);
+    }
+    // No density from the light: no prefix of light tracing crosses this vertex, and whoever asks finds C = 0 first.
+    return std::isfinite(factor) ? s.weight * factor : Rgb{};
+}
+
 /// Lets `v` scatter: chooses the next ray, sets v->delta and the predecessor's reverse density. False when the walk ends.
 template <TransportMode mode>
 bool leave(PathVertex* v, PathVertex* previous, const ScatterSample& u, WalkRay* ray) {
@@ -73,6 +90,8 @@ bool leave(PathVertex* v, PathVertex* previous, const ScatterSample& u, WalkRay*
         const float shading_cosine = std::fabs(s.wi.z);
         if (!(shading_cosine > 0)) return false;
         weight *= v->adjoint * (abs_dot(ray->direction, v->ng) / shading_cosine);  // [Veach 1997, eq. 5.19]
+    } else {
+        v->step = light_step(*v, s, ray->direction);
     }
     ray->alpha = v->alpha * weight;
     if (ray->alpha.is_black()) return false;
@@ -87,15 +106,17 @@ bool leave(PathVertex* v, PathVertex* previous, const ScatterSample& u, WalkRay*
 
 /// False when roulette ends the walk; otherwise the throughput is divided by the survival probability.
 /// `start` is the throughput that the sub-path began with.
-inline bool survive(const RouletteRule& rule, int vertex_index, float start, float u, Rgb* alpha) {
+inline bool survive(const RouletteRule& rule, int vertex_index, float start, float u, WalkRay* ray) {
     if (vertex_index < rule.first_vertex) return true;
-    const float q = clamp(scalar_of(*alpha) / start, rule.min_survival, rule.max_survival);
+    const float q = clamp(scalar_of(ray->alpha) / start, rule.min_survival, rule.max_survival);
     if (u >= q) return false;
-    *alpha *= 1 / q;
+    ray->alpha *= 1 / q;
+    ray->survival *= q;
     return true;
 }
 
-/// Start of a light sub-path at path[0] and the ray that leaves it. False when nothing is emitted.
+/// Start of a light sub-path at path[0] and the ray that leaves it. False when nothing is emitted. y_0's alpha is F(1) / C(1),
+/// its emission without the direction.
 inline bool start_light_path(const Scene& scene, Rng& rng, PathVertex* y0, WalkRay* ray) {
     EmissionSample s;
     const double pick = rng.uniform_double();
@@ -105,7 +126,9 @@ inline bool start_light_path(const Scene& scene, Rng& rng, PathVertex* y0, WalkR
     y0->p = s.position;
     y0->ng = s.normal;
     y0->emitter = int32_t(s.emitter);
-    y0->alpha = s.alpha;
+    y0->alpha = scene.emitters().strength(e, s.direction) / s.pdf_position;
+    y0->survival = 1;
+    y0->label = y0->reverse_label = kNoLabel;
     y0->fwd = s.pdf_position;
     y0->rev = 0;
     y0->delta = false;
@@ -123,11 +146,11 @@ inline bool start_light_path(const Scene& scene, Rng& rng, PathVertex* y0, WalkR
 inline int trace_light_path(const Scene& scene, Rng& rng, int max_vertices, const RouletteRule& rule, PathVertex* path,
                             WalkCounters* counters) {
     WalkRay ray;
-    if (max_vertices < 2 || !start_light_path(scene, rng, &path[0], &ray)) return 0;
+    if (max_vertices < 1 || !start_light_path(scene, rng, &path[0], &ray)) return 0;
     const bool area = scene.emitters()[uint32_t(path[0].emitter)].is_area();
     const float start = scalar_of(ray.alpha);
     int n = 1;
-    while (true) {
+    while (n < max_vertices) {
         SurfacePoint point;
         ++counters->rays;
         if (!scene.intersect(ray.origin, ray.direction, &point)) break;
@@ -140,7 +163,7 @@ inline int trace_light_path(const Scene& scene, Rng& rng, int max_vertices, cons
         if (n >= max_vertices) break;
         const Vec2 u1 = rng.uniform2(), u2 = rng.uniform2();
         if (!leave<TransportMode::kImportance>(&v, &path[n - 2], {u1.x, u2}, &ray)) break;
-        if (!survive(rule, n, start, u1.y, &ray.alpha)) break;
+        if (!survive(rule, n, start, u1.y, &ray)) break;
     }
     return n;
 }

@@ -7,6 +7,9 @@
 
 namespace lightloom {
 
+/// "Not classified": see PathVertex::label.
+inline constexpr uint16_t kNoLabel = 0xffff;
+
 struct PathVertex {
     Vec3 p, ng;                ///< Position; geometric normal (at an infinite light's y_0: the direction of travel).
     Frame shading;
@@ -24,6 +27,14 @@ struct PathVertex {
     int32_t emitter = kNone;   ///< Emitter that this vertex lies on.
     float reach = 0;           ///< SurfacePoint::reach.
     bool delta = false;        ///< The sub-path went on through a Dirac lobe.
+    /// Light subspace of the prefix, or eye subspace of the suffix, that ends here as traced; and of the other kind, seen from
+    /// the successor. kNoLabel until a method with tables asks for them.
+    uint16_t label = kNoLabel, reverse_label = kNoLabel;
+    /// Product of the survival probabilities that alpha was divided by: alpha * survival is free of Russian roulette.
+    float survival = 1;
+    /// Camera sub-paths, once it has scattered: what light tracing would multiply a prefix's F / C by when it crosses this
+    /// vertex the other way, from the successor to the predecessor (BSDF, adjoint correction, density; see PathView::step).
+    Rgb step;
 };
 
 /// What leaves a vertex towards `w` (unit): BSDF value with the cosines of the sub-path's kind, and both densities.

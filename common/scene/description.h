@@ -119,8 +119,9 @@ struct SpotLight {
     Vec3 position;
     Frame axes;            ///< axes.n is the direction of the axis, away from the light.
     Rgb intensity;         ///< On the axis, W / sr.
-    float cos_total = 0;   ///< Cosine beyond which the light is dark.
-    float cos_falloff = 0; ///< Cosine within which it has full intensity; smoothstep between.
+    // 1 - cosine of an angle, which has the digits that the cosine of a narrow cone has lost.
+    float total_height = 0;    ///< Of the angle beyond which the light is dark.
+    float falloff_height = 0;  ///< Of the angle within which it has full intensity; smoothstep between.
 };
 
 struct DistantLight {

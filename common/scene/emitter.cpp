@@ -9,10 +9,14 @@ namespace {
 
 constexpr float kInvFourPi = 0.07957747154594766788f;
 
-float spot_falloff(const Emitter& e, float cos_theta) {
-    if (cos_theta < e.cos_total) return 0;
-    if (cos_theta >= e.cos_falloff) return 1;
-    const float x = (cos_theta - e.cos_total) / (e.cos_falloff - e.cos_total);
+/// 1 - cos of the angle between unit vectors, without cancellation.
+float height_between(const Vec3& a, const Vec3& b) { return 0.5f * length_squared(a - b); }
+
+float spot_falloff(const Emitter& e, const Vec3& w) {
+    const float height = height_between(e.normal, w);
+    if (height > e.total_height) return 0;
+    if (height <= e.falloff_height) return 1;
+    const float x = (e.total_height - height) / (e.total_height - e.falloff_height);
     return x * x * (3 - 2 * x);
 }
 
@@ -46,7 +50,7 @@ double EmitterSet::power(const Emitter& e) const {
         case EmitterKind::kSphere: return kPiD * scalar_of(e.radiance) / e.inv_area * (e.two_sided ? 2 : 1);
         case EmitterKind::kPoint: return 4 * kPiD * scalar_of(e.radiance);
         case EmitterKind::kSpot:
-            return 2 * kPiD * scalar_of(e.radiance) * ((1 - double(e.cos_falloff)) + (double(e.cos_falloff) - e.cos_total) / 2);
+            return kPiD * scalar_of(e.radiance) * (double(e.falloff_height) + double(e.total_height));
         case EmitterKind::kDistant: return scalar_of(e.radiance) * disc;
         case EmitterKind::kEnvironment: return environment_.integrated_radiance() * disc;
     }
@@ -58,7 +62,7 @@ Rgb EmitterSet::emitted(const Emitter& e, const Vec3& normal, const Vec3& w) con
         case EmitterKind::kTriangle:
         case EmitterKind::kSphere: return e.two_sided || dot(normal, w) > 0 ? e.radiance : Rgb{};
         case EmitterKind::kPoint: return e.radiance;
-        case EmitterKind::kSpot: return e.radiance * spot_falloff(e, dot(e.normal, w));
+        case EmitterKind::kSpot: return e.radiance * spot_falloff(e, w);
         case EmitterKind::kDistant: return e.radiance;
         case EmitterKind::kEnvironment: return environment_.radiance(-w);
     }
@@ -80,7 +84,7 @@ float EmitterSet::pdf_direction(const Emitter& e, const Vec3& normal, const Vec3
             return c > 0 ? c * kInvPi : 0;
         }
         case EmitterKind::kPoint: return kInvFourPi;
-        case EmitterKind::kSpot: return dot(e.normal, w) >= e.cos_total ? 1 / (kTwoPi * (1 - e.cos_total)) : 0;
+        case EmitterKind::kSpot: return height_between(e.normal, w) <= e.total_height ? 1 / (kTwoPi * e.total_height) : 0;
         case EmitterKind::kDistant:
         case EmitterKind::kEnvironment: return disc_pdf_;
     }
@@ -114,8 +118,8 @@ bool EmitterSet::sample_emission(double pick, Vec2 u_position, Vec2 u_direction,
             out->direction = out->normal = sample_sphere(u_direction);
             break;
         case EmitterKind::kSpot: {
-            const float z = 1 - u_direction.x * (1 - e.cos_total);
-            const float r = safe_sqrt(1 - z * z);
+            const float height = u_direction.x * e.total_height;
+            const float z = 1 - height, r = safe_sqrt(height * (2 - height));
             const math::SinCos sc = math::sincos_turns(u_direction.y);
             out->position = e.position;
             out->direction = out->normal = Frame(e.normal).to_world({r * float(sc.cos), r * float(sc.sin), z});
@@ -179,16 +183,33 @@ bool EmitterSet::sample_next_event(const Vec3& reference, double pick, Vec2 u, N
         } else {
             out->position = e.position;
         }
-        const Vec3 to_light = out->position - reference;
+        if (!connect_point(reference, out->position, out->normal, out)) return false;
+        out->pdf = pdf_next_event(e, reference, out->position, out->normal, out->wi);
+        return out->pdf > 0;
+    }
+    out->radiance = emitted(e, out->normal, -out->wi);
+    return out->pdf > 0 && !out->radiance.is_black();
+}
+
+bool EmitterSet::connect_point(const Vec3& reference, const Vec3& position, const Vec3& normal_or_travel,
+                               NextEventSample* out) const {
+    const Emitter& e = emitters_[out->emitter];
+    out->normal = normal_or_travel;
+    if (e.is_infinite()) {
+        out->wi = -normal_or_travel;
+        out->position = reference + out->wi * (2 * scene_radius_);
+        out->geometry = 1;
+    } else {
+        out->position = position;
+        const Vec3 to_light = position - reference;
         const float d2 = length_squared(to_light);
         if (!(d2 > 0)) return false;
         out->wi = to_light / std::sqrt(d2);
         if (!e.is_area()) out->normal = -out->wi;
         out->geometry = (e.is_area() ? abs_dot(out->normal, out->wi) : 1.0f) / d2;
-        out->pdf = pdf_next_event(e, reference, out->position, out->normal, out->wi);
     }
     out->radiance = emitted(e, out->normal, -out->wi);
-    return out->pdf > 0 && out->geometry > 0 && !out->radiance.is_black();
+    return out->geometry > 0 && !out->radiance.is_black();
 }
 
 float EmitterSet::pdf_next_event(const Emitter& e, const Vec3& reference, const Vec3& position, const Vec3& normal,

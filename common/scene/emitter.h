@@ -27,7 +27,7 @@ struct Emitter {
     float radius = 0;           ///< kSphere; negative-free. `inward` flips its emitting side.
     bool inward = false;
     float inv_area = 0;
-    float cos_total = 0, cos_falloff = 0;  ///< kSpot.
+    float total_height = 0, falloff_height = 0;  ///< kSpot; see SpotLight.
     float reach = 0;            ///< Area lights: largest coordinate magnitude; see offset_origin().
     int32_t light = 0;          ///< Group for reports: the area-light shape or light source it came from.
 
@@ -82,9 +82,17 @@ class EmitterSet {
     /// False when the point chosen cannot light `reference` (wrong side, inside a cone's shadow...).
     bool sample_next_event(const Vec3& reference, double pick, Vec2 u, NextEventSample* out) const;
 
+    /// Connects `reference` to a given x_0 of emitter `out->emitter`: `position` on a finite light, `travel` the direction of
+    /// travel of an infinite one, `normal` that of an area light. Fills in the rest of `out` but for pdf. False as above.
+    bool connect_point(const Vec3& reference, const Vec3& position, const Vec3& normal_or_travel, NextEventSample* out) const;
     /// Radiance (or intensity, irradiance) leaving x_0 of emitter `e` along `w` (unit, away from the light); `normal` is the
     /// geometric normal at x_0 on the emitting side. The environment looks its map up in -w.
     Rgb emitted(const Emitter& e, const Vec3& normal, const Vec3& w) const;
+    /// The part of emitted() that belongs to x_0 alone, F(1) of a light prefix: radiance of area lights and of the environment
+    /// along `w`, intensity on a spot's axis.
+    Rgb strength(const Emitter& e, const Vec3& w) const {
+        return e.kind == EmitterKind::kEnvironment ? environment_.radiance(-w) : e.radiance;
+    }
     /// pL of x_0: density of sample_emission() for the point, native measure, pmf included. `w` as above (environment).
     float pdf_position(const Emitter& e, const Vec3& w) const;
     /// Density of the emission direction `w` given x_0: solid angle for finite lights, disc area for infinite ones.

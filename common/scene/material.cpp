@@ -5,10 +5,14 @@
 namespace lightloom {
 namespace {
 
-Rgb value(const TextureTables& tables, TextureId id, Vec2 uv, const Rgb& fallback) {
+Rgb value(const TextureTables& tables, TextureId id, Vec2 uv, const Rgb& fallback, TextureUse use = TextureUse::kUnbounded) {
     if (id == kNone) return fallback;
     const TextureNode& node = tables.nodes[size_t(id)];
-    return node.kind == TextureKind::kConstant ? node.value : evaluate_texture(tables, id, uv);
+    return node.kind == TextureKind::kConstant ? node.value : evaluate_texture(tables, id, uv, use);
+}
+
+Rgb reflectance(const TextureTables& tables, TextureId id, Vec2 uv, const Rgb& fallback) {
+    return value(tables, id, uv, fallback, TextureUse::kReflectance);
 }
 
 float alpha(const TextureTables& tables, TextureId id, Vec2 uv, bool remap) {
@@ -22,7 +26,7 @@ struct ConductorIndex {
 };
 
 ConductorIndex conductor_index(const TextureTables& tables, const Material& m, Vec2 uv) {
-    if (m.reflectance != kNone) return {Rgb(1), conductor_k(value(tables, m.reflectance, uv, Rgb(0)))};
+    if (m.reflectance != kNone) return {Rgb(1), conductor_k(reflectance(tables, m.reflectance, uv, Rgb(0)))};
     // Copper, at the wavelengths of the three primaries.
     return {value(tables, m.eta, uv, Rgb(0.200f, 0.924f, 1.102f)), value(tables, m.k, uv, Rgb(3.912f, 2.452f, 2.142f))};
 }
@@ -47,10 +51,10 @@ Bsdf resolve_material(const TextureTables& tables, MaterialId material, Vec2 uv,
                 }
                 continue;
             }
-            case MaterialKind::kDiffuse: return make_diffuse(value(tables, m.reflectance, uv, Rgb(0.5f)));
+            case MaterialKind::kDiffuse: return make_diffuse(reflectance(tables, m.reflectance, uv, Rgb(0.5f)));
             case MaterialKind::kDiffuseTransmission:
-                return make_diffuse_transmission(value(tables, m.reflectance, uv, Rgb(0.25f)),
-                                                 value(tables, m.transmittance, uv, Rgb(0.25f)));
+                return make_diffuse_transmission(reflectance(tables, m.reflectance, uv, Rgb(0.25f)),
+                                                 reflectance(tables, m.transmittance, uv, Rgb(0.25f)));
             case MaterialKind::kThinDielectric: return make_thin_dielectric(ior);
             default: break;
         }
@@ -63,7 +67,7 @@ Bsdf resolve_material(const TextureTables& tables, MaterialId material, Vec2 uv,
             }
             case MaterialKind::kDielectric: return make_dielectric(ior, alpha_x, alpha_y);
             case MaterialKind::kCoatedDiffuse:
-                return make_coated_diffuse(value(tables, m.reflectance, uv, Rgb(0.5f)), ior, m.thickness, alpha_x, alpha_y,
+                return make_coated_diffuse(reflectance(tables, m.reflectance, uv, Rgb(0.5f)), ior, m.thickness, alpha_x, alpha_y,
                                            (m.layer_events + 1) / 2);
             case MaterialKind::kCoatedConductor: {
                 const ConductorIndex index = conductor_index(tables, m, uv);

@@ -22,14 +22,15 @@ struct RawHit {
 /// place of each coordinate (with a floor near the origin) [Waechter and Binder 2019, A Fast and Robust Method for Avoiding
 /// Self-Intersection], and never less than what `reach` asks for. `reach` bounds the coordinates of the whole triangle or
 /// sphere that `p` lies on: where `p` is, and where a ray finds the surface, are known to some units in the last place of
-/// THAT, which near the origin of a large ground plane is far more than those of `p`. Camera and light sub-paths, next
+/// THAT, which near the origin of a large ground plane is far more than those of `p`. The floor near the origin shrinks with
+/// `reach` below 1/4, for scenes that are small as a whole. Camera and light sub-paths, next
 /// event and connections all use this one rule, so that a segment has the same visibility from either end.
 inline Vec3 offset_origin(const Vec3& p, const Vec3& geometric_normal, const Vec3& direction, float reach) {
-    constexpr float kOrigin = 1.0f / 32, kFloatScale = 1.0f / 65536, kIntScale = 256, kReachScale = 0x1p-20f;
+    constexpr float kOrigin = 1.0f / 32, kIntScale = 256, kReachScale = 0x1p-20f;
     const Vec3 n = face_forward(geometric_normal, direction);
-    const float least = kReachScale * reach;
-    const auto move = [least](float c, float nc) {
-        float moved = c + kFloatScale * nc;
+    const float least = kReachScale * reach, floor = reach < 0.25f ? 0x1p-14f * reach : 0x1p-16f;
+    const auto move = [least, floor](float c, float nc) {
+        float moved = c + floor * nc;
         if (!(std::fabs(c) < kOrigin)) {
             const int32_t steps = int32_t(kIntScale * nc);
             moved = std::bit_cast<float>(std::bit_cast<int32_t>(c) + (c < 0 ? -steps : steps));

@@ -97,6 +97,7 @@ bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out) const {
         const Vec3 n = normalize(inv.normal_by_inverse(out->shading.n));
         out->shading = frame_along(n, m.vector(out->shading.s));
     }
+    out->reach = std::max(out->reach, least_reach_);
     return true;
 }
 

@@ -47,7 +47,8 @@ struct SurfacePoint {
     Vec2 uv;
     MaterialId material = kNone;
     int32_t emitter = kNone;
-    float reach = 0;     ///< Largest coordinate magnitude of the primitive, world space; see offset_origin().
+    /// Largest coordinate magnitude of the primitive, world space, and at least Scene's least_reach_; see offset_origin().
+    float reach = 0;
 };
 
 class Scene {
@@ -77,6 +78,7 @@ class Scene {
     Scene() = default;
     Status check() const;
     void collect_emitters(std::vector<Emitter>* emitters);
+    float smallest_reach(const Bounds3& bounds) const;
     void summarise();
     void triangle_point(const TriangleMesh& mesh, const RawHit& hit, SurfacePoint* out) const;
     static float opacity(const void* user, int32_t object, uint32_t geometry, uint32_t primitive, float u, float v);
@@ -90,6 +92,9 @@ class Scene {
     std::vector<std::string> light_sources_;     // where each light group came from
     EmitterSet emitters_;
     Camera camera_;
+    /// Largest coordinate magnitude in the whole scene, at most 1/4: in a scene of ordinary size small primitives keep the
+    /// offsets that rays from afar need, and only in a scene that is tiny as a whole do the offsets shrink with it.
+    float least_reach_ = 0.25f;
     FrameLayout frame_;
     SceneSummary summary_;
 };

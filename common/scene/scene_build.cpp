@@ -46,6 +46,12 @@ struct Checker {
                                         std::to_string(m.positions.size()) + " vertices)");
         for (const Vec3& p : m.positions)
             if (!is_finite(p)) return invalid_argument(where + ": a vertex position is not finite");
+        for (size_t i = 0; i < m.indices.size(); i += 3) {
+            const Vec3 &a = m.positions[m.indices[i]], &b = m.positions[m.indices[i + 1]], &c = m.positions[m.indices[i + 2]];
+            if (!std::isfinite(length_squared(cross(b - a, c - a))))
+                return invalid_argument(where + ": triangle " + std::to_string(i / 3) +
+                                        " is too large: its area is beyond single precision; make the scene smaller");
+        }
         for (const Vec3& n : m.normals)
             if (!is_finite(n)) return invalid_argument(where + ": a vertex normal is not finite");
         return {};
@@ -55,6 +61,10 @@ struct Checker {
         LL_RETURN_IF_ERROR(attributes(s.attributes, may_emit));
         if (!is_finite(s.centre) || !(s.radius > 0) || !std::isfinite(s.radius))
             return invalid_argument(at(s.attributes) + ": a sphere needs a finite centre and a positive radius");
+        const float area = 4 * kPi * s.radius * s.radius;
+        if (!std::isfinite(area) || !std::isfinite(1 / area))
+            return invalid_argument(at(s.attributes) + ": the sphere is too " + (area > 1 ? "large" : "small") +
+                                    ": its area is beyond single precision; scale the scene");
         return {};
     }
 };
@@ -166,8 +176,8 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
         e.position = l.position;
         e.normal = l.axes.n;
         e.radiance = l.intensity;
-        e.cos_total = l.cos_total;
-        e.cos_falloff = l.cos_falloff;
+        e.total_height = l.total_height;
+        e.falloff_height = l.falloff_height;
         e.light = new_light("spot light");
         emitters->push_back(e);
     }
@@ -185,6 +195,14 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
         e.light = new_light("infinite light");
         emitters->push_back(e);
     }
+}
+
+float Scene::smallest_reach(const Bounds3& bounds) const {
+    float reach = largest_coordinate(description_.camera.camera_to_world.point({0, 0, 0}));
+    if (!bounds.empty()) reach = std::max({reach, largest_coordinate(bounds.lo), largest_coordinate(bounds.hi)});
+    for (const PointLight& l : description_.point_lights) reach = std::max(reach, largest_coordinate(l.position));
+    for (const SpotLight& l : description_.spot_lights) reach = std::max(reach, largest_coordinate(l.position));
+    return std::min(reach, 0.25f);
 }
 
 Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions& options) {
@@ -241,9 +259,11 @@ Result<std::unique_ptr<Scene>> Scene::build(SceneDescription description, const 
     if (!accel.ok()) return accel.status();
     scene->accel_ = std::move(accel).value();
 
+    const Bounds3 bounds = scene->accel_->bounds();
+    scene->least_reach_ = scene->smallest_reach(bounds);
     std::vector<Emitter> emitters;
     scene->collect_emitters(&emitters);
-    const Bounds3 bounds = scene->accel_->bounds();
+    for (Emitter& e : emitters) e.reach = std::max(e.reach, scene->least_reach_);
     const Vec3 centre = bounds.empty() ? Vec3{} : bounds.centre();
     // A little larger than the bounding sphere, so that rounding never starts a light sub-path inside of the scene.
     const float radius = bounds.empty() ? 1.0f : length(bounds.hi - centre) * 1.0001f + 1e-6f;

@@ -44,21 +44,25 @@ Rgb image_value(const TextureNode& node, const Image& image, Vec2 st) {
 
 }  // namespace
 
-Rgb evaluate_texture(const TextureTables& tables, TextureId id, Vec2 uv) {
+Rgb evaluate_texture(const TextureTables& tables, TextureId id, Vec2 uv, TextureUse use) {
     const TextureNode& node = tables.nodes[size_t(id)];
     const Vec2 st{node.su * uv.x + node.du, node.sv * uv.y + node.dv};
     switch (node.kind) {
         case TextureKind::kConstant: return node.value;
-        case TextureKind::kScale: return evaluate_texture(tables, node.a, uv) * evaluate_texture(tables, node.b, uv);
+        case TextureKind::kScale: return evaluate_texture(tables, node.a, uv, use) * evaluate_texture(tables, node.b, uv);
         case TextureKind::kMix: {
             const Rgb t = evaluate_texture(tables, node.amount, uv);
-            return evaluate_texture(tables, node.a, uv) * (Rgb(1.0f) - t) + evaluate_texture(tables, node.b, uv) * t;
+            return evaluate_texture(tables, node.a, uv, use) * (Rgb(1.0f) - t) + evaluate_texture(tables, node.b, uv, use) * t;
         }
         case TextureKind::kCheckerboard: {
             const int64_t cells = int64_t(std::floor(st.x)) + int64_t(std::floor(st.y));
-            return evaluate_texture(tables, (cells & 1) == 0 ? node.a : node.b, uv);
+            return evaluate_texture(tables, (cells & 1) == 0 ? node.a : node.b, uv, use);
         }
-        case TextureKind::kImage: return image_value(node, tables.images[size_t(node.image)], st);
+        case TextureKind::kImage: {
+            const Rgb v = image_value(node, tables.images[size_t(node.image)], st);
+            if (use == TextureUse::kUnbounded) return v;
+            return {std::min(v.r, 1.0f), std::min(v.g, 1.0f), std::min(v.b, 1.0f)};
+        }
     }
     return {};
 }

@@ -15,9 +15,13 @@ struct TextureTables {
     std::span<const Material> materials;
 };
 
+/// What a colour texture is looked up for. As in pbrt, an image gives a reflectance of at most 1 per texel lookup, before
+/// other textures scale or mix it; refractive indices and float textures have no such bound.
+enum class TextureUse { kUnbounded, kReflectance };
+
 /// Value of a texture at (u, v). Nesting is bounded at import (at most 32 levels). For a pbrt v coordinate, image row 0 is
 /// at v = 1. Never reads out of range.
-Rgb evaluate_texture(const TextureTables& tables, TextureId id, Vec2 uv);
+Rgb evaluate_texture(const TextureTables& tables, TextureId id, Vec2 uv, TextureUse use = TextureUse::kUnbounded);
 
 /// Resolve `material` at (u, v). A kMix material is decided stochastically but reproducibly from `choice` in [0, 1): the
 /// decision is part of the vertex, so every technique that produces the same vertex sees the same surface.

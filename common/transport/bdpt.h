@@ -28,6 +28,67 @@ struct BdptSelection {
     }
 };
 
+/// One way in which a camera sample and its light sub-path met: technique s, t with y[0 .. s-1] (s >= 2) and z[0 .. t-1]. x_0 is
+/// apart because for s <= 1 it is on neither array. `view` is filled in.
+struct BdptContribution {
+    Rgb value;  ///< Unweighted, f / p.
+    int s = 0, t = 0;
+    const PathVertex *y = nullptr, *z = nullptr;
+    Vec3 position, normal;  ///< Of x_0; for an infinite light a point outside of the scene and the direction of travel.
+    uint32_t emitter = 0;
+    Vec2 film;              ///< t = 1 only.
+};
+
+/// Traces one camera sample and one light sub-path and calls contribute(contribution, view) for everything that they give.
+/// light_done(y, n) is called once the light sub-path is complete.
+template <ViewDetail detail, class LightDone, class Contribute>
+void trace_bdpt_sample(SampleContext& context, LightDone&& light_done, Contribute&& contribute) {
+    const Scene& scene = context.scene;
+    PathVertex *y = context.light_path_vertices, *z = context.camera_path;
+    PathView view;
+    Rng rng({context.seed, Stage::kLight, context.group_iteration, context.light_path});
+    const int n = trace_light_path(scene, rng, context.max_edges, context.roulette, y, &context.counters);
+    light_done(y, n);
+    const auto from_light = [&](const Rgb& value, int s, int t, Vec2 film) {
+        contribute(BdptContribution{value, s, t, y, z, y[0].p, y[0].ng, uint32_t(y[0].emitter), film}, view);
+    };
+    for (int s = 2; s <= n; ++s) {
+        if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
+        Vec2 film;
+        z[0].p = scene.camera().sample_lens(rng.uniform2());
+        const Rgb c = connect_to_camera(scene, y, s, z[0].p, &film, &view, &context.counters);
+        if (!c.is_black()) from_light(c, s, 1, film);
+    }
+
+    CameraSampler sampler(context.seed, context.iteration, context.pixel);
+    const auto visit = [&](int t) {
+        const PathVertex& v = z[t - 1];
+        if (v.emitter != kNone)
+            if (const Rgb c = emitter_hit<detail>(scene, z, t, &view); !c.is_black())
+                contribute(BdptContribution{c, 0, t, y, z, v.p, v.ng, uint32_t(v.emitter), {}}, view);
+        if (t > context.max_edges || !v.bsdf.has_smooth_lobe()) return;
+        NextEventSample light;
+        const double pick = sampler.rng().uniform_double();
+        if (scene.emitters().sample_next_event(v.p, pick, sampler.next_event(t), &light))
+            if (const Rgb c = next_event<detail>(scene, z, t, light, &view, &context.counters); !c.is_black())
+                contribute(BdptContribution{c, 1, t, y, z, light.position, light.normal, light.emitter, {}}, view);
+        for (int s = 2; s <= n && s + t - 1 <= context.max_edges; ++s) {
+            if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
+            if (const Rgb c = connect<detail>(scene, y, s, z, t, &view, &context.counters); !c.is_black()) from_light(c, s, t, {});
+        }
+    };
+    const auto escape = [&](int t, const WalkRay& ray) {
+        if (t > context.max_edges) return;
+        const Rgb c = environment_hit<detail>(scene, z, t, ray, &view);
+        if (c.is_black()) return;
+        const EmitterSet& emitters = scene.emitters();
+        contribute(BdptContribution{c, 0, t, y, z, ray.origin + ray.direction * (2 * emitters.scene_radius()), -ray.direction,
+                                    uint32_t(emitters.environment_index()), {}}, view);
+    };
+    trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters, visit,
+                      escape);
+}
+
 /// A selection with fewer techniques than BdptSelection (connect_factor 0) makes an algorithm of the techniques that remain.
 template <class Selection = BdptSelection>
 struct BdptAlgorithm {
@@ -35,44 +96,16 @@ struct BdptAlgorithm {
     Heuristic heuristic = Heuristic::kBalance;
 
     Rgb sample(SampleContext& context) const {
-        const Scene& scene = context.scene;
-        PathVertex *y = context.light_path_vertices, *z = context.camera_path;
-        PathView view;
-        const auto weighted = [&](const Rgb& contribution, int s) {
-            return contribution * float(mis_weight(view, {TechniqueKind::kConnect, s}, selection, heuristic));
-        };
-        Rng rng({context.seed, Stage::kLight, context.group_iteration, context.light_path});
-        const int n = trace_light_path(scene, rng, context.max_edges, context.roulette, y, &context.counters);
-        for (int s = 2; s <= n; ++s) {
-            if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
-            Vec2 film;
-            const Vec3 lens = scene.camera().sample_lens(rng.uniform2());
-            const Rgb c = connect_to_camera(scene, y, s, lens, &film, &view, &context.counters);
-            if (!c.is_black()) context.splat(film, weighted(c, s));
-        }
-
         Rgb sum;
-        CameraSampler sampler(context.seed, context.iteration, context.pixel);
-        const auto visit = [&](int t) {
-            const PathVertex& v = z[t - 1];
-            if (v.emitter != kNone)
-                if (const Rgb c = emitter_hit(scene, z, t, &view); !c.is_black()) sum += weighted(c, 0);
-            if (t > context.max_edges || !v.bsdf.has_smooth_lobe()) return;
-            NextEventSample light;
-            const double pick = sampler.rng().uniform_double();
-            if (scene.emitters().sample_next_event(v.p, pick, sampler.next_event(t), &light))
-                if (const Rgb c = next_event(scene, z, t, light, &view, &context.counters); !c.is_black()) sum += weighted(c, 1);
-            for (int s = 2; s <= n && s + t - 1 <= context.max_edges; ++s) {
-                if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
-                if (const Rgb c = connect(scene, y, s, z, t, &view, &context.counters); !c.is_black()) sum += weighted(c, s);
-            }
-        };
-        const auto escape = [&](int t, const WalkRay& ray) {
-            if (t > context.max_edges) return;
-            if (const Rgb c = environment_hit(scene, z, t, ray, &view); !c.is_black()) sum += weighted(c, 0);
-        };
-        trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
-                          visit, escape);
+        trace_bdpt_sample<ViewDetail::kFull>(
+            context, [](const PathVertex*, int) {},
+            [&](const BdptContribution& c, const PathView& view) {
+                const Rgb weighted = c.value * float(mis_weight(view, {TechniqueKind::kConnect, c.s}, selection, heuristic));
+                if (c.t == 1)
+                    context.splat(c.film, weighted);
+                else
+                    sum += weighted;
+            });
         return sum;
     }
 };

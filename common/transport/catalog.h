@@ -20,6 +20,8 @@ struct ParameterInfo {
     double min_value, max_value;
     bool integer;
     std::string_view help;  ///< What it does, unit, source.
+    /// Names of the values 0, 1, ... where a name says more than a number; both are understood.
+    std::span<const std::string_view> choices = {};
 };
 
 struct AlgorithmInfo {
@@ -29,6 +31,7 @@ struct AlgorithmInfo {
     std::string_view bias;      ///< "unbiased", or what is biased or missing.
     std::span<const ParameterInfo> parameters;
     bool splats;                ///< Traces light paths that land anywhere on the frame.
+    bool needs_tables = false;  ///< Reads tables that training units make first (common/tables).
 };
 
 /// Parsed, validated parameters of one algorithm, in the order of its AlgorithmInfo::parameters.
@@ -41,8 +44,11 @@ std::span<const AlgorithmInfo> catalog();
 Result<const AlgorithmInfo*> find_algorithm(std::string_view name);
 /// Unknown key, not a number, or out of range: kInvalidArgument naming the key, the range and the algorithm.
 Result<AlgorithmParameters> parse_parameters(const AlgorithmInfo& algorithm, const std::map<std::string, std::string>& set);
+bool has_parameter(const AlgorithmInfo& algorithm, std::string_view name);
 /// Value of a parameter that the algorithm has.
 double parameter_value(const AlgorithmInfo& algorithm, const AlgorithmParameters& parameters, std::string_view name);
+/// All parameters with their values as canonical text, so that an image says what was rendered even where defaults applied.
+std::map<std::string, std::string> complete_parameters(const AlgorithmInfo& algorithm, const AlgorithmParameters& values);
 /// N1: light paths splatted per pixel and iteration, one constant of the frame.
 double light_paths_per_pixel(const AlgorithmInfo& algorithm, const AlgorithmParameters& parameters);
 

@@ -1,7 +1,7 @@
 #include "common/transport/first_hit.h"
 
 #include "common/path/camera_walk.h"
-#include "common/transport/fork_join.h"
+#include "common/core/fork_join.h"
 
 namespace lightloom {
 

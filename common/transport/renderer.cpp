@@ -1,17 +1,17 @@
 #include "common/transport/renderer.h"
 
-#include <algorithm>
-
-#include "common/path/path_view.h"
 #include "common/transport/bdpt.h"
 #include "common/transport/light.h"
+#include "common/transport/lvcbpt.h"
+#include "common/transport/parameters.h"
 #include "common/transport/path.h"
+#include "common/transport/spcbpt.h"
 #include "common/transport/unit_loop.h"
 
 namespace lightloom {
 namespace {
 
-template <UnitAlgorithm A>
+template <class A>
 class UnitRenderer final : public Renderer {
   public:
     UnitRenderer(std::shared_ptr<const Scene> scene, RenderSettings settings, RouletteRule roulette, A algorithm)
@@ -30,29 +30,32 @@ class UnitRenderer final : public Renderer {
 
 }  // namespace
 
-Result<std::unique_ptr<Renderer>> Renderer::create(std::shared_ptr<const Scene> scene, const RenderSettings& settings) {
-    Result<const AlgorithmInfo*> info = find_algorithm(settings.algorithm);
-    if (!info.ok()) return info.status();
-    Result<AlgorithmParameters> parameters = parse_parameters(**info, settings.parameters);
-    if (!parameters.ok()) return parameters.status();
-    if (settings.max_depth < 0 || settings.max_depth + 1 > kMaxEdges)
-        return invalid_argument("max depth must lie between 0 and " + std::to_string(kMaxEdges - 1) + ", not " +
-                                std::to_string(settings.max_depth));
-    const auto value = [&](std::string_view name) { return parameter_value(**info, *parameters, name); };
-    RouletteRule roulette;
-    roulette.first_vertex = int(value("rr-start"));
-    roulette.min_survival = float(value("rr-min"));
-    roulette.max_survival = std::max(roulette.max_survival, roulette.min_survival);  // rr-min=1 switches roulette off
+Result<std::unique_ptr<Renderer>> Renderer::create(std::shared_ptr<const Scene> scene, const RenderSettings& settings,
+                                                   std::shared_ptr<const SubspaceTables> tables) {
+    const Result<TransportParameters> read = TransportParameters::read(settings);
+    if (!read.ok()) return read.status();
+    const TransportParameters& p = *read;
+    if (p.needs_tables) {
+        if (!tables) return failed_precondition("algorithm '" + settings.algorithm + "' needs its tables");
+        LL_RETURN_IF_ERROR(tables->validate(scene->emitters()));
+    }
+    const double light_paths_per_iteration = p.light_paths * double(scene->frame().crop.area());
     const auto make = [&](auto algorithm) {
         return std::unique_ptr<Renderer>(
-            new UnitRenderer<decltype(algorithm)>(std::move(scene), settings, roulette, std::move(algorithm)));
+            new UnitRenderer<decltype(algorithm)>(std::move(scene), settings, p.roulette, std::move(algorithm)));
     };
-    if (settings.algorithm == "path") return make(PathAlgorithm{Heuristic(int(value("heuristic")))});
+    if (settings.algorithm == "path") return make(PathAlgorithm{p.heuristic});
     if (settings.algorithm == "light") return make(LightAlgorithm{});
-    BdptAlgorithm<> bdpt;
-    bdpt.heuristic = Heuristic(int(value("heuristic")));
-    bdpt.selection.light_paths_per_iteration = double(scene->frame().crop.area());
-    return make(bdpt);
+    if (settings.algorithm == "bdpt") return make(BdptAlgorithm<>{{light_paths_per_iteration}, p.heuristic});
+    if (settings.algorithm == "lvcbpt")
+        return make(LvcbptAlgorithm{{light_paths_per_iteration, double(p.connections) / tables->vertices_per_path},
+                                    p.heuristic, p.connections, p.minimum_paths});
+    SubspaceSelection selection;
+    selection.prepared = std::make_shared<const PreparedTables>(*tables);
+    selection.light_paths_per_iteration = light_paths_per_iteration;
+    selection.connections = p.connections;
+    selection.cache_paths = p.ris_aware ? double(p.minimum_paths) : 0;
+    return make(SpcbptAlgorithm{std::move(selection), p.heuristic, p.connections, p.minimum_paths});
 }
 
 }  // namespace lightloom

@@ -9,6 +9,7 @@
 #include "common/core/result.h"
 #include "common/film/partial.h"
 #include "common/scene/scene.h"
+#include "common/tables/subspace_tables.h"
 #include "common/transport/catalog.h"
 
 namespace lightloom {
@@ -37,7 +38,9 @@ class Renderer {
     virtual ~Renderer() = default;
 
     /// `scene` must already have the resolution and crop of the job (Scene::build options).
-    static Result<std::unique_ptr<Renderer>> create(std::shared_ptr<const Scene> scene, const RenderSettings& settings);
+    /// `tables` belong to this scene and these settings; only algorithms whose catalog row says so need them.
+    static Result<std::unique_ptr<Renderer>> create(std::shared_ptr<const Scene> scene, const RenderSettings& settings,
+                                                    std::shared_ptr<const SubspaceTables> tables = nullptr);
 
     /// Renders one unit on the calling thread's TBB arena; the result does not depend on how many threads that has.
     /// A stop request makes it return kCancelled soon.

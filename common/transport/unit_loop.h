@@ -9,7 +9,7 @@
 
 #include "common/film/partial.h"
 #include "common/path/random_walk.h"
-#include "common/transport/fork_join.h"
+#include "common/core/fork_join.h"
 #include "common/transport/renderer.h"
 
 namespace lightloom {
@@ -41,6 +41,23 @@ struct SampleContext {
     }
 };
 
+/// What an algorithm may know before the first sample of a unit.
+struct UnitScope {
+    const Scene& scene;
+    uint64_t seed;
+    int max_edges;
+    RouletteRule roulette;
+    const UnitWork& work;
+    std::stop_token stop;
+};
+
+/// What an algorithm brings to all samples of a unit (a light-vertex cache), and what making it has already added to the image.
+struct UnitPreparation {
+    std::vector<std::vector<Splat>> splats;  ///< By chunk, in path order.
+    WalkCounters counters;
+    uint64_t light_paths = 0;  ///< Traced in all, splatted or not.
+};
+
 /// An algorithm: `sample` returns the camera part of one sample of pixel (px, py) and splats the rest; with
 /// kOwnsCameraSamples false it is called once per light path instead and only splats.
 template <class A>
@@ -48,8 +65,16 @@ concept UnitAlgorithm = requires(const A& a, SampleContext& context) {
     { a.sample(context) } -> std::same_as<Rgb>;
 };
 
+/// One that makes something for the whole unit first: `prepare` runs before the first sample, on all threads of the arena, and its
+/// result is passed to every sample.
+template <class A>
+concept PreparedAlgorithm = requires(const A& a, const UnitScope& scope, UnitPreparation& preparation, SampleContext& context) {
+    { a.sample(context, a.prepare(scope, &preparation)) } -> std::same_as<Rgb>;
+};
+
 /// Sums one unit. See UnitWork for what the numbers mean.
-template <UnitAlgorithm A>
+template <class A>
+    requires UnitAlgorithm<A> || PreparedAlgorithm<A>
 Result<Partial> render_unit(const A& algorithm, const Scene& scene, const RenderSettings& settings, const RouletteRule& roulette,
                             const UnitWork& work, std::stop_token stop) {
     const Rect& crop = scene.frame().crop;
@@ -61,6 +86,20 @@ Result<Partial> render_unit(const A& algorithm, const Scene& scene, const Render
     partial.samples_per_pixel = work.iteration_count;
     partial.camera.assign(size_t(3 * tile.area()), 0.0);
     partial.light_paths = work.light_path_count;
+
+    UnitPreparation preparation;
+    const auto make_sampler = [&] {
+        if constexpr (PreparedAlgorithm<A>) {
+            const UnitScope scope{scene, settings.seed, settings.max_depth + 1, roulette, work, stop};
+            return [&algorithm, state = algorithm.prepare(scope, &preparation)](SampleContext& context) {
+                return algorithm.sample(context, state);
+            };
+        } else {
+            return [&algorithm](SampleContext& context) { return algorithm.sample(context); };
+        }
+    };
+    const auto sample = make_sampler();
+    if (stop.stop_requested()) return Status(StatusCode::kCancelled, "the unit was cancelled");
 
     struct Chunk {
         std::vector<Splat> splats;
@@ -95,7 +134,7 @@ Result<Partial> render_unit(const A& algorithm, const Scene& scene, const Render
                 for (uint32_t b = 0; b < work.iteration_count; ++b) {
                     context.iteration = work.first_iteration + b;
                     context.light_path = work.first_light_path + uint64_t(b) * uint64_t(pixels) + uint64_t(i);
-                    const Rgb value = algorithm.sample(context);
+                    const Rgb value = sample(context);
                     if (!is_finite(value)) {
                         if (chunk.dropped.size() < Partial::kMaxDroppedRecords)
                             chunk.dropped.push_back({context.iteration, context.pixel, false});
@@ -111,19 +150,19 @@ Result<Partial> render_unit(const A& algorithm, const Scene& scene, const Render
     if (stop.stop_requested()) return Status(StatusCode::kCancelled, "the unit was cancelled");
 
     partial.counters.camera_samples = uint64_t(pixels) * work.iteration_count;
-    partial.counters.light_paths = work.light_path_count;
+    partial.counters.light_paths = std::max(work.light_path_count, preparation.light_paths);
     std::vector<double> splat_sums;
     const auto drop = [&](const DroppedSample& d) {
         if (partial.dropped.size() < Partial::kMaxDroppedRecords) partial.dropped.push_back(d);
     };
-    for (const Chunk& chunk : chunks) {
-        partial.dropped_count += chunk.dropped_count;
-        for (const DroppedSample& d : chunk.dropped) drop(d);
-        partial.counters.rays += chunk.counters.rays;
-        partial.counters.vertices += chunk.counters.vertices;
-        partial.counters.connections += chunk.counters.connections;
-        if (!chunk.splats.empty() && splat_sums.empty()) splat_sums.assign(size_t(3 * crop.area()), 0.0);
-        for (const Splat& s : chunk.splats) {
+    const auto add_counters = [&](const WalkCounters& c) {
+        partial.counters.rays += c.rays;
+        partial.counters.vertices += c.vertices;
+        partial.counters.connections += c.connections;
+    };
+    const auto add_splats = [&](const std::vector<Splat>& splats) {
+        if (!splats.empty() && splat_sums.empty()) splat_sums.assign(size_t(3 * crop.area()), 0.0);
+        for (const Splat& s : splats) {
             if (!is_finite(s.value)) {
                 ++partial.dropped_count;
                 drop({s.iteration, s.pixel, true});
@@ -132,6 +171,14 @@ Result<Partial> render_unit(const A& algorithm, const Scene& scene, const Render
             double* sum = &splat_sums[size_t(s.pixel) * 3];
             sum[0] += s.value.r, sum[1] += s.value.g, sum[2] += s.value.b;
         }
+    };
+    for (const std::vector<Splat>& splats : preparation.splats) add_splats(splats);
+    add_counters(preparation.counters);
+    for (const Chunk& chunk : chunks) {
+        partial.dropped_count += chunk.dropped_count;
+        for (const DroppedSample& d : chunk.dropped) drop(d);
+        add_counters(chunk.counters);
+        add_splats(chunk.splats);
     }
     for (uint32_t p = 0; p * size_t(3) < splat_sums.size(); ++p) {
         const double* sum = &splat_sums[size_t(p) * 3];

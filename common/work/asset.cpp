@@ -4,6 +4,8 @@
 #include <charconv>
 #include <optional>
 
+#include "common/core/utf8.h"
+
 namespace lightloom {
 namespace {
 
@@ -22,27 +24,10 @@ Status bad_line(int number, std::string_view what) {
     return invalid_argument("scene file list, line " + std::to_string(number) + ": " + std::string(what));
 }
 
-/// Well-formed UTF-8 [RFC 3629]: no overlong form, no surrogate, nothing above U+10FFFF.
-bool is_utf8(std::string_view text) {
-    for (size_t i = 0; i < text.size();) {
-        const uint8_t lead = uint8_t(text[i++]);
-        if (lead < 0x80) continue;
-        const int more = lead >= 0xc2 && lead <= 0xdf ? 1 : (lead & 0xf0) == 0xe0 ? 2 : lead >= 0xf0 && lead <= 0xf4 ? 3 : 0;
-        if (more == 0 || text.size() - i < size_t(more)) return false;
-        const uint8_t second = uint8_t(text[i]);
-        if ((lead == 0xe0 && second < 0xa0) || (lead == 0xed && second > 0x9f) || (lead == 0xf0 && second < 0x90) ||
-            (lead == 0xf4 && second > 0x8f))
-            return false;
-        for (int k = 0; k < more; ++k)
-            if ((uint8_t(text[i++]) & 0xc0) != 0x80) return false;
-    }
-    return true;
-}
-
 }  // namespace
 
 Status validate_asset_path(std::string_view path) {
-    const std::string shown(path.substr(0, 80));
+    const std::string shown = clipped_utf8(path, 80);
     if (path.empty()) return invalid_argument("empty file name in a scene");
     if (path.size() > 1024) return invalid_argument("file name longer than 1024 bytes: " + shown + "...");
     for (const char c : path) {

@@ -26,7 +26,6 @@ Digest JobSpec::image_digest() const {
                                frame.crop.y0, frame.crop.x1, frame.crop.y1};
     for (const int32_t n : numbers) put(text, "frame", std::to_string(n));
     put(text, "layers", first_hit_layers ? "first-hit" : "none");
-    put(text, "colour", half_float ? "half" : "float");
     return sha256(text);
 }
 

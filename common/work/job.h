@@ -25,7 +25,6 @@ struct JobSpec {
     Digest scene_root;               ///< Of the scene's file list (asset manifest).
     FrameLayout frame;               ///< Filled from the scene when the job is accepted.
     bool first_hit_layers = false;   ///< Also write albedo, normal and depth of the first hit.
-    bool half_float = false;         ///< Store colour as half; a value beyond its range fails the job.
 
     /// Digest of everything that decides the bytes of the image except how many iterations are rendered.
     Digest image_digest() const;
@@ -87,6 +86,8 @@ class Plan {
     uint32_t max_group_iterations() const { return max_group_iterations_; }
     /// The groups that make exactly `iterations` iterations; the last one is cut short where need be.
     std::vector<Group> groups_for(uint64_t iterations) const;
+    /// How many groups these are, without making them.
+    uint32_t group_count(uint64_t iterations) const;
     /// The units of a group, tile by tile.
     std::vector<WorkUnit> units(const Group& group) const;
     uint32_t tile_count() const { return uint32_t(tiles_.size()); }

@@ -93,6 +93,17 @@ std::vector<Group> Plan::groups_for(uint64_t iterations) const {
     return groups;
 }
 
+uint32_t Plan::group_count(uint64_t iterations) const {
+    uint64_t done = 0, count = 0;
+    while (done < iterations) {
+        const uint32_t size = group_size(done, max_group_iterations_);
+        if (size == max_group_iterations_) return uint32_t(count + (iterations - done + size - 1) / size);
+        done += size;
+        ++count;
+    }
+    return uint32_t(count);
+}
+
 std::vector<WorkUnit> Plan::units(const Group& group) const {
     return split_group(group, tiles_, light_paths_per_pixel_);
 }

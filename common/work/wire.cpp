@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "common/core/utf8.h"
+
 namespace lightloom::wire {
 namespace {
 
@@ -50,7 +52,6 @@ void put(const JobSpec& in, v1::JobSpec* out) {
     out->mutable_frame()->set_height(in.frame.height);
     put_rect(in.frame.crop, out->mutable_frame()->mutable_crop());
     out->set_first_hit_layers(in.first_hit_layers);
-    out->set_half_float(in.half_float);
 }
 
 Result<JobSpec> get(const v1::JobSpec& in) {
@@ -69,7 +70,6 @@ Result<JobSpec> get(const v1::JobSpec& in) {
     spec.scene_root = *root;
     spec.frame = {in.frame().width(), in.frame().height(), get_rect(in.frame().crop())};
     spec.first_hit_layers = in.first_hit_layers();
-    spec.half_float = in.half_float();
     return spec;
 }
 
@@ -77,7 +77,7 @@ void put(const JobInfo& in, v1::Job* out) {
     out->set_job_id(in.job_id);
     out->set_state(v1::JobState(int(in.state) + 1));
     put(in.spec, out->mutable_spec());
-    out->set_message(in.message);
+    out->set_message(clipped_utf8(in.message, kMaxMessageBytes));
     out->set_revision(in.revision);
     out->set_unit_total_count(in.unit_total);
     out->set_unit_done_count(in.unit_done);
@@ -202,7 +202,7 @@ WorkerGrant get(const v1::WorkerGrant& in) { return {in.worker_id(), in.heartbea
 
 void put(const SubmitAck& in, v1::SubmitResultResponse* out) {
     out->set_outcome(v1::SubmitOutcome(int(in.outcome) + 1));
-    out->set_reason(in.reason);
+    out->set_reason(clipped_utf8(in.reason, kMaxMessageBytes));
 }
 
 Result<SubmitAck> get(const v1::SubmitResultResponse& in) {

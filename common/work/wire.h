@@ -11,6 +11,9 @@
 
 namespace lightloom::wire {
 
+/// Bytes of a message about an error, at most; what is longer is cut.
+inline constexpr size_t kMaxMessageBytes = 2000;
+
 grpc::Status to_grpc(const Status& status);
 Status from_grpc(const grpc::Status& status);
 

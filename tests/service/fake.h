@@ -81,7 +81,8 @@ inline RendererSource fake_renderers(double seconds = 0) {
 }
 
 struct FakeService {
-    explicit FakeService(FrameLayout frame = {40, 30, {0, 0, 40, 30}}, std::optional<uint64_t> shuffle = std::nullopt) {
+    explicit FakeService(FrameLayout frame = {40, 30, {0, 0, 40, 30}}, std::optional<uint64_t> shuffle = std::nullopt,
+                         const std::function<void(CoordinatorOptions&)>& change = {}) {
         identity = {"build", "profile", sha256("golden")};
         const AssetManifest manifest{"scene.pbrt", {{"scene.pbrt", sha256("scene"), 5}}};
         root = manifest.root();
@@ -94,6 +95,7 @@ struct FakeService {
         };
         options.shuffle_seed = shuffle;
         options.clock = [this] { return TimePoint(std::chrono::milliseconds(now_ms)); };
+        if (change) change(options);
         coordinator = std::make_unique<Coordinator>(std::move(options));
         EXPECT_TRUE(coordinator->assets().put(root, manifest.canonical_text()).ok());
     }

@@ -85,6 +85,25 @@ TEST(Processes, BytesAreTheSameHoweverAJobIsRun) {
         ASSERT_EQ(service.submit(name, kJob)->wait(), 0) << service.log(name) << service.log("server");
         EXPECT_EQ(service.digest(name), reference) << count << " workers";
     }
+    // The same holds for half colours, whoever makes them.
+    std::vector<std::string> job = kJob;
+    job.push_back("--half");
+    const Digest half = embedded(service, 2, 1, job);
+    EXPECT_NE(half, reference);
+    const std::string id = service.jobs().list_jobs()->front().job_id;
+    ASSERT_EQ(Process("lightloom", {"fetch", id, "--server", service.address(), "--half", "-q", "-o", service.path("half.exr")},
+                      service.path("half.log")).wait(), 0) << service.log("half");
+    EXPECT_EQ(service.digest("half"), half);
+    EXPECT_EQ(service.manifest("half")["image"]["sha256"].get<std::string>(), half.hex());
+    EXPECT_EQ(service.manifest("half")["image"]["float_sha256"].get<std::string>(), reference.hex());
+}
+
+TEST(Processes, ASecondCoordinatorDoesNotShareADirectory) {
+    const Service service;
+    Process second("lightloom-server", {"--listen", "127.0.0.1:0", "--status", "off", "--data", service.path("data")},
+                   service.path("second.log"));
+    EXPECT_EQ(second.wait(), 1);
+    EXPECT_NE(service.log("second").find("is used by another coordinator"), std::string::npos) << service.log("second");
 }
 
 TEST(Processes, TwoProcessesRenderDisjointUnits) {
@@ -178,6 +197,7 @@ TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
     EXPECT_EQ(run({"render", kScene, "--set", "no-such=1"}), 2);
     EXPECT_EQ(run({"render", kScene, "--resolution", "12"}), 2);
     EXPECT_EQ(run({"render", kScene, "--spp", "1", "--time", "1"}), 2);
+    EXPECT_EQ(run({"submit", kScene, "--detach", "--half"}), 2);
     EXPECT_EQ(run({"no-such-command"}), 2);
     EXPECT_EQ(run({"list", "--server", "127.0.0.1:1"}), 4);
     EXPECT_EQ(run({"--help"}), 0);

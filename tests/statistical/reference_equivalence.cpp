@@ -32,8 +32,8 @@ using namespace lightloom::equivalence;
 namespace {
 
 struct Outcome {
-    Estimate estimate;
-    Interval image, regions[9];
+    Rendering rendering;
+    RatioInterval image, regions[9];
     double channel_ratios[3];
 };
 
@@ -48,41 +48,44 @@ Result<Outcome> compare_means(const Options& options, const std::string& name, c
         return invalid_argument(name + ": the reference has another size than the frame");
     const PartMeans expected = part_means(reference->color);
     const double reference_error = double(entry.at("mean_y_se")) / double(entry.at("mean_y"));
-    const double z_image = sidak_factor(tests), z_region = sidak_factor(9 * tests);
+    const double image_level = sidak(0.05, int(tests)), region_level = sidak(0.05, int(9 * tests));
+    const auto ratio = [&](const Rendering& r, size_t part, double error_scale, double level) {
+        const double error = expected[part] * reference_error * error_scale;
+        return ratio_interval(r.mean(part), {expected[part], error * error}, level);
+    };
 
     Outcome outcome;
-    const auto settled = [&](const Estimate& e) {
-        outcome.image = ratio_interval(e.parts[kImage], expected[kImage], reference_error, z_image);
+    const auto settled = [&](const Rendering& r) {
+        outcome.image = ratio(r, kImage, 1, image_level);
         bool all = outcome.image.within(options.bound);
-        for (size_t r = 0; r < 9; ++r) {
-            const size_t part = kFirstRegion + r;
-            outcome.regions[r] = ratio_interval(e.parts[part], expected[part], 3 * reference_error, z_region);
-            all &= outcome.regions[r].within(options.region_bound);
+        for (size_t i = 0; i < 9; ++i) {
+            outcome.regions[i] = ratio(r, kFirstRegion + i, 3, region_level);
+            all &= outcome.regions[i].within(options.region_bound);
         }
         return all;
     };
-    auto rendered = estimate(*loaded.scene, *render, options.seconds, settled);
+    auto rendered = render_groups(*loaded.scene, *render, options.seconds, settled);
     if (!rendered.ok()) return rendered.status();
-    outcome.estimate = std::move(rendered).value();
-    settled(outcome.estimate);
+    outcome.rendering = std::move(rendered).value();
+    settled(outcome.rendering);
     for (size_t c = 0; c < 3; ++c)
-        outcome.channel_ratios[c] = outcome.estimate.parts[kFirstChannel + c].mean() / expected[kFirstChannel + c];
+        outcome.channel_ratios[c] = outcome.rendering.mean(kFirstChannel + c).mean / expected[kFirstChannel + c];
     if (!options.pictures.empty()) {
         const std::string stem = options.pictures + "/" + name + "-" + algorithm;
-        LL_RETURN_IF_ERROR(write_png(stem + ".png", outcome.estimate.picture));
+        LL_RETURN_IF_ERROR(write_png(stem + ".png", outcome.rendering.picture));
         LL_RETURN_IF_ERROR(write_png8(stem + "-error.png", crop.width(), crop.height(),
-                                      signed_error_picture(outcome.estimate.picture, reference->color, 0.2)));
+                                      signed_error_picture(outcome.rendering.picture, reference->color, 0.2)));
     }
     return outcome;
 }
 
 void print(const std::string& name, const std::string& algorithm, const Outcome& outcome, double bound) {
-    const Interval& image = outcome.image;
+    const RatioInterval& image = outcome.image;
     std::printf("%-18s %-5s %5llu %6.1f  %.4f [%.4f, %.4f] %c  %.3f %.3f %.3f ", name.c_str(), algorithm.c_str(),
-                static_cast<unsigned long long>(outcome.estimate.iterations), outcome.estimate.seconds, image.ratio, image.low,
+                static_cast<unsigned long long>(outcome.rendering.iterations), outcome.rendering.seconds, image.ratio, image.low,
                 image.high, image.within(bound) ? '=' : image.excludes(bound) ? '!' : '?', outcome.channel_ratios[0],
                 outcome.channel_ratios[1], outcome.channel_ratios[2]);
-    for (const Interval& r : outcome.regions) std::printf(" %.3f+-%.3f", r.ratio, r.high - r.ratio);
+    for (const RatioInterval& r : outcome.regions) std::printf(" %.3f+-%.3f", r.ratio, r.high - r.ratio);
     std::printf("\n");
     std::fflush(stdout);
 }
@@ -90,16 +93,16 @@ void print(const std::string& name, const std::string& algorithm, const Outcome&
 nlohmann::ordered_json json_line(const std::string& name, const std::string& algorithm, const Outcome& outcome) {
     nlohmann::ordered_json line{{"scene", name},
                                 {"algorithm", algorithm},
-                                {"spp", outcome.estimate.iterations},
-                                {"seconds", outcome.estimate.seconds},
-                                {"dropped", outcome.estimate.dropped},
-                                {"image", outcome.image.json()},
+                                {"spp", outcome.rendering.iterations},
+                                {"seconds", outcome.rendering.seconds},
+                                {"dropped", outcome.rendering.dropped},
+                                {"image", to_json(outcome.image)},
                                 {"channels", outcome.channel_ratios}};
-    for (const Interval& r : outcome.regions) line["regions"].push_back(r.json());
+    for (const RatioInterval& r : outcome.regions) line["regions"].push_back(to_json(r));
     return line;
 }
 
-void print_own(const std::string& name, const char* what, const Interval& ratio) {
+void print_own(const std::string& name, const char* what, const RatioInterval& ratio) {
     std::printf("%-18s %-34s %.4f [%.4f, %.4f] %s\n", name.c_str(), what, ratio.ratio, ratio.low, ratio.high,
                 ratio.within(0.005) ? "=" : ratio.excludes(0.005) ? "!" : "?");
     std::fflush(stdout);
@@ -135,28 +138,28 @@ int run(const Options& options) {
         }
         auto loaded = load_scene(options, name, entry.at("resolution"));
         if (!loaded.ok()) return failed(name, loaded.status());
-        std::map<std::string, Mean> means;
+        std::map<std::string, Estimate> means;
         for (const std::string& algorithm : options.algorithms) {
             const auto outcome = compare_means(options, name, entry, *loaded, algorithm, tests);
             if (!outcome.ok()) return failed(name + " " + algorithm, outcome.status());
-            means[algorithm] = outcome->estimate.parts[kImage];
+            means[algorithm] = outcome->rendering.mean(kImage);
             print(name, algorithm, *outcome, options.bound);
             write(json_line(name, algorithm, *outcome));
             differ |= outcome->image.excludes(options.bound);
         }
-        const double z_own = sidak_factor(2 * refs.size());
+        const double own_level = sidak(0.05, int(2 * refs.size()));
         if (means.count("path") && means.count("bdpt")) {
-            const Interval ratio = ratio_interval(means["path"], means["bdpt"], z_own);
+            const RatioInterval ratio = ratio_interval(means["path"], means["bdpt"], own_level);
             print_own(name, "path / bdpt", ratio);
-            write({{"scene", name}, {"own", "path/bdpt"}, {"ratio", ratio.json()}});
+            write({{"scene", name}, {"own", "path/bdpt"}, {"ratio", to_json(ratio)}});
             differ |= ratio.excludes(0.005);
         }
         if (options.own) {
             nlohmann::ordered_json line{{"scene", name}, {"own", "light/bdpt"}};
-            const auto ratio = light_against_bdpt(options, *loaded, z_own, &line);
+            const auto ratio = light_against_bdpt(options, *loaded, own_level, &line);
             if (!ratio.ok()) return failed(name + " light", ratio.status());
             print_own(name, "light / bdpt without seen mirrors", *ratio);
-            line["ratio"] = ratio->json();
+            line["ratio"] = to_json(*ratio);
             write(line);
             differ |= ratio->excludes(0.005);
         }

@@ -2,15 +2,15 @@
 // Means of a picture and of its parts with confidence intervals, from independent group images: what the parts of the
 // program `reference_equivalence` share.
 
-#include <cmath>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "common/core/distributions.h"
 #include "common/core/result.h"
-#include "common/film/accumulation.h"
+#include "common/film/region_means.h"
 #include "common/scene/scene.h"
 #include "common/transport/renderer.h"
 
@@ -25,48 +25,27 @@ struct Options {
     bool own = false, missing = false, spectral = false;
 };
 
-/// Upper quantile of the normal distribution.
-double normal_quantile(double upper_tail);
-/// The factor that makes a standard error a two-sided 95 % interval, Sidak-corrected for `tests` of them.
-double sidak_factor(size_t tests);
-
-struct Interval {
-    double ratio = 0, low = 0, high = 0;
-    bool within(double bound) const { return low >= 1 - bound && high <= 1 + bound; }
-    bool excludes(double bound) const { return low > 1 + bound || high < 1 - bound; }
-    nlohmann::ordered_json json() const { return {{"ratio", ratio}, {"low", low}, {"high", high}}; }
-};
-
-/// Mean over groups, and its standard error.
-struct Mean {
-    double sum = 0, sum2 = 0;
-    int groups = 0;
-    void add(double value) { sum += value, sum2 += value * value, ++groups; }
-    double mean() const { return sum / groups; }
-    double standard_error() const { return std::sqrt(std::fmax(0, sum2 / groups - mean() * mean()) / (groups - 1)); }
-};
-
-/// m / reference, the reference's own relative standard error included.
-Interval ratio_interval(const Mean& m, double reference, double relative_reference_error, double z);
-/// a / b of two independent estimates.
-Interval ratio_interval(const Mean& a, const Mean& b, double z);
-
 /// The parts of a picture whose means are taken: luminance of the whole, of a 3 x 3 grid, and the channels of the whole.
 enum Part : int { kImage = 0, kFirstRegion = 1, kFirstChannel = 10, kParts = 13 };
+inline nlohmann::ordered_json to_json(const RatioInterval& i) { return {{"ratio", i.ratio}, {"low", i.low}, {"high", i.high}}; }
+
 using PartMeans = std::vector<double>;
 PartMeans part_means(const RgbImage& image);
 
-struct Estimate {
-    std::vector<Mean> parts = std::vector<Mean>(kParts);
+/// Independent group images, reduced to the means of their parts.
+struct Rendering {
+    std::vector<WeightedMean> parts = std::vector<WeightedMean>(kParts);
     uint64_t iterations = 0, dropped = 0;
     double seconds = 0;
     RgbImage picture;
+
+    Estimate mean(size_t part) const { return parts[part].estimate(); }
 };
 
 using RenderGroup = std::function<Result<Partial>(const UnitWork&)>;
 /// Renders groups until `settled` (asked from the 16th group on) or until `seconds` have passed.
-Result<Estimate> estimate(const Scene& scene, const RenderGroup& render, double seconds,
-                          const std::function<bool(const Estimate&)>& settled);
+Result<Rendering> render_groups(const Scene& scene, const RenderGroup& render, double seconds,
+                                const std::function<bool(const Rendering&)>& settled);
 
 struct LoadedScene {
     std::shared_ptr<const Scene> scene;
@@ -80,7 +59,8 @@ Result<LoadedScene> load_scene(const Options& options, const std::string& name, 
 Result<RenderGroup> catalog_group(const LoadedScene& loaded, const std::string& algorithm, uint64_t seed);
 
 /// `light` against the part of `bdpt` that light tracing can make: everything but what the lens sees through a Dirac vertex.
-Result<Interval> light_against_bdpt(const Options& options, const LoadedScene& loaded, double z, nlohmann::ordered_json* line);
+Result<RatioInterval> light_against_bdpt(const Options& options, const LoadedScene& loaded, double level,
+                                         nlohmann::ordered_json* line);
 
 /// Prints the energy of paths that no technique of `bdpt` but hitting the emitter can make (specular - diffuse - specular).
 Status print_missing_energy(const Options& options);

@@ -1,6 +1,5 @@
 // Estimates and intervals of `reference_equivalence`.
 
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
 
@@ -9,51 +8,21 @@
 
 namespace lightloom::equivalence {
 
-double normal_quantile(double upper_tail) {
-    double lo = 0, hi = 40;
-    for (int i = 0; i < 200; ++i) {
-        const double mid = (lo + hi) / 2;
-        (0.5 * std::erfc(mid / std::sqrt(2.0)) > upper_tail ? lo : hi) = mid;
-    }
-    return lo;
-}
-
-double sidak_factor(size_t tests) { return normal_quantile(0.5 * (1 - std::pow(0.95, 1.0 / double(tests)))); }
-
-Interval ratio_interval(const Mean& m, double reference, double relative_reference_error, double z) {
-    const double ratio = m.mean() / reference;
-    const double error = std::hypot(m.standard_error() / reference, ratio * relative_reference_error);
-    return {ratio, ratio - z * error, ratio + z * error};
-}
-
-Interval ratio_interval(const Mean& a, const Mean& b, double z) {
-    return ratio_interval(a, b.mean(), b.standard_error() / b.mean(), z);
-}
-
 PartMeans part_means(const RgbImage& image) {
-    PartMeans means(kParts, 0.0);
-    std::vector<double> count(kParts, 0.0);
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x) {
-            const float* p = &image.pixels[(size_t(y) * size_t(image.width) + size_t(x)) * 3];
-            const double luminance = 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2];
-            const int region = kFirstRegion + (y * 3 / image.height) * 3 + x * 3 / image.width;
-            const auto add = [&](int part, double value) { means[size_t(part)] += value, ++count[size_t(part)]; };
-            add(kImage, luminance);
-            add(region, luminance);
-            for (int c = 0; c < 3; ++c) add(kFirstChannel + c, p[c]);
-        }
-    for (size_t part = 0; part < means.size(); ++part) means[part] /= count[part];
+    PartMeans means = luminance_means(image, 3, 3);
+    double sum[3] = {};
+    for (size_t i = 0; i < image.pixels.size(); ++i) sum[i % 3] += image.pixels[i];
+    for (const double channel : sum) means.push_back(channel * 3 / double(image.pixels.size()));
     return means;
 }
 
-Result<Estimate> estimate(const Scene& scene, const RenderGroup& render, double seconds,
-                          const std::function<bool(const Estimate&)>& settled) {
+Result<Rendering> render_groups(const Scene& scene, const RenderGroup& render, double seconds,
+                                const std::function<bool(const Rendering&)>& settled) {
     constexpr uint32_t kIterations = 2, kLeastGroups = 16;
     const FrameLayout frame = scene.frame();
     const float exposure = scene.description().film.exposure_scale;
     Accumulation total(frame);
-    Estimate result;
+    Rendering result;
     const auto start = std::chrono::steady_clock::now();
     for (uint32_t group = 0;; ++group) {
         const UnitWork work{uint64_t(group) * kIterations, kIterations, group, frame.crop, 0,
@@ -66,7 +35,7 @@ Result<Estimate> estimate(const Scene& scene, const RenderGroup& render, double 
         LL_RETURN_IF_ERROR(alone.fold(sum, kIterations));
         LL_RETURN_IF_ERROR(total.fold(sum, kIterations));
         const PartMeans means = part_means(alone.develop(exposure));
-        for (size_t part = 0; part < means.size(); ++part) result.parts[part].add(means[part]);
+        for (size_t part = 0; part < means.size(); ++part) result.parts[part].add(means[part], kIterations);
         result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         if (group + 1 >= kLeastGroups && (result.seconds >= seconds || settled(result))) break;
     }

@@ -64,20 +64,21 @@ RenderGroup group_of(const LoadedScene& loaded, const A& algorithm, uint64_t see
 
 }  // namespace
 
-Result<Interval> light_against_bdpt(const Options& options, const LoadedScene& loaded, double z, nlohmann::ordered_json* line) {
+Result<RatioInterval> light_against_bdpt(const Options& options, const LoadedScene& loaded, double level,
+                                         nlohmann::ordered_json* line) {
     auto light = catalog_group(loaded, "light", options.seed);
     if (!light.ok()) return light.status();
     // Half of the time each; the seeds differ, because the two estimates have to be independent.
-    const auto never = [](const Estimate&) { return false; };
-    auto a = estimate(*loaded.scene, *light, options.seconds / 2, never);
+    const auto never = [](const Rendering&) { return false; };
+    auto a = render_groups(*loaded.scene, *light, options.seconds / 2, never);
     if (!a.ok()) return a.status();
     BdptAlgorithm<SplattablePaths> bdpt;
     bdpt.selection.light_paths_per_iteration = double(loaded.scene->frame().crop.area());
-    auto b = estimate(*loaded.scene, group_of(loaded, bdpt, options.seed + 1), options.seconds / 2, never);
+    auto b = render_groups(*loaded.scene, group_of(loaded, bdpt, options.seed + 1), options.seconds / 2, never);
     if (!b.ok()) return b.status();
     (*line)["light_spp"] = a->iterations;
     (*line)["bdpt_spp"] = b->iterations;
-    return ratio_interval(a->parts[kImage], b->parts[kImage], z);
+    return ratio_interval(a->mean(kImage), b->mean(kImage), level);
 }
 
 Status print_missing_energy(const Options& options) {
@@ -94,16 +95,18 @@ Status print_missing_energy(const Options& options) {
         if (!hittable.ok()) return hittable.status();
         auto bdpt = catalog_group(*as_is, "bdpt", options.seed);
         if (!bdpt.ok()) return bdpt.status();
-        const auto never = [](const Estimate&) { return false; };
-        auto total = estimate(*as_is->scene, *bdpt, options.seconds / 4, never);
+        const auto never = [](const Rendering&) { return false; };
+        auto total = render_groups(*as_is->scene, *bdpt, options.seconds / 4, never);
         if (!total.ok()) return total.status();
-        auto hits = estimate(*hittable->scene, group_of(*hittable, HitsOnly{}, options.seed), options.seconds * 3 / 4, never);
+        auto hits = render_groups(*hittable->scene, group_of(*hittable, HitsOnly{}, options.seed), options.seconds * 3 / 4, never);
         if (!hits.ok()) return hits.status();
         const bool points = !as_is->scene->description().point_lights.empty();
         // Of the whole light: where the lights are points, bdpt's mean lacks what only hits can make.
-        const double own = total->parts[kImage].mean(), only = hits->parts[kImage].mean();
+        const double own = total->mean(kImage).mean;
+        const Estimate by_hits = hits->mean(kImage);
+        const double only = by_hits.mean;
         const double all = points ? own + only : own;
-        const double error = sidak_factor(names.size()) * hits->parts[kImage].standard_error();
+        const double error = student_quantile(sidak(0.05, int(names.size())), by_hits.degrees) * by_hits.standard_error();
         std::printf("%-26s %-18s %10.5f %12.6f  %.5f [%.5f, %.5f]\n", name.c_str(), points ? "points (missing)" : "can be hit", own,
                     only, only / all, (only - error) / all, (only + error) / all);
         std::fflush(stdout);

@@ -217,7 +217,7 @@ double luminance(const Triple& c) { return 0.2126 * c[0] + 0.7152 * c[1] + 0.072
 constexpr int kGroups = 8;
 
 /// Means of each of kGroups group images with `path`.
-Result<std::vector<Regions>> render_groups(SceneDescription description, const SceneOptions& scene_options, uint64_t seed) {
+Result<std::vector<Regions>> render_means(SceneDescription description, const SceneOptions& scene_options, uint64_t seed) {
     LoadedScene loaded;
     loaded.max_depth = description.max_depth;
     auto built = Scene::build(std::move(description), scene_options);
@@ -249,7 +249,7 @@ Status print_spectral_ratio(const Options& options, const std::string& name, con
     SceneOptions scene_options;
     if (std::sscanf(resolution.c_str(), "%dx%d", &scene_options.width, &scene_options.height) != 2)
         return invalid_argument(name + ": the resolution " + resolution + " is not WIDTHxHEIGHT");
-    auto rgb = render_groups(imported->description, scene_options, options.seed);
+    auto rgb = render_means(imported->description, scene_options, options.seed);
     if (!rgb.ok()) return rgb.status();
     std::vector<Regions> spectral(kGroups, Regions{});
     Spectra spectra;
@@ -257,7 +257,7 @@ Status print_spectral_ratio(const Options& options, const std::string& name, con
         SceneDescription description = imported->description;
         to_wavelengths(&description, &spectra, {first, first + 1, first + 2});
         // The same random numbers for all wavelengths and for RGB: what is left in the ratio is colour.
-        auto part = render_groups(std::move(description), scene_options, options.seed);
+        auto part = render_means(std::move(description), scene_options, options.seed);
         if (!part.ok()) return part.status();
         for (size_t g = 0; g < kGroups; ++g)
             for (size_t r = 0; r < 10; ++r)
@@ -265,26 +265,26 @@ Status print_spectral_ratio(const Options& options, const std::string& name, con
                     for (size_t c = 0; c < 3; ++c)
                         spectral[g][r][c] += (*part)[g][r][k] * weights().rgb[size_t(first) + k][c];
     }
-    Mean of_rgb[10], of_spectra[10];
-    Mean ratio[10];
+    double of_rgb[10] = {}, of_spectra[10] = {};
+    WeightedMean ratios;
     Triple channels{}, channels_spectral{};
     for (size_t g = 0; g < kGroups; ++g)
         for (size_t r = 0; r < 10; ++r) {
-            of_rgb[r].add(luminance((*rgb)[g][r]));
-            of_spectra[r].add(luminance(spectral[g][r]));
-            ratio[r].add(luminance((*rgb)[g][r]) / luminance(spectral[g][r]));
-            if (r == 0)
-                for (size_t c = 0; c < 3; ++c) channels[c] += (*rgb)[g][r][c], channels_spectral[c] += spectral[g][r][c];
+            of_rgb[r] += luminance((*rgb)[g][r]);
+            of_spectra[r] += luminance(spectral[g][r]);
+            if (r > 0) continue;
+            ratios.add(luminance((*rgb)[g][r]) / luminance(spectral[g][r]), 1);
+            for (size_t c = 0; c < 3; ++c) channels[c] += (*rgb)[g][r][c], channels_spectral[c] += spectral[g][r][c];
         }
-    std::printf("%-18s RGB / spectra %.4f +- %.4f  %.3f %.3f %.3f ", name.c_str(), of_rgb[0].mean() / of_spectra[0].mean(),
-                ratio[0].standard_error(), channels[0] / channels_spectral[0], channels[1] / channels_spectral[1],
+    std::printf("%-18s RGB / spectra %.4f +- %.4f  %.3f %.3f %.3f ", name.c_str(), of_rgb[0] / of_spectra[0],
+                ratios.estimate().standard_error(), channels[0] / channels_spectral[0], channels[1] / channels_spectral[1],
                 channels[2] / channels_spectral[2]);
     nlohmann::ordered_json line{{"scene", name},
-                                {"rgb_over_spectra", of_rgb[0].mean() / of_spectra[0].mean()},
-                                {"standard_error", ratio[0].standard_error()}};
+                                {"rgb_over_spectra", of_rgb[0] / of_spectra[0]},
+                                {"standard_error", ratios.estimate().standard_error()}};
     for (int r = 1; r < 10; ++r) {
-        std::printf(" %.3f", of_rgb[r].mean() / of_spectra[r].mean());
-        line["regions"].push_back(of_rgb[r].mean() / of_spectra[r].mean());
+        std::printf(" %.3f", of_rgb[r] / of_spectra[r]);
+        line["regions"].push_back(of_rgb[r] / of_spectra[r]);
     }
     std::printf("\n");
     std::fflush(stdout);

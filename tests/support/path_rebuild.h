@@ -33,7 +33,7 @@ inline FullPath join(const Scene& scene, const PathVertex* y, int s, const PathV
 
 inline SurfacePoint point_of(const PathVertex& v) {
     SurfacePoint p;
-    p.p = v.p, p.ng = v.ng, p.shading = v.shading, p.emitter = v.emitter;
+    p.p = v.p, p.ng = v.ng, p.shading = v.shading, p.emitter = v.emitter, p.reach = v.reach;
     return p;
 }
 

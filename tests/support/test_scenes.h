@@ -57,7 +57,7 @@ inline std::shared_ptr<const Scene> delta_lights() {
     spot.position = {-0.5f, 1.8f, 0};
     spot.axes = Frame(normalize(Vec3{0.3f, -1, 0.2f}));
     spot.intensity = {5, 4, 3};
-    spot.cos_total = 0.7f, spot.cos_falloff = 0.9f;
+    spot.total_height = 0.3f, spot.falloff_height = 0.1f;
     b.description().spot_lights.push_back(spot);
     b.description().distant_lights.push_back({normalize(Vec3{0.2f, -1, 0.1f}), {2, 2, 2}});
     return b.build();

@@ -7,6 +7,7 @@
 #include "common/core/math.h"
 #include "common/core/rng.h"
 #include "common/core/transform.h"
+#include "common/core/utf8.h"
 
 namespace lightloom {
 namespace {
@@ -61,6 +62,19 @@ TEST(Transform, InverseAndSingular) {
     EXPECT_NEAR(p.x, 0.3f, 1e-3);
     EXPECT_NEAR(p.z, 5, 1e-2);
     EXPECT_FALSE(inverse(scaling(1, 0, 1)).has_value());
+}
+
+TEST(Utf8, CutsBetweenCharactersAndReplacesWhatIsNone) {
+    EXPECT_EQ(clipped_utf8("abc", 10), "abc");
+    EXPECT_EQ(clipped_utf8("abc", 2), "ab");
+    EXPECT_EQ(clipped_utf8("a\xc3\xa4\xe2\x82\xac", 5), "a\xc3\xa4");
+    EXPECT_EQ(clipped_utf8("a\xc3\xa4\xe2\x82\xac", 6), "a\xc3\xa4\xe2\x82\xac");
+    EXPECT_EQ(clipped_utf8("caf\xe9!", 10), "caf\xef\xbf\xbd!");
+    EXPECT_EQ(clipped_utf8("\xe2\x82", 10), "\xef\xbf\xbd\xef\xbf\xbd");
+    for (const char* bad : {"\xc3", "\xc0\xaf", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xf5\x80\x80\x80", "\x80"}) {
+        EXPECT_FALSE(is_utf8(bad));
+        EXPECT_TRUE(is_utf8(clipped_utf8(bad, 100)));
+    }
 }
 
 }  // namespace

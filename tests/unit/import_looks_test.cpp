@@ -253,8 +253,8 @@ TEST(ImportLight, PointSpotAndDistant) {
         "LightSource \"spot\" \"point3 from\" [0 0 5] \"point3 to\" [0 0 0] \"float coneangle\" 60 \"float "
         "conedeltaangle\" 60");
     EXPECT_EQ(d.spot_lights.at(0).axes.n, (Vec3{0, 0, -1}));
-    EXPECT_NEAR(d.spot_lights[0].cos_total, 0.5, 1e-6);
-    EXPECT_NEAR(d.spot_lights[0].cos_falloff, 1, 1e-6);
+    EXPECT_NEAR(d.spot_lights[0].total_height, 0.5, 1e-6);
+    EXPECT_NEAR(d.spot_lights[0].falloff_height, 0, 1e-6);
     EXPECT_EQ(d.spot_lights[0].intensity, Rgb(1.0f));
     d = world("LightSource \"spot\" \"float coneangle\" 60 \"float conedeltaangle\" 60 \"float power\" 2");
     EXPECT_NEAR(d.spot_lights.at(0).intensity.r, 2 / (2 * 3.14159265 * 0.25), 1e-5);
@@ -263,6 +263,9 @@ TEST(ImportLight, PointSpotAndDistant) {
     EXPECT_EQ(d.distant_lights[0].irradiance, Rgb(3, 3, 6));
     expect_error("LightSource \"distant\" \"point3 from\" [1 1 1] \"point3 to\" [1 1 1]", {"same point"});
     expect_error("Scale 1 2 1 LightSource \"spot\"", {"similarity"});
+    d = world("LightSource \"spot\" \"float coneangle\" 0.01 \"float conedeltaangle\" 0");
+    EXPECT_NEAR(d.spot_lights.at(0).total_height / 1.5230871e-8, 1, 1e-6);
+    expect_error("LightSource \"spot\" \"float coneangle\" 0.009 \"float conedeltaangle\" 0", {"coneangle", "0.01"});
     expect_error("LightSource \"goniometric\"", {"goniometric"});
     expect_error("LightSource \"point\" \"rgb L\" [1 1 1]", {"unknown parameter"});
     expect_error("LightSource \"point\" \"float scale\" -1", {"negative"});

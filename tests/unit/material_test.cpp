@@ -27,11 +27,31 @@ class Tables {
         return MaterialId(materials_.size() - 1);
     }
     Bsdf resolve(MaterialId id, float choice = 0.5f) const {
-        return resolve_material({nodes_, {}, materials_}, id, {0.3f, 0.7f}, choice);
+        return resolve_material({nodes_, images_, materials_}, id, {0.3f, 0.7f}, choice);
+    }
+    /// An image of one texel.
+    TextureId image(const Rgb& texel) {
+        Image image;
+        image.width = image.height = 1;
+        image.floats = {texel.r, texel.g, texel.b};
+        images_.push_back(image);
+        TextureNode node;
+        node.kind = TextureKind::kImage;
+        node.image = int32_t(images_.size()) - 1;
+        nodes_.push_back(node);
+        return TextureId(nodes_.size() - 1);
+    }
+    TextureId scaled(TextureId a, TextureId scale) {
+        TextureNode node;
+        node.kind = TextureKind::kScale;
+        node.a = a, node.b = scale;
+        nodes_.push_back(node);
+        return TextureId(nodes_.size() - 1);
     }
 
   private:
     std::vector<TextureNode> nodes_;
+    std::vector<Image> images_;
     std::vector<Material> materials_;
 };
 
@@ -151,6 +171,22 @@ TEST(Material, AlbedosAreClampedAsInPbrt) {
     Material m = of_kind(MaterialKind::kDiffuse);
     m.reflectance = t.constant({1.5f, -0.5f, 0.3f});
     EXPECT_EQ(t.resolve(t.add(m)).reflectance, Rgb(1, 0, 0.3f));
+}
+
+TEST(Material, ImagesAreClampedAsReflectancesOnly) {
+    Tables t;
+    // Clamped before it is scaled; the scale, a float texture, is not.
+    Material m = of_kind(MaterialKind::kDiffuse);
+    m.reflectance = t.scaled(t.image({4, 0.5f, 0}), t.image(Rgb(0.25f)));
+    EXPECT_EQ(t.resolve(t.add(m)).reflectance, Rgb(0.25f, 0.125f, 0));
+    m.reflectance = t.scaled(t.image(Rgb(0.25f)), t.image(Rgb(2)));
+    EXPECT_EQ(t.resolve(t.add(m)).reflectance, Rgb(0.5f));
+    Material index = of_kind(MaterialKind::kConductor), same = index;
+    index.eta = t.constant(Rgb(2)), index.k = t.constant(Rgb(3));
+    same.eta = t.image(Rgb(2)), same.k = t.image(Rgb(3));
+    const Bsdf wanted = t.resolve(t.add(index)), found = t.resolve(t.add(same));
+    EXPECT_EQ(found.reflectance, wanted.reflectance);  // eta
+    EXPECT_EQ(found.transmittance, wanted.transmittance);  // k
 }
 
 }  // namespace

@@ -100,6 +100,7 @@ TEST(Plan, BoundedGroupsAreAPrefixOfTheUnboundedOnes) {
             sum += groups[i].iteration_count;
         }
         EXPECT_EQ(sum, iterations);
+        EXPECT_EQ(plan.group_count(iterations), groups.size());
     }
     // What a time-limited job keeps is a number of whole groups: asking for that many iterations makes the same groups.
     uint64_t prefix = 0;

@@ -1,0 +1,37 @@
+#pragma once
+// Light subspaces of prefixes of one vertex: x_0 alone. Emitters share a fixed number of cells in proportion to their power:
+// an area light gets a grid on its surface, the environment an equal-area grid of directions, and lights too weak for a cell of
+// their own share one with their neighbours in the list. [Su, Li and Wang 2022, section 5.1: 20 % of the light subspaces]
+
+#include <cstdint>
+#include <vector>
+
+#include "common/core/result.h"
+#include "common/scene/emitter.h"
+
+namespace lightloom {
+
+class LightDivision {
+  public:
+    /// An emitter's cells: first .. first + side^2 - 1 as a grid.
+    struct Cells {
+        uint16_t first = 0, side = 1;
+    };
+
+    LightDivision() = default;
+    explicit LightDivision(std::vector<Cells> cells) : cells_(std::move(cells)) {}
+    /// Divides `emitters` into at most `cell_count` cells (at least one), numbered from zero.
+    static LightDivision divide(const EmitterSet& emitters, uint32_t cell_count);
+
+    /// Cell of a point x_0 of emitter `index` that emits along `w` (unit; only the environment looks at it). The same for
+    /// a point that was sampled and for one that was hit.
+    uint32_t label(const EmitterSet& emitters, uint32_t index, const Vec3& position, const Vec3& w) const;
+    uint32_t cell_count() const;
+    const std::vector<Cells>& cells() const { return cells_; }
+    Status validate(const EmitterSet& emitters, uint32_t label_count) const;
+
+  private:
+    std::vector<Cells> cells_;  // one per emitter
+};
+
+}  // namespace lightloom

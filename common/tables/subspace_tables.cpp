@@ -1,0 +1,127 @@
+#include "common/tables/subspace_tables.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <map>
+
+namespace lightloom {
+namespace {
+
+constexpr std::string_view kMagic = "lightloom-tables 1\n";
+
+Status positive(const std::vector<float>& values, size_t count, const char* name) {
+    if (values.size() != count) return data_loss(std::string(name) + " has the wrong size");
+    for (const float v : values) {
+        if (!(v > 0 && std::isfinite(v))) return data_loss(std::string(name) + " holds a value that is not positive");
+    }
+    return {};
+}
+
+/// Little-endian, which every supported host is.
+template <class T>
+std::string bytes_of(const std::vector<T>& values) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    return std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+}
+
+template <class T>
+bool from_bytes(std::string_view bytes, std::vector<T>* values) {
+    if (bytes.size() % sizeof(T) != 0) return false;
+    values->resize(bytes.size() / sizeof(T));
+    if (!bytes.empty()) std::memcpy(values->data(), bytes.data(), bytes.size());
+    return true;
+}
+
+struct Shape {
+    uint32_t light_count, eye_count;
+    double vertices_per_path;
+};
+
+void put_section(std::string& out, const std::string& name, const std::string& bytes) {
+    out += name + ' ' + std::to_string(bytes.size()) + ' ' + sha256(bytes).hex() + '\n' + bytes + '\n';
+}
+
+}  // namespace
+
+Status SubspaceTables::validate(const EmitterSet& emitters) const {
+    if (light_count < 1 || eye_count < 1 || light_count > kMaxSubspaces || eye_count > kMaxSubspaces)
+        return data_loss("the number of subspaces is out of range");
+    LL_RETURN_IF_ERROR(division.validate(emitters, light_count));
+    LL_RETURN_IF_ERROR(light_tree.validate(light_count));
+    LL_RETURN_IF_ERROR(eye_tree.validate(eye_count));
+    LL_RETURN_IF_ERROR(positive(energy, light_count, "Q"));
+    LL_RETURN_IF_ERROR(positive(gamma, size_t(light_count) * eye_count, "Gamma"));
+    for (uint32_t j = 0; j < eye_count; ++j) {
+        double sum = 0;
+        for (uint32_t i = 0; i < light_count; ++i) sum += double(column(j)[i]);
+        if (std::fabs(sum - 1) > 1e-4) return data_loss("a column of Gamma does not sum to one");
+    }
+    if (window.size() != light_count) return data_loss("the window table has the wrong size");
+    for (const uint16_t w : window) {
+        if (w < 1) return data_loss("the window table holds a zero");
+    }
+    if (!(vertices_per_path > 0 && std::isfinite(vertices_per_path))) return data_loss("no light vertices per path");
+    return {};
+}
+
+SubspaceTables trivial_tables(const EmitterSet& emitters) {
+    SubspaceTables t;
+    t.division = LightDivision::divide(emitters, 1);
+    t.energy = {1};
+    t.gamma = {1};
+    t.window = {1};
+    return t;
+}
+
+std::string serialize(const SubspaceTables& t) {
+    std::string out(kMagic);
+    put_section(out, "shape", bytes_of(std::vector<Shape>{{t.light_count, t.eye_count, t.vertices_per_path}}));
+    put_section(out, "division", bytes_of(t.division.cells()));
+    put_section(out, "kappa-light", bytes_of(t.light_tree.nodes()));
+    put_section(out, "kappa-eye", bytes_of(t.eye_tree.nodes()));
+    put_section(out, "Q", bytes_of(t.energy));
+    put_section(out, "Gamma", bytes_of(t.gamma));
+    put_section(out, "window", bytes_of(t.window));
+    return out;
+}
+
+Result<SubspaceTables> parse_tables(std::string_view bytes) {
+    if (bytes.substr(0, kMagic.size()) != kMagic) return data_loss("not a table file of a known version");
+    std::map<std::string, std::string_view, std::less<>> sections;
+    size_t at = kMagic.size();
+    while (at < bytes.size()) {
+        const size_t line_end = bytes.find('\n', at);
+        if (line_end == std::string_view::npos) return data_loss("the tables are cut short");
+        const std::string line(bytes.substr(at, line_end - at));
+        char name[32], hex[65];
+        unsigned long long size = 0;
+        if (std::sscanf(line.c_str(), "%31s %llu %64s", name, &size, hex) != 3) return data_loss("malformed table header");
+        at = line_end + 1;
+        if (size >= bytes.size() || at + size + 1 > bytes.size()) return data_loss("the tables are cut short");
+        const std::string_view content = bytes.substr(at, size_t(size));
+        if (sha256(content).hex() != hex) return data_loss(std::string("table ") + name + " is damaged");
+        if (!sections.emplace(name, content).second) return data_loss(std::string("table ") + name + " occurs twice");
+        at += size_t(size) + 1;
+    }
+    SubspaceTables t;
+    std::vector<Shape> shape;
+    std::vector<LightDivision::Cells> cells;
+    std::vector<SubspaceTree::Node> light, eye;
+    const auto read = [&](const char* name, auto* values) {
+        const auto item = sections.find(std::string_view(name));
+        return item != sections.end() && from_bytes(item->second, values);
+    };
+    if (!read("shape", &shape) || shape.size() != 1 || !read("division", &cells) || !read("kappa-light", &light) ||
+        !read("kappa-eye", &eye) || !read("Q", &t.energy) || !read("Gamma", &t.gamma) || !read("window", &t.window))
+        return data_loss("a table is missing or malformed");
+    t.light_count = shape[0].light_count, t.eye_count = shape[0].eye_count;
+    t.vertices_per_path = shape[0].vertices_per_path;
+    t.division = LightDivision(std::move(cells));
+    t.light_tree = SubspaceTree(std::move(light));
+    t.eye_tree = SubspaceTree(std::move(eye));
+    return t;
+}
+
+}  // namespace lightloom

@@ -1,0 +1,196 @@
+#include "common/tables/train.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "common/core/fork_join.h"
+#include "common/tables/train_classifier.h"
+
+namespace lightloom {
+namespace {
+
+constexpr size_t kClassifierEnds = 60000;  ///< Enough for 1000 centroids and their borders.
+
+class Stopwatch {
+  public:
+    double lap() {
+        const auto now = std::chrono::steady_clock::now();
+        const double seconds = std::chrono::duration<double>(now - start_).count();
+        start_ = now;
+        return seconds;
+    }
+
+  private:
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// Ibar of every block: its mean estimate, smoothed over 3 x 3 blocks, plus a tenth of the frame's mean.
+std::vector<double> block_brightness(const TrainingData& d) {
+    const int w = d.blocks_x, h = d.blocks_y;
+    const double per_block = double(d.samples) / double(d.block_sum.size());
+    double mean = 0;
+    for (const double s : d.block_sum) mean += s / per_block;
+    mean /= double(d.block_sum.size());
+    std::vector<double> out(d.block_sum.size());
+    for (int y = 0; y < h; ++y) {
+        for (int x = 0; x < w; ++x) {
+            double sum = 0;
+            int count = 0;
+            for (int j = std::max(0, y - 1); j <= std::min(h - 1, y + 1); ++j)
+                for (int i = std::max(0, x - 1); i <= std::min(w - 1, x + 1); ++i, ++count) sum += d.block_sum[size_t(j * w + i)];
+            out[size_t(y * w + x)] = sum / (count * per_block) + 0.1 * mean;
+        }
+    }
+    return out;
+}
+
+SubPathEnd end_between(const TrainingVertex& v, const TrainingVertex& predecessor) {
+    const Vec3 d = predecessor.position - v.position;
+    const float length2 = length_squared(d);
+    return sub_path_end(v.position, v.normal, length2 > 0 ? d / std::sqrt(length2) : v.normal);
+}
+
+uint32_t source_label(const LightDivision& division, const EmitterSet& emitters, const TrainingVertex& x0) {
+    return division.label(emitters, x0.emitter, x0.position, x0.normal);
+}
+
+uint32_t used_labels(const SubspaceTree& tree) {
+    uint32_t count = 0;
+    for (const SubspaceTree::Node& n : tree.nodes())
+        if (n.axis() == SubspaceTree::kLeaf) count = std::max(count, n.child() + 1);
+    return count;
+}
+
+/// kappa of both sides.
+void train_classifiers(const TrainingData& d, const std::vector<double>& brightness, const EmitterSet& emitters,
+                       const TrainingOptions& o, SubspaceTables* tables) {
+    size_t nodes = 0;
+    for (const TrainingPath& p : d.paths) nodes += p.vertex_count;
+    const size_t stride = std::max<size_t>(1, nodes / kClassifierEnds);
+    std::vector<WeightedEnd> light, eye;
+    for (size_t x = 0; x < d.paths.size(); x += stride) {
+        const TrainingPath& p = d.paths[x];
+        const TrainingVertex* v = &d.vertices[p.first_vertex];
+        const float weight = float(double(p.estimate) / brightness[p.block]);
+        if (!(weight > 0)) continue;
+        for (uint32_t s = 1; s + 1 < p.vertex_count; ++s) {
+            if (!(v[s].density > 0)) continue;
+            eye.push_back({end_between(v[s], v[s + 1]), weight});
+            if (s >= 2) light.push_back({end_between(v[s - 1], v[s - 2]), weight});
+        }
+    }
+    const uint32_t source_cells = std::max(1u, uint32_t(double(o.light_subspaces) * o.source_share));
+    tables->division = LightDivision::divide(emitters, source_cells);
+    const uint32_t sources = tables->division.cell_count();
+    ClassifierOptions light_options;
+    light_options.subspaces = o.light_subspaces > sources ? o.light_subspaces - sources : 1;
+    light_options.first_label = sources;
+    light_options.direction_weight = float(o.direction_weight);
+    light_options.seed = o.seed;
+    ClassifierOptions eye_options = light_options;
+    eye_options.subspaces = o.eye_subspaces;
+    eye_options.first_label = 0;
+    eye_options.seed = o.seed + 1;
+    tables->light_tree = train_classifier(light, light_options);
+    tables->eye_tree = train_classifier(eye, eye_options);
+    tables->light_count = used_labels(tables->light_tree);
+    tables->eye_count = used_labels(tables->eye_tree);
+}
+
+/// Q, windows and the number of connectible vertices.
+void measure_energy(const TrainingData& d, const EmitterSet& emitters, const TrainingOptions& o, SubspaceTables* t) {
+    std::vector<double> sum(t->light_count, 0.0), count(t->light_count, 0.0);
+    double vertices = 0;
+    for (const TrainingPath& p : d.light_paths) {
+        const TrainingVertex* v = &d.vertices[p.first_vertex];
+        for (uint32_t i = 0; i < p.vertex_count; ++i) {
+            if (!(v[i].density > 0)) continue;
+            const uint32_t label =
+                i == 0 ? source_label(t->division, emitters, v[0]) : t->light_label(end_between(v[i], v[i - 1]));
+            sum[label] += double(v[i].density);
+            count[label] += 1;
+            vertices += 1;
+        }
+    }
+    const double paths = double(std::max<uint64_t>(1, d.samples));
+    double total = 0;
+    for (const double s : sum) total += s / paths;
+    // The floor keeps every subspace reachable: a zero would lose the light that only a delta light's prefix carries.
+    const double floor = total > 0 ? 1e-3 * total / t->light_count : 1;
+    t->energy.clear(), t->window.clear();
+    for (uint32_t i = 0; i < t->light_count; ++i) {
+        t->energy.push_back(float(sum[i] / paths + floor));
+        const double expected = count[i] / paths * o.nominal_paths;
+        const double windows = expected > 0 ? std::ceil(o.reuse_target / expected) : double(o.reuse_windows);
+        t->window.push_back(uint16_t(std::clamp(windows, 1.0, double(o.reuse_windows))));
+    }
+    t->vertices_per_path = vertices > 0 ? vertices / paths : 1;
+}
+
+GammaDataset gamma_dataset(const TrainingData& d, const std::vector<double>& brightness, const EmitterSet& emitters,
+                           const TrainingOptions& o, const SubspaceTables& t) {
+    GammaDataset out;
+    out.light_count = t.light_count, out.eye_count = t.eye_count;
+    out.source_count = t.division.cell_count();
+    out.energy = t.energy;
+    std::vector<float> weights;
+    for (const TrainingPath& p : d.paths) {
+        const TrainingVertex* v = &d.vertices[p.first_vertex];
+        GammaPath path;
+        path.first_node = uint32_t(out.nodes.size());
+        for (uint32_t s = 1; s + 1 < p.vertex_count; ++s) {
+            if (!(v[s].density > 0)) continue;
+            GammaNode node;
+            node.light = uint16_t(s == 1 ? source_label(t.division, emitters, v[0])
+                                         : t.light_label(end_between(v[s - 1], v[s - 2])));
+            node.eye = uint16_t(t.eye_label(end_between(v[s], v[s + 1])));
+            node.g = float(o.connections * double(v[s].density) / double(t.energy[node.light]));
+            if (node.g > 0 && std::isfinite(node.g)) out.nodes.push_back(node);
+        }
+        path.node_count = uint32_t(out.nodes.size()) - path.first_node;
+        if (path.node_count == 0) continue;
+        path.weight = float(double(p.square) / (brightness[p.block] * brightness[p.block]));
+        path.fixed = v[0].density;
+        path.contribution = float(double(p.estimate) / brightness[p.block]);
+        if (!std::isfinite(path.weight) || !(path.weight > 0)) continue;
+        out.paths.push_back(path);
+        weights.push_back(path.weight);
+    }
+    if (weights.size() > 100) {
+        const auto cut = weights.begin() + std::ptrdiff_t(double(weights.size() - 1) * 0.9999);
+        std::nth_element(weights.begin(), cut, weights.end());
+        for (GammaPath& p : out.paths) p.weight = std::min(p.weight, *cut);
+    }
+    return out;
+}
+
+}  // namespace
+
+Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& emitters, const TrainingOptions& options,
+                                    std::stop_token stop, TrainingReport* report) {
+    *report = {};
+    const Status cancelled(StatusCode::kCancelled, "training was cancelled");
+    Stopwatch watch;
+    SubspaceTables tables;
+    const std::vector<double> brightness = block_brightness(data);
+    train_classifiers(data, brightness, emitters, options, &tables);
+    report->classifier_seconds = watch.lap();
+    if (stop.stop_requested()) return cancelled;
+    measure_energy(data, emitters, options, &tables);
+    report->energy_seconds = watch.lap();
+    const GammaDataset dataset = gamma_dataset(data, brightness, emitters, options, tables);
+    report->paths = dataset.paths.size(), report->nodes = dataset.nodes.size();
+    if (dataset.paths.empty()) report->note = "no path of this scene can be connected: uniform tables";
+    if (stop.stop_requested()) return cancelled;
+    GammaOptions gamma;
+    gamma.trainer = options.trainer;
+    gamma.mix = options.mix;
+    gamma.seed = options.seed;
+    tables.gamma = train_gamma(dataset, gamma, &report->gamma);
+    report->gamma_seconds = watch.lap();
+    LL_RETURN_IF_ERROR(tables.validate(emitters));
+    return tables;
+}
+
+}  // namespace lightloom

@@ -1,0 +1,44 @@
+#pragma once
+// From training data to tables: brightness of blocks, kappa, Q, Gamma, windows. [Su, Li and Wang 2022, section 5]
+//
+// Cleaning of the dataset, for what it trains only (no image is made of it): a path without a connectible edge teaches Gamma
+// nothing and is left out; w_X is cut at its 99.99 % quantile, so that one lucky path does not own a column; centroids see
+// contributions cut at their 99.9 % quantile.
+
+#include <cstdint>
+#include <functional>
+#include <stop_token>
+#include <string>
+
+#include "common/core/result.h"
+#include "common/tables/subspace_tables.h"
+#include "common/tables/train_gamma.h"
+#include "common/tables/training_data.h"
+
+namespace lightloom {
+
+struct TrainingOptions {
+    uint32_t light_subspaces = 1000, eye_subspaces = 1000;  ///< N_L, N_E: upper bounds.
+    double source_share = 0.2;      ///< Of the light subspaces, for points on lights.
+    double direction_weight = 0.05; ///< k_d.
+    double mix = 0.1;               ///< Conservative share of Gamma.
+    GammaTrainer trainer = GammaTrainer::kMm;
+    int connections = 3;            ///< N that rendering will use.
+    double reuse_target = 200;      ///< M0: prefixes that a subspace should hold.
+    int reuse_windows = 1;          ///< J_max.
+    double nominal_paths = 1;       ///< Light paths of the smallest cache that rendering will make.
+    uint64_t seed = 0;
+};
+
+struct TrainingReport {
+    GammaReport gamma;
+    uint64_t paths = 0, nodes = 0;
+    double classifier_seconds = 0, energy_seconds = 0, gamma_seconds = 0;
+    std::string note;  ///< One line when the tables are simpler than asked; empty otherwise.
+};
+
+/// kCancelled after a stop request; otherwise always valid tables, whatever the data hold.
+Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& emitters, const TrainingOptions& options,
+                                    std::stop_token stop, TrainingReport* report);
+
+}  // namespace lightloom

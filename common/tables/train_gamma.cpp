@@ -1,0 +1,273 @@
+#include "common/tables/train_gamma.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "common/core/math.h"
+#include "common/core/rng.h"
+
+namespace lightloom {
+namespace {
+
+/// Labels of one level of the nested family: everything that agrees above the lowest `bits` is one.
+struct Level {
+    uint32_t bits, source_count, coarse_sources, light_count, eye_count;
+
+    Level(const GammaDataset& d, uint32_t level_bits)
+        : bits(level_bits), source_count(d.source_count), coarse_sources(up(d.source_count)),
+          light_count(coarse_sources + up(d.light_count - d.source_count)), eye_count(up(d.eye_count)) {}
+    uint32_t up(uint32_t n) const { return (n + (1u << bits) - 1) >> bits; }
+    uint32_t light(uint32_t i) const { return i < source_count ? i >> bits : coarse_sources + ((i - source_count) >> bits); }
+    uint32_t eye(uint32_t j) const { return j >> bits; }
+};
+
+/// The dataset as a level sees it, with Gamma's matrix B (column-major) and what is needed to improve it.
+class LevelProblem {
+  public:
+    LevelProblem(const GammaDataset& data, uint32_t bits, double mix) : data_(data), level_(data, bits), mix_(mix) {
+        energy_.assign(level_.light_count, 0.0);
+        for (uint32_t i = 0; i < data.light_count; ++i) energy_[level_.light(i)] += double(data.energy[i]);
+        total_energy_ = std::accumulate(energy_.begin(), energy_.end(), 0.0);
+        cells_.reserve(data.nodes.size());
+        gains_.reserve(data.nodes.size());
+        for (const GammaNode& n : data.nodes) {
+            const uint32_t i = level_.light(n.light);
+            cells_.push_back(level_.eye(n.eye) * level_.light_count + i);
+            // g holds 1 / Q of the finest subspace; Gamma_IJ Q_i / Q_I is its lifted entry [algorithms.md 9.1].
+            gains_.push_back(float(double(n.g) * double(data.energy[n.light]) / energy_[i]));
+        }
+    }
+    const Level& level() const { return level_; }
+    size_t size() const { return size_t(level_.light_count) * level_.eye_count; }
+    double share(uint32_t i) const { return energy_[i] / total_energy_; }
+    double floor_of(uint32_t i) const { return 0.5 / level_.light_count + 0.5 * share(i); }
+
+    std::vector<float> flat_prior() const {
+        std::vector<float> prior(size());
+        for (size_t c = 0; c < prior.size(); ++c) prior[c] = float(floor_of(uint32_t(c % level_.light_count)));
+        return prior;
+    }
+    /// B of a coarser level as this one's prior: mass goes to the parts of a subspace in proportion to their energy.
+    std::vector<float> lifted(const LevelProblem& coarse, const std::vector<float>& b) const {
+        std::vector<float> out(size());
+        for (uint32_t j = 0; j < level_.eye_count; ++j) {
+            for (uint32_t i = 0; i < level_.light_count; ++i) {
+                const uint32_t fine_i = finest_light(i), fine_j = j << level_.bits;
+                const uint32_t ci = coarse.level_.light(fine_i), cj = coarse.level_.eye(fine_j);
+                out[size_t(j) * level_.light_count + i] =
+                    float(double(b[size_t(cj) * coarse.level_.light_count + ci]) * energy_[i] / coarse.energy_[ci]);
+            }
+        }
+        return out;
+    }
+    double gamma_at(const std::vector<float>& b, uint32_t cell) const {
+        return (1 - mix_) * double(b[cell]) + mix_ * floor_of(cell % level_.light_count);
+    }
+    double density(const GammaPath& p, const std::vector<float>& gamma) const {
+        double f = double(p.fixed);
+        for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n) f += double(gains_[n]) * double(gamma[cells_[n]]);
+        return f;
+    }
+    std::vector<float> mixed(const std::vector<float>& b) const {
+        std::vector<float> gamma(b.size());
+        for (size_t c = 0; c < b.size(); ++c) gamma[c] = float(gamma_at(b, uint32_t(c)));
+        return gamma;
+    }
+    double loss(const std::vector<float>& b, const std::vector<uint32_t>& paths) const {
+        const std::vector<float> gamma = mixed(b);
+        double sum = 0;
+        for (const uint32_t x : paths) {
+            const GammaPath& p = data_.paths[x];
+            const double f = density(p, gamma);
+            if (f > 0) sum += double(p.weight) / f;
+        }
+        return paths.empty() ? 0 : sum / double(paths.size());
+    }
+    /// Negative gradient of the loss with respect to B, up to the factor (1 - mix).
+    void gradient(const std::vector<float>& b, const uint32_t* begin, const uint32_t* end, std::vector<double>* out) const {
+        const std::vector<float> gamma = mixed(b);
+        std::fill(out->begin(), out->end(), 0.0);
+        for (const uint32_t* x = begin; x != end; ++x) {
+            const GammaPath& p = data_.paths[*x];
+            const double f = density(p, gamma);
+            if (!(f > 0)) continue;
+            const double scale = double(p.weight) / (f * f);
+            for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n) (*out)[cells_[n]] += scale * double(gains_[n]);
+        }
+    }
+    /// One majorise-minimise step per column: B <- sqrt(B^2 G + lambda Gbar pi^2), normalised [algorithms.md 9.2].
+    void improve(std::vector<float>* b, const std::vector<float>& prior, double lambda, const std::vector<uint32_t>& paths) const {
+        std::vector<double> g(b->size());
+        gradient(*b, paths.data(), paths.data() + paths.size(), &g);
+        double mean = 0;
+        for (size_t c = 0; c < g.size(); ++c) mean += double((*b)[c]) * g[c];
+        mean /= level_.eye_count;
+        for (uint32_t j = 0; j < level_.eye_count; ++j) {
+            const size_t column = size_t(j) * level_.light_count;
+            double sum = 0;
+            for (size_t c = column; c < column + level_.light_count; ++c) {
+                const double old = double((*b)[c]), pi = double(prior[c]);
+                g[c] = std::sqrt(old * old * g[c] + lambda * mean * pi * pi);
+                sum += g[c];
+            }
+            if (!(sum > 0)) continue;  // no path came here: the prior stays
+            for (size_t c = column; c < column + level_.light_count; ++c) (*b)[c] = float(g[c] / sum);
+        }
+    }
+
+  private:
+    uint32_t finest_light(uint32_t i) const {
+        return i < level_.coarse_sources ? i << level_.bits : data_.source_count + ((i - level_.coarse_sources) << level_.bits);
+    }
+
+    const GammaDataset& data_;
+    const Level level_;
+    const double mix_;
+    std::vector<double> energy_;
+    double total_energy_ = 1;
+    std::vector<uint32_t> cells_;
+    std::vector<float> gains_;
+};
+
+constexpr double kStrengths[] = {0.01, 0.1, 1, 10};
+constexpr int kCoarseSteps = 4, kStepsPerStrength = 4, kFinalSteps = 3;
+
+std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& options, GammaReport* report) {
+    std::vector<uint32_t> train, judge;
+    for (uint32_t x = 0; x < data.paths.size(); ++x) {
+        const uint64_t h = mix64(options.seed ^ mix64(x + 0x51ull));
+        (double(h >> 11) * 0x1p-53 < options.held_out ? judge : train).push_back(x);
+    }
+    std::vector<uint32_t> all(data.paths.size());
+    std::iota(all.begin(), all.end(), 0u);
+
+    // From about 16 subspaces a side to the finest, a quarter of a subspace's size at a time.
+    uint32_t bits = 0;
+    while ((std::max(data.light_count, data.eye_count) >> bits) > 16) bits += 2;
+    std::optional<LevelProblem> problem(std::in_place, data, bits, options.mix);
+    std::vector<float> prior = problem->flat_prior(), b = prior;
+    report->uniform_loss = problem->loss(prior, judge);
+    double best_loss = report->uniform_loss;
+    while (true) {
+        const bool finest = bits == 0;
+        // The prior's strength matters where data are thin, which is at the fine end.
+        std::vector<float> best_b = prior;
+        double level_loss = HUGE_VAL, strength = 0;
+        for (const double lambda : kStrengths) {
+            if (bits > 2 && lambda != 0.1) continue;
+            std::vector<float> candidate = b;
+            for (int i = 0; i < (bits > 2 ? kCoarseSteps : kStepsPerStrength); ++i) problem->improve(&candidate, prior, lambda, train);
+            const double loss = problem->loss(candidate, judge);
+            if (loss < level_loss) level_loss = loss, strength = lambda, best_b = std::move(candidate);
+        }
+        if (level_loss < best_loss) {
+            best_loss = level_loss;
+            report->prior_strength = strength;
+            report->light_resolution = problem->level().light_count;
+            report->eye_resolution = problem->level().eye_count;
+            b = std::move(best_b);
+            // What judged may teach as well once the choice is made.
+            if (finest)
+                for (int i = 0; i < kFinalSteps; ++i) problem->improve(&b, prior, strength, all);
+        } else {
+            b = prior;  // finer subspaces than the data support: keep the coarser model, lifted
+        }
+        if (finest) break;
+        const LevelProblem coarse = *problem;
+        bits -= 2;
+        problem.emplace(data, bits, options.mix);
+        b = prior = problem->lifted(coarse, b);
+    }
+    report->loss = best_loss;
+    return problem->mixed(b);
+}
+
+std::vector<float> train_adam(const GammaDataset& data, const GammaOptions& options) {
+    constexpr double kRate = 0.1, kBeta1 = 0.9, kBeta2 = 0.999, kEpsilon = 1e-8;
+    constexpr size_t kBatch = 10000;
+    constexpr int kEpochs = 2;
+    const LevelProblem problem(data, 0, options.mix);
+    std::vector<float> b = problem.flat_prior();
+    std::vector<double> theta(b.size()), first(b.size(), 0), second(b.size(), 0), g(b.size());
+    for (size_t c = 0; c < b.size(); ++c) theta[c] = math::log(double(b[c]));
+    std::vector<uint32_t> order(data.paths.size());
+    std::iota(order.begin(), order.end(), 0u);
+    Rng rng({options.seed, Stage::kTraining, 2, 0});
+    double power1 = 1, power2 = 1;
+    for (int epoch = 0; epoch < kEpochs; ++epoch) {
+        for (size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[size_t(rng.next_u64() % i)]);
+        for (size_t begin = 0; begin < order.size(); begin += kBatch) {
+            const size_t end = std::min(order.size(), begin + kBatch);
+            problem.gradient(b, &order[begin], order.data() + end, &g);
+            power1 *= kBeta1, power2 *= kBeta2;
+            const double scale = (1 - options.mix) / double(end - begin);
+            for (uint32_t j = 0; j < data.eye_count; ++j) {
+                const size_t column = size_t(j) * data.light_count;
+                double mean = 0;
+                for (size_t c = column; c < column + data.light_count; ++c) mean += double(b[c]) * g[c];
+                double largest = -HUGE_VAL;
+                for (size_t c = column; c < column + data.light_count; ++c) {
+                    const double slope = -scale * double(b[c]) * (g[c] - mean);  // through the softmax
+                    first[c] = kBeta1 * first[c] + (1 - kBeta1) * slope;
+                    second[c] = kBeta2 * second[c] + (1 - kBeta2) * slope * slope;
+                    theta[c] -= kRate * (first[c] / (1 - power1)) / (std::sqrt(second[c] / (1 - power2)) + kEpsilon);
+                    largest = std::max(largest, theta[c]);
+                }
+                double sum = 0;
+                for (size_t c = column; c < column + data.light_count; ++c) sum += g[c] = math::exp(theta[c] - largest);
+                for (size_t c = column; c < column + data.light_count; ++c) b[c] = float(g[c] / sum);
+            }
+        }
+    }
+    return problem.mixed(b);
+}
+
+std::vector<float> train_contribution(const GammaDataset& data, const GammaOptions& options) {
+    constexpr float kCap = 10;  // relative to the block's brightness: one outlier must not own a column
+    const LevelProblem problem(data, 0, options.mix);
+    std::vector<double> sum(problem.size(), 0.0);
+    for (const GammaPath& p : data.paths) {
+        for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n)
+            sum[size_t(data.nodes[n].eye) * data.light_count + data.nodes[n].light] += double(std::min(p.contribution, kCap));
+    }
+    std::vector<float> b = problem.flat_prior();
+    for (uint32_t j = 0; j < data.eye_count; ++j) {
+        const size_t column = size_t(j) * data.light_count;
+        double total = 0;
+        for (size_t c = column; c < column + data.light_count; ++c) total += sum[c];
+        if (!(total > 0)) continue;
+        for (size_t c = column; c < column + data.light_count; ++c) b[c] = float(sum[c] / total);
+    }
+    return problem.mixed(b);
+}
+
+}  // namespace
+
+double gamma_loss(const GammaDataset& data, const std::vector<float>& gamma, size_t first, size_t stride) {
+    double sum = 0;
+    size_t count = 0;
+    for (size_t x = first; x < data.paths.size(); x += stride, ++count) {
+        const GammaPath& p = data.paths[x];
+        double f = double(p.fixed);
+        for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n)
+            f += double(data.nodes[n].g) * double(gamma[size_t(data.nodes[n].eye) * data.light_count + data.nodes[n].light]);
+        if (f > 0) sum += double(p.weight) / f;
+    }
+    return count ? sum / double(count) : 0;
+}
+
+std::vector<float> train_gamma(const GammaDataset& data, const GammaOptions& options, GammaReport* report) {
+    *report = {};
+    if (options.trainer == GammaTrainer::kMm) return train_mm(data, options, report);
+    const LevelProblem problem(data, 0, options.mix);
+    report->uniform_loss = gamma_loss(data, problem.mixed(problem.flat_prior()));
+    const std::vector<float> gamma =
+        options.trainer == GammaTrainer::kAdam ? train_adam(data, options) : train_contribution(data, options);
+    report->loss = gamma_loss(data, gamma);
+    report->light_resolution = data.light_count, report->eye_resolution = data.eye_count;
+    return gamma;
+}
+
+}  // namespace lightloom

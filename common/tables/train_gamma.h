@@ -1,0 +1,60 @@
+#pragma once
+// Learns Gamma: for every eye subspace a distribution over light subspaces that minimises the MIS-aware bound of the variance,
+//     loss(Gamma) = sum_X w_X / F_X,   F_X = fixed_X + sum_n g_n Gamma(i_n, j_n)     [Su, Li and Wang 2022, Eq. 14-16]
+// over the paths X of a dataset. Three trainers:
+//   mm            majorise-minimise with a prior from coarser subspaces, its strength chosen on held-out paths [algorithms.md 9.2]
+//   adam          stochastic gradient on softmax columns, as the paper does
+//   contribution  share of contribution, blind to the other techniques (the paper's Fig. 6 ablation)
+// All are deterministic. Gamma = (1 - mix) B + mix (uniform + Q-proportional) / 2; the loss knows the mix.
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace lightloom {
+
+/// A connection that can make a path.
+struct GammaNode {
+    uint16_t light = 0, eye = 0;
+    float g = 0;
+};
+
+struct GammaPath {
+    uint32_t first_node = 0, node_count = 0;
+    float weight = 0;        ///< w_X, see TrainingPath::square over the squared brightness of its block.
+    float fixed = 0;         ///< Techniques that Gamma does not change.
+    float contribution = 0;  ///< Relative to the block's brightness.
+};
+
+struct GammaDataset {
+    uint32_t light_count = 1, eye_count = 1;
+    uint32_t source_count = 0;  ///< Light labels below this are cells of emitters; coarsened apart.
+    std::vector<GammaNode> nodes;
+    std::vector<GammaPath> paths;
+    std::vector<float> energy;  ///< Q, positive.
+};
+
+enum class GammaTrainer : uint8_t { kMm, kAdam, kContribution };
+
+struct GammaOptions {
+    GammaTrainer trainer = GammaTrainer::kMm;
+    double mix = 0.1;
+    double held_out = 0.2;  ///< Share of the paths that only judge (mm).
+    uint64_t seed = 0;
+};
+
+/// What training found, for reports.
+struct GammaReport {
+    double uniform_loss = 0;  ///< Of Q-proportional selection without subspaces, on the held-out paths (mm) or all.
+    double loss = 0;          ///< Of the result, same paths.
+    double prior_strength = 0;
+    uint32_t light_resolution = 1, eye_resolution = 1;  ///< Subspaces that the result tells apart (mm).
+};
+
+/// Column-major (eye * light_count + light), every column sums to one, every entry positive.
+std::vector<float> train_gamma(const GammaDataset& data, const GammaOptions& options, GammaReport* report);
+
+/// The loss of a Gamma over the paths first, first + stride, ... of a dataset, divided by their number.
+double gamma_loss(const GammaDataset& data, const std::vector<float>& gamma, size_t first = 0, size_t stride = 1);
+
+}  // namespace lightloom

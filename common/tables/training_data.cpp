@@ -1,0 +1,103 @@
+#include "common/tables/training_data.h"
+
+#include <cmath>
+#include <cstring>
+
+namespace lightloom {
+namespace {
+
+struct Header {
+    char magic[8] = {'L', 'L', 'T', 'R', 'A', 'I', 'N', '1'};
+    int32_t blocks_x = 0, blocks_y = 0;
+    uint64_t samples = 0, path_count = 0, light_path_count = 0, vertex_count = 0;
+};
+
+template <class T>
+void put(std::string& out, const std::vector<T>& values) {
+    out.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+}
+
+template <class T>
+void take(std::string_view& rest, uint64_t count, std::vector<T>* values) {
+    values->resize(count);
+    if (count) std::memcpy(values->data(), rest.data(), count * sizeof(T));
+    rest.remove_prefix(count * sizeof(T));
+}
+
+}  // namespace
+
+Status TrainingData::append(const TrainingData& other) {
+    if (blocks_x == 0) {
+        blocks_x = other.blocks_x, blocks_y = other.blocks_y;
+        block_sum.assign(other.block_sum.size(), 0.0);
+    }
+    if (blocks_x != other.blocks_x || blocks_y != other.blocks_y || block_sum.size() != other.block_sum.size())
+        return invalid_argument("training data of another frame");
+    for (size_t i = 0; i < block_sum.size(); ++i) block_sum[i] += other.block_sum[i];
+    samples += other.samples;
+    const uint32_t offset = uint32_t(vertices.size());
+    const auto join = [offset](std::vector<TrainingPath>& into, const std::vector<TrainingPath>& from) {
+        for (TrainingPath p : from) {
+            p.first_vertex += offset;
+            into.push_back(p);
+        }
+    };
+    join(paths, other.paths);
+    join(light_paths, other.light_paths);
+    vertices.insert(vertices.end(), other.vertices.begin(), other.vertices.end());
+    return {};
+}
+
+Status TrainingData::validate(size_t emitter_count) const {
+    if (blocks_x < 1 || blocks_y < 1 || block_sum.size() != size_t(blocks_x) * size_t(blocks_y))
+        return data_loss("training data without a frame");
+    for (const std::vector<TrainingPath>* list : {&paths, &light_paths}) {
+        for (const TrainingPath& p : *list) {
+            if (p.vertex_count < 1 || uint64_t(p.first_vertex) + p.vertex_count > vertices.size() ||
+                p.block >= block_sum.size() || vertices[p.first_vertex].emitter >= emitter_count ||
+                !std::isfinite(p.estimate) || !std::isfinite(p.square))
+                return data_loss("training data with a malformed path");
+        }
+    }
+    return {};
+}
+
+std::string serialize(const TrainingData& d) {
+    Header header;
+    header.blocks_x = d.blocks_x, header.blocks_y = d.blocks_y;
+    header.samples = d.samples;
+    header.path_count = d.paths.size(), header.light_path_count = d.light_paths.size(), header.vertex_count = d.vertices.size();
+    std::string out(reinterpret_cast<const char*>(&header), sizeof header);
+    put(out, d.block_sum);
+    put(out, d.paths);
+    put(out, d.light_paths);
+    put(out, d.vertices);
+    return out;
+}
+
+Result<TrainingData> parse_training_data(std::string_view bytes) {
+    Header header;
+    const Header expected;
+    if (bytes.size() < sizeof header) return data_loss("training data cut short");
+    std::memcpy(&header, bytes.data(), sizeof header);
+    bytes.remove_prefix(sizeof header);
+    if (std::memcmp(header.magic, expected.magic, sizeof header.magic) != 0) return data_loss("not training data of a known version");
+    if (header.blocks_x < 1 || header.blocks_y < 1 || header.blocks_x > 65536 || header.blocks_y > 65536)
+        return data_loss("training data without a frame");
+    const uint64_t blocks = uint64_t(header.blocks_x) * uint64_t(header.blocks_y);
+    const uint64_t limit = bytes.size();
+    if (blocks > limit || header.path_count > limit || header.light_path_count > limit || header.vertex_count > limit ||
+        blocks * sizeof(double) + (header.path_count + header.light_path_count) * sizeof(TrainingPath) +
+                header.vertex_count * sizeof(TrainingVertex) != limit)
+        return data_loss("training data of the wrong size");
+    TrainingData d;
+    d.blocks_x = header.blocks_x, d.blocks_y = header.blocks_y;
+    d.samples = header.samples;
+    take(bytes, blocks, &d.block_sum);
+    take(bytes, header.path_count, &d.paths);
+    take(bytes, header.light_path_count, &d.light_paths);
+    take(bytes, header.vertex_count, &d.vertices);
+    return d;
+}
+
+}  // namespace lightloom

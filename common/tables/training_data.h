@@ -1,0 +1,54 @@
+#pragma once
+// What training units bring home: full paths (the dataset D), light sub-paths (for Q), and the brightness of the frame by blocks.
+// Everything is a plain array, so that parts from many units are simply joined in the order of their sample numbers.
+//
+// A path X of technique `own` with density p_own and effective generator density sum_s n_s p_s = p_own / w_own:
+//     estimate = L(w_own f / p_own)                a sample of the image, in expectation
+//     square   = L(f / p_own)^2 w_own              c_X p_own of algorithms.md 1.1: E[square / (F / p_own)] is the loss
+//     vertices[i].density = n p of a technique, without N Gamma / Q, over p_own: i = 0 holds the ones that tables do not change
+//                           (s = 0 and s = k), 1 <= s <= k-1 the connection of x_{s-1} and x_s; 0 where impossible
+// One path per camera sample (and one per light sub-path that reached the lens) is kept, chosen in proportion to its estimate; both
+// numbers are divided by the probability of that choice, so that sums over D stay unbiased.
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/core/result.h"
+#include "common/core/vec.h"
+
+namespace lightloom {
+
+struct TrainingVertex {
+    Vec3 position;
+    Vec3 normal;             ///< Geometric; x_0 of an infinite light: direction of travel. The lens has none.
+    float density = 0;       ///< Paths: see above. Light sub-paths: scalar throughput; 0 where not connectible.
+    uint32_t emitter = 0;    ///< x_0 only.
+};
+
+struct TrainingPath {
+    uint32_t first_vertex = 0;
+    uint32_t vertex_count = 0;  ///< k + 1, x_0 ... x_k; light sub-paths: y_0 ... y_{n-1}.
+    uint32_t block = 0;         ///< Of the frame. Light sub-paths: 0.
+    float estimate = 0, square = 0;
+};
+
+struct TrainingData {
+    int32_t blocks_x = 0, blocks_y = 0;
+    std::vector<double> block_sum;   ///< Of all estimates, kept or not; blocks_x * blocks_y.
+    uint64_t samples = 0;            ///< Camera samples traced, uniform over the frame; as many light sub-paths.
+    std::vector<TrainingPath> paths;
+    std::vector<TrainingPath> light_paths;
+    std::vector<TrainingVertex> vertices;
+
+    /// Appends another unit's data of the same frame; kInvalidArgument for another one's.
+    Status append(const TrainingData& other);
+    Status validate(size_t emitter_count) const;
+};
+
+std::string serialize(const TrainingData& data);
+/// kDataLoss when the bytes are no training data.
+Result<TrainingData> parse_training_data(std::string_view bytes);
+
+}  // namespace lightloom

@@ -1,0 +1,28 @@
+#pragma once
+// The settings of a render as numbers: what the catalog's texts mean to transport and to training.
+
+#include "common/core/result.h"
+#include "common/path/mis.h"
+#include "common/path/random_walk.h"
+#include "common/tables/train.h"
+#include "common/transport/renderer.h"
+
+namespace lightloom {
+
+struct TransportParameters {
+    RouletteRule roulette;
+    Heuristic heuristic = Heuristic::kBalance;
+    double light_paths = 0;       ///< N1, per pixel and iteration; 0 for algorithms that splat nothing.
+    bool needs_tables = false;
+    // Algorithms with a cache.
+    int connections = 1;          ///< N
+    uint64_t minimum_paths = 1;   ///< Of a unit's cache.
+    bool ris_aware = false;
+    uint64_t training_samples = 0;
+    TrainingOptions training;
+
+    /// Unknown algorithm or parameter, value or depth out of range: a clear error.
+    static Result<TransportParameters> read(const RenderSettings& settings);
+};
+
+}  // namespace lightloom

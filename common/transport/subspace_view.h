@@ -1,0 +1,65 @@
+#pragma once
+// Labels of full paths: which light subspace every hypothetical light prefix falls into, and which eye subspace every camera
+// suffix. A label depends on the end of a sub-path as its own predecessor sees it, so all techniques agree on it.
+
+#include "common/path/throughput.h"
+#include "common/tables/subspace_tables.h"
+
+namespace lightloom {
+
+struct SubspaceLabeller {
+    const SubspaceTables& tables;
+    const EmitterSet& emitters;
+
+    uint16_t light(const PathVertex& v, const Vec3& to_predecessor) const {
+        return uint16_t(tables.light_label(sub_path_end(v.p, v.ng, to_predecessor)));
+    }
+    uint16_t eye(const PathVertex& v, const Vec3& to_predecessor) const {
+        return uint16_t(tables.eye_label(sub_path_end(v.p, v.ng, to_predecessor)));
+    }
+    /// Point x_0 on `emitter`; `travel` is the emission's direction for the environment.
+    uint16_t source(uint32_t emitter, const Vec3& position, const Vec3& travel) const {
+        return uint16_t(tables.division.label(emitters, emitter, position, travel));
+    }
+
+    /// All labels of a complete light sub-path.
+    void label_light_path(PathVertex* y, int n) const {
+        if (n == 0) return;
+        y[0].label = source(uint32_t(y[0].emitter), y[0].p, y[0].ng);
+        for (int i = 1; i < n; ++i) {
+            if (!y[i].bsdf.has_smooth_lobe()) continue;
+            y[i].label = light(y[i], y[i].wo);
+            if (i + 1 < n) y[i].reverse_label = eye(y[i], -y[i + 1].wo);
+        }
+    }
+    /// The eye label of a camera vertex, before it is connected.
+    void label_camera_vertex(PathVertex* v) const { v->label = eye(*v, v->wo); }
+
+    /// Labels and throughput of a path made with ViewDetail::kSubspace. `towards`: unit, from z_{t-1} to x_{s-1} (to the emitter of
+    /// an escaped ray); not read for s = 0 on a surface, where z_{t-1} is x_0. Vertices of z get their reverse labels on demand.
+    void complete(const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
+        view_throughput(y, s, z, view);
+        const int k = view->k;
+        for (int i = 0; i < s; ++i) view->light_label[i + 1] = y[i].label;
+        for (int i = 1; i + 1 < s; ++i) view->eye_label[i] = y[i].reverse_label;
+        if (s >= 2) view->eye_label[s - 1] = eye(y[s - 1], -towards);
+        for (int j = 1; j < t; ++j) view->eye_label[k - j] = z[j].label;
+        const bool hit = s == 0 && k == t - 1;
+        if (s == 0 && hit) view->light_label[1] = source(uint32_t(z[t - 1].emitter), z[t - 1].p, z[t - 1].wo);
+        // Prefixes that end on the camera side, at z_j; the camera's end vertex z_{t-1} has no successor of its own unless it was
+        // the emitter.
+        for (int j = 2; j < t; ++j) {
+            const bool end = j == t - 1;
+            if (end && hit) break;
+            if (end) {
+                view->light_label[k - j + 1] = z[j].bsdf.has_smooth_lobe() ? light(z[j], towards) : kNoLabel;
+            } else {
+                if (z[j].reverse_label == kNoLabel && z[j].bsdf.has_smooth_lobe())
+                    z[j].reverse_label = light(z[j], -z[j + 1].wo);
+                view->light_label[k - j + 1] = z[j].reverse_label;
+            }
+        }
+    }
+};
+
+}  // namespace lightloom

@@ -1,0 +1,208 @@
+// What the coordinator keeps, and for how long: the table of units, the sums, the list of jobs.
+
+#include <gtest/gtest.h>
+
+#include "tests/service/fake.h"
+
+namespace lightloom {
+namespace {
+
+using testing::FakeService;
+
+constexpr TimePoint kNever = TimePoint::max();
+
+FrameLayout whole(int width, int height) { return {width, height, {0, 0, width, height}}; }
+
+Digest digest_of(const UnitKey& key) { return sha256(std::to_string(key.group) + "/" + std::to_string(key.tile)); }
+
+TEST(UnitTable, MergedGroupsStillAnswerForTheirUnits) {
+    const Plan plan(whole(1000, 600), 0.5);
+    ASSERT_GT(plan.tile_count(), 1u);
+    UnitTable table(plan, 50, 2, std::nullopt);
+    std::vector<WorkUnit> leased;
+    for (uint32_t group = 0; group < table.group_total(); ++group) {
+        for (uint32_t tile = 0; tile < plan.tile_count(); ++tile) {
+            const auto unit = table.lease(tile, kNever);
+            ASSERT_TRUE(unit);
+            leased.push_back(*unit);
+            EXPECT_EQ(table.complete(unit->key, tile, digest_of(unit->key)), UnitTable::Completion::kFirst);
+        }
+        table.advance(group + 1);
+    }
+    EXPECT_FALSE(table.lease(0, kNever));
+    EXPECT_EQ(table.done_count(), table.unit_total());
+    EXPECT_EQ(leased.size(), table.unit_total());
+    const auto merged = table.merged();
+    ASSERT_EQ(merged.size(), leased.size());
+    uint64_t iterations = 0;
+    for (size_t i = 0; i < leased.size(); ++i) {
+        const UnitKey key = leased[i].key;
+        EXPECT_EQ(merged[i].unit, key);
+        EXPECT_EQ(merged[i].worker, key.tile);
+        const auto found = table.find(key);
+        ASSERT_TRUE(found);
+        EXPECT_EQ(found->first_iteration, leased[i].first_iteration);
+        EXPECT_EQ(found->iteration_count, leased[i].iteration_count);
+        EXPECT_EQ(found->tile, leased[i].tile);
+        EXPECT_EQ(found->first_light_path, leased[i].first_light_path);
+        EXPECT_EQ(found->light_path_count, leased[i].light_path_count);
+        EXPECT_EQ(table.complete(key, 9, digest_of(key)), UnitTable::Completion::kDuplicateSame);
+        EXPECT_EQ(table.complete(key, 9, sha256("other")), UnitTable::Completion::kDuplicateDifferent);
+        EXPECT_FALSE(table.renew(key, 9, kNever));
+        EXPECT_EQ(table.reopen(key).total, 0);
+        if (key.tile == 0) iterations += found->iteration_count;
+    }
+    EXPECT_EQ(iterations, 50u);
+    EXPECT_EQ(table.complete({table.group_total(), 0}, 0, {}), UnitTable::Completion::kUnknown);
+    EXPECT_FALSE(table.find({0, plan.tile_count()}));
+}
+
+TEST(UnitTable, AMillionIterationsNeedNoRoomBeforeTheyAreLeased) {
+    const auto begin = std::chrono::steady_clock::now();
+    UnitTable table(Plan(whole(4000, 4000), 1), 1u << 24, 4, std::nullopt);
+    EXPECT_EQ(table.group_total(), 1u << 24);
+    EXPECT_TRUE(table.lease(0, kNever));
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(500));
+}
+
+/// The only splat of a unit's partial is `value`.
+Partial splat_of(const WorkUnit& unit, double value) {
+    Partial partial;
+    partial.tile = unit.tile;
+    partial.samples_per_pixel = unit.iteration_count;
+    partial.light_paths = unit.light_path_count;
+    partial.camera.assign(size_t(3 * unit.tile.area()), 0.0);
+    partial.splats.push_back({0, {value, 0, 0}});
+    return partial;
+}
+
+TEST(Reducer, APartialThatLeavesTheRangeAfterWaitingIsTheOneRefused) {
+    const FrameLayout frame = whole(1000, 600);
+    const Plan plan(frame, 0.5);
+    const uint32_t tiles = plan.tile_count();
+    ASSERT_GE(tiles, 3u);
+    const auto first = plan.units(plan.group(0)), second = plan.units(plan.group(1));
+    Reducer reducer(frame, tiles);
+    const double most = FixedSums::kRange * 0.75;
+    // The second group waits, whole: its tiles 0 and 2 exceed the range together.
+    for (uint32_t tile = 0; tile < tiles; ++tile) {
+        const auto refused = reducer.add(second[tile], splat_of(second[tile], tile == 0 || tile == 2 ? most : 1));
+        ASSERT_TRUE(refused.ok()) << refused.status().message();
+        EXPECT_TRUE(refused->empty());
+    }
+    for (uint32_t tile = 0; tile < tiles; ++tile) {
+        const auto refused = reducer.add(first[tile], splat_of(first[tile], 1));
+        ASSERT_TRUE(refused.ok()) << refused.status().message();
+        if (tile + 1 < tiles) {
+            EXPECT_TRUE(refused->empty());
+        } else {
+            ASSERT_EQ(refused->size(), 1u);
+            EXPECT_EQ(refused->front().unit, second[2].key);
+            EXPECT_EQ(refused->front().why.code(), StatusCode::kDataLoss);
+        }
+    }
+    // The others were kept: the unit alone completes its group.
+    EXPECT_EQ(reducer.folded_groups(), 1u);
+    const auto refused = reducer.add(second[2], splat_of(second[2], 1));
+    ASSERT_TRUE(refused.ok());
+    EXPECT_TRUE(refused->empty());
+    EXPECT_EQ(reducer.folded_groups(), 2u);
+}
+
+TEST(Reducer, AGroupThatDoesNotFitTheSumsIsAnError) {
+    const FrameLayout frame = whole(10, 10);
+    const Plan plan(frame, 1);
+    Reducer reducer(frame, 1);
+    for (uint32_t group = 0; group < 2; ++group) {
+        const WorkUnit unit = plan.units(plan.group(group))[0];
+        const auto refused = reducer.add(unit, splat_of(unit, FixedSums::kRange * 0.75));
+        EXPECT_EQ(refused.ok(), group == 0);
+    }
+    EXPECT_EQ(reducer.folded_groups(), 1u);
+}
+
+/// Units that workers can hold before any of them is merged.
+size_t units_in_flight(uint64_t waiting_bytes) {
+    FakeService service(whole(40, 30), std::nullopt, [&](CoordinatorOptions& o) { o.waiting_bytes = waiting_bytes; });
+    service.submit(service.spec(4000));
+    size_t count = 0;
+    while (!service.lease(service.add_worker()).empty()) ++count;
+    return count;
+}
+
+TEST(Coordinator, OpensOnlyGroupsThatTheRoomForWaitingPartialsHolds) {
+    const uint64_t group_bytes = 40 * 30 * (3 * sizeof(double) + sizeof(SplatSum));
+    EXPECT_EQ(units_in_flight(0), 1u);
+    EXPECT_EQ(units_in_flight(group_bytes - 1), 1u);
+    EXPECT_EQ(units_in_flight(5 * group_bytes), 6u);
+}
+
+TEST(Coordinator, ForgetsTheOldestEndedJobsOnly) {
+    FakeService service(whole(40, 30), std::nullopt, [](CoordinatorOptions& o) { o.kept_jobs = 2, o.max_jobs = 3; });
+    const std::string running = service.submit(service.spec(1));
+    std::vector<std::string> cancelled;
+    for (int i = 0; i < 5; ++i) {
+        cancelled.push_back(service.submit(service.spec(1)));
+        ASSERT_TRUE(service.coordinator->cancel_job(cancelled.back()).ok());
+    }
+    for (int i = 0; i < 1000 && service.coordinator->list_jobs().size() > 3; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    const auto jobs = service.coordinator->list_jobs();
+    ASSERT_EQ(jobs.size(), 3u);
+    EXPECT_EQ(jobs[0].job_id, running);
+    EXPECT_EQ(jobs[1].job_id, cancelled[3]);
+    EXPECT_EQ(jobs[2].job_id, cancelled[4]);
+    EXPECT_EQ(service.coordinator->get_job(cancelled[0]).status().code(), StatusCode::kNotFound);
+    // Its request is forgotten with it: the same id is a new job.
+    EXPECT_TRUE(service.coordinator->submit_job("request-2", service.spec(1)).ok());
+    EXPECT_TRUE(service.coordinator->submit_job("third", service.spec(1)).ok());
+    EXPECT_EQ(service.coordinator->submit_job("fourth", service.spec(1)).status().code(), StatusCode::kResourceExhausted);
+}
+
+TEST(Coordinator, DroppedSamplesOfGroupsBeyondTheImageDoNotCount) {
+    FakeService service;
+    JobSpec spec = service.spec(0);
+    spec.time_limit_seconds = 10;
+    const std::string id = service.submit(spec);
+    std::vector<std::pair<std::string, UnitLease>> held;
+    for (int i = 0; i < 3; ++i) {
+        const std::string worker = service.add_worker();
+        held.emplace_back(worker, service.lease(worker).at(0));
+    }
+    ASSERT_TRUE(service.coordinator->heartbeat(held[0].first, {{held[0].second.reference(), true}}).ok());
+    // Groups 0 and 2 arrive, each with dropped samples; group 1 never does.
+    for (const int i : {0, 2}) {
+        const UnitLease& lease = held[size_t(i)].second;
+        Partial partial = testing::fake_partial(unit_work(lease.unit), lease.spec.frame);
+        partial.dropped_count = uint64_t(i + 1);
+        for (int d = 0; d <= i; ++d) partial.dropped.push_back({lease.unit.first_iteration, uint32_t(d), false});
+        const auto encoded = encode_partial(partial, lease.spec.frame);
+        ASSERT_TRUE(encoded.ok()) << encoded.status().message();
+        const auto ack = service.coordinator->submit_payload(held[size_t(i)].first, lease.reference(),
+                                                             encoded->descriptor, encoded->payload);
+        ASSERT_TRUE(ack.ok());
+        EXPECT_EQ(ack->outcome, SubmitOutcome::kAccepted) << ack->reason;
+    }
+    EXPECT_EQ(service.coordinator->get_job(id)->dropped_samples, 4u);
+    service.now_ms += 10001;
+    const JobInfo info = service.wait_end(id);
+    ASSERT_EQ(info.state, JobState::kSucceeded) << info.message;
+    EXPECT_EQ(info.samples_per_pixel_done, 1u);
+    EXPECT_EQ(info.dropped_samples, 1u);
+    const auto manifest = service.coordinator->manifest(id);
+    ASSERT_TRUE(manifest.ok());
+    EXPECT_NE(manifest->find("\"iteration\": 0"), std::string::npos);
+    EXPECT_EQ(manifest->find("\"iteration\": 2"), std::string::npos);
+}
+
+TEST(Coordinator, AWaitThatIsNotANumberIsRefused) {
+    FakeService service;
+    const std::string worker = service.add_worker();
+    for (const double wait : {std::nan(""), -1.0}) {
+        const auto leases = service.coordinator->lease_units(worker, wait, [] { return false; });
+        EXPECT_EQ(leases.status().code(), StatusCode::kInvalidArgument);
+    }
+}
+
+}  // namespace
+}  // namespace lightloom

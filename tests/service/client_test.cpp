@@ -1,0 +1,202 @@
+// The client's side of a job against a port that the test plays, and small things of the coordinator's process.
+
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+
+#include "client/commands.h"
+#include "client/run_job.h"
+#include "common/film/atomic_file.h"
+#include "server/data_lock.h"
+#include "server/results.h"
+#include "server/status_http.h"
+#include "tests/service/fake.h"
+
+namespace lightloom {
+namespace {
+
+using client::AfterFetch;
+using testing::FakeService;
+using testing::TempDirectory;
+using Json = nlohmann::json;
+
+/// A service that has one finished job, and whose submissions fail as the test says.
+class PlayedPort final : public JobPort {
+  public:
+    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec&) override {
+        request_ids.push_back(request_id);
+        if (request_ids.size() <= refusals.size()) return refusals[request_ids.size() - 1];
+        return job;
+    }
+    Result<JobInfo> get_job(const std::string&) override { return job; }
+    Result<std::vector<JobInfo>> list_jobs() override { return std::vector<JobInfo>{job}; }
+    Result<JobInfo> cancel_job(const std::string&) override { return job; }
+    Status watch_job(const std::string&, const std::function<void(const JobInfo&)>&, std::stop_token) override { return {}; }
+    Result<std::string> image(const std::string&, ImageKind) override { return exr; }
+    Result<std::string> manifest(const std::string&) override {
+        return Json{{"image", {{"sha256", job.image_digest.hex()}, {"size_bytes", exr.size()}, {"colour", "float"}}}}.dump();
+    }
+    Result<std::vector<Digest>> find_missing(const std::vector<Digest>&) override { return std::vector<Digest>(); }
+    Status upload(const Digest&, const std::filesystem::path&) override { return {}; }
+    Status upload_bytes(const Digest&, std::string_view) override { return {}; }
+
+    JobInfo job;
+    std::string exr;
+    std::vector<Status> refusals;
+    std::vector<std::string> request_ids;
+};
+
+/// A 3 x 2 image whose pixel (1, 1) is `value`.
+PlayedPort port_with_image(float value) {
+    ExrImage image;
+    image.frame = {3, 2, {0, 0, 3, 2}};
+    image.color = {3, 2, std::vector<float>(18, 0.1f)};
+    image.color.pixels[3 * 4 + 1] = value;
+    image.layers.push_back({"variance", "RGB", std::vector<float>(18, 1e6f)});
+    image.attributes = {{exr_attribute::kSeed, "7"}};
+    PlayedPort port;
+    port.exr = *encode_exr(image);
+    port.job.job_id = "job-1";
+    port.job.state = JobState::kSucceeded;
+    port.job.image_digest = sha256(port.exr);
+    return port;
+}
+
+client::JobOptions half_to(const std::filesystem::path& path) {
+    client::JobOptions options;
+    options.output = path.string();
+    options.quiet = options.half = true;
+    return options;
+}
+
+TEST(Client, HalfColoursAreMadeWhenTheImageIsFetched) {
+    const TempDirectory directory;
+    PlayedPort port = port_with_image(65504);
+    ASSERT_EQ(client::fetch(port, port.job, half_to(directory.path / "a.exr"), {}, AfterFetch::kImageStays), client::kSuccess);
+    const auto bytes = read_file((directory.path / "a.exr").string());
+    ASSERT_TRUE(bytes.ok());
+    const Json manifest = Json::parse(*read_file((directory.path / "a.manifest.json").string()));
+    EXPECT_EQ(manifest["image"]["sha256"], sha256(*bytes).hex());
+    EXPECT_EQ(manifest["image"]["size_bytes"], bytes->size());
+    EXPECT_EQ(manifest["image"]["colour"], "half");
+    EXPECT_EQ(manifest["image"]["float_sha256"], port.job.image_digest.hex());
+    const auto image = decode_exr(*bytes, "a");
+    ASSERT_TRUE(image.ok()) << image.status().message();
+    EXPECT_EQ(image->color.pixels[13], 65504.0f);
+    EXPECT_NE(image->color.pixels[0], 0.1f) << "a tenth is no half";
+    EXPECT_NEAR(image->color.pixels[0], 0.1f, 1e-4f);
+    ASSERT_TRUE(image->layer("variance"));
+    EXPECT_EQ(image->layer("variance")->pixels[0], 1e6f);
+    EXPECT_EQ(image->attribute(exr_attribute::kSeed), "7");
+}
+
+TEST(Client, AnImageBeyondHalfIsRefusedAndNotLost) {
+    const TempDirectory directory;
+    PlayedPort port = port_with_image(70000);
+    const auto options = half_to(directory.path / "a.exr");
+    ::testing::internal::CaptureStderr();
+    EXPECT_EQ(client::fetch(port, port.job, options, {}, AfterFetch::kImageStays), client::kFailure);
+    const std::string message = ::testing::internal::GetCapturedStderr();
+    EXPECT_NE(message.find("pixel (1, 1) is 70000"), std::string::npos) << message;
+    EXPECT_NE(message.find("`lightloom fetch job-1` without --half"), std::string::npos) << message;
+    EXPECT_TRUE(std::filesystem::is_empty(directory.path));
+
+    ::testing::internal::CaptureStderr();
+    EXPECT_EQ(client::fetch(port, port.job, options, {}, AfterFetch::kImageGoes), client::kFailure);
+    EXPECT_NE(::testing::internal::GetCapturedStderr().find("a.float.exr"), std::string::npos);
+    EXPECT_FALSE(std::filesystem::exists(directory.path / "a.exr"));
+    EXPECT_EQ(*read_file((directory.path / "a.float.exr").string()), port.exr);
+    EXPECT_TRUE(std::filesystem::exists(directory.path / "a.float.manifest.json"));
+}
+
+TEST(Client, SubmitsAgainUnderTheSameRequestWhenTheAnswerIsLost) {
+    PlayedPort port = port_with_image(1);
+    port.refusals = {{StatusCode::kDeadlineExceeded, "late"}, {StatusCode::kUnavailable, "gone"}};
+    EXPECT_TRUE(client::submit(port, {}).ok());
+    ASSERT_EQ(port.request_ids.size(), 3u);
+    EXPECT_EQ(port.request_ids[0], port.request_ids[1]);
+    EXPECT_EQ(port.request_ids[0], port.request_ids[2]);
+    port.request_ids.clear();
+    port.refusals = {invalid_argument("no")};
+    EXPECT_EQ(client::submit(port, {}).status().code(), StatusCode::kInvalidArgument);
+    EXPECT_EQ(port.request_ids.size(), 1u);
+}
+
+TEST(Results, ReplayCommandsAreOneShellCommand) {
+    JobSpec spec;
+    spec.frame = {4, 4, {0, 0, 4, 4}};
+    spec.parameters["key"] = "1";
+    const std::string plain = replay_command(spec, "room/a-b.pbrt", {{0, 0}, {3, 6, false}});
+    EXPECT_EQ(plain.find('\''), std::string::npos) << plain;
+    const std::string scene = "my room; it's \"$HOME\" `x`.pbrt";
+    const std::string command = "printf '%s|' " + replay_command(spec, scene, {{0, 0}, {3, 6, false}});
+    FILE* shell = ::popen(command.c_str(), "r");
+    ASSERT_TRUE(shell);
+    std::string output(1000, '\0');
+    output.resize(std::fread(output.data(), 1, output.size(), shell));
+    EXPECT_EQ(::pclose(shell), 0);
+    EXPECT_TRUE(output.starts_with("lightloom|replay|" + scene + "|--algorithm|path|--set|key=1|")) << output;
+}
+
+TEST(DataLock, OneHolderAtATime) {
+    const TempDirectory directory;
+    {
+        const auto first = DataLock::take(directory.path);
+        ASSERT_TRUE(first.ok()) << first.status().message();
+        const auto second = DataLock::take(directory.path);
+        ASSERT_FALSE(second.ok());
+        EXPECT_NE(second.status().message().find("--data"), std::string::npos) << second.status().message();
+    }
+    EXPECT_TRUE(DataLock::take(directory.path).ok());
+    EXPECT_FALSE(DataLock::take(directory.path / "no-such").ok());
+}
+
+double cpu_seconds() {
+    rusage usage{};
+    ::getrusage(RUSAGE_SELF, &usage);
+    const auto seconds = [](const timeval& t) { return double(t.tv_sec) + 1e-6 * double(t.tv_usec); };
+    return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+bool connect_to(int descriptor, int port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(uint16_t(port));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    return ::connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+}
+
+std::string healthz(int descriptor) {
+    const std::string request = "GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n";
+    EXPECT_EQ(::send(descriptor, request.data(), request.size(), 0), ssize_t(request.size()));
+    std::string answer(1000, '\0');
+    answer.resize(size_t(std::max<ssize_t>(0, ::recv(descriptor, answer.data(), answer.size(), 0))));
+    return answer;
+}
+
+TEST(StatusHttp, WithoutDescriptorsItWaitsInsteadOfSpinning) {
+    FakeService service;
+    const auto http = StatusHttp::start(*service.coordinator, "127.0.0.1:0");
+    ASSERT_TRUE(http.ok()) << http.status().message();
+    const int descriptor = ::socket(AF_INET, SOCK_STREAM, 0);
+    rlimit saved{};
+    ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &saved), 0);
+    // No descriptor is left for the connection that the server would accept.
+    rlimit none = saved;
+    none.rlim_cur = 0;
+    ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+    EXPECT_TRUE(connect_to(descriptor, (*http)->port()));
+    const double before = cpu_seconds();
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    EXPECT_LT(cpu_seconds() - before, 0.25);
+    ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &saved), 0);
+    EXPECT_EQ(healthz(descriptor).substr(0, 15), "HTTP/1.1 200 OK") << "it goes on when there are descriptors again";
+    ::close(descriptor);
+}
+
+}  // namespace
+}  // namespace lightloom

@@ -1,0 +1,1 @@
+lightloom_test(scene_test LINK lt_scene)
