@@ -22,7 +22,7 @@ struct Options {
     double seconds = 60, bound = 0.01, region_bound = 0.05;
     uint64_t seed = 1;
     size_t threads = 0;  ///< 0: all.
-    bool own = false, missing = false, spectral = false;
+    bool light = false, missing = false, spectral = false;
 };
 
 /// The parts of a picture whose means are taken: luminance of the whole, of a 3 x 3 grid, and the channels of the whole.
