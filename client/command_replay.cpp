@@ -7,6 +7,7 @@
 #include "client/job_options.h"
 #include "common/scene/scene.h"
 #include "common/transport/renderer.h"
+#include "common/transport/training.h"
 #include "common/work/job.h"
 
 namespace lightloom::client {
@@ -52,10 +53,11 @@ int replay(const ReplayOptions& options) {
     auto built = Scene::build(std::move(local->imported.description), {.width = spec->width, .height = spec->height});
     if (!built.ok()) return report_error(built.status());
     const std::shared_ptr<const Scene> scene = std::move(built).value();
-    const auto renderer = Renderer::create(scene, {.algorithm = spec->algorithm,
+    const auto renderer = create_with_tables(scene, {.algorithm = spec->algorithm,
                                                    .parameters = spec->parameters,
                                                    .seed = spec->seed,
-                                                   .max_depth = spec->max_depth});
+                                                   .max_depth = spec->max_depth},
+                                          {});
     if (!renderer.ok()) return report_error(renderer.status());
     const auto algorithm = find_algorithm(spec->algorithm);
     const auto parameters = parse_parameters(**algorithm, spec->parameters);

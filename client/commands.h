@@ -22,5 +22,7 @@ void add_inspect_command(CLI::App& app, int* exit_code);
 void add_compare_command(CLI::App& app, int* exit_code);
 void add_algorithms_command(CLI::App& app, int* exit_code);
 void add_replay_command(CLI::App& app, int* exit_code);
+void add_bench_command(CLI::App& app, int* exit_code);
+void add_reference_command(CLI::App& app, int* exit_code);
 
 }  // namespace lightloom::client

@@ -41,6 +41,8 @@ int main(int argc, char** argv) {
 #endif
     add_algorithms_command(app, &exit_code);
     add_replay_command(app, &exit_code);
+    add_bench_command(app, &exit_code);
+    add_reference_command(app, &exit_code);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

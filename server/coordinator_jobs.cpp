@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <ctime>
 #include <new>
@@ -24,17 +23,6 @@ std::string utc(std::time_t time) {
     char text[32];
     std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
     return text;
-}
-
-/// All parameters with their values, so that the manifest and the EXR say what was rendered even where defaults applied.
-std::map<std::string, std::string> complete_parameters(const AlgorithmInfo& algorithm, const AlgorithmParameters& values) {
-    std::map<std::string, std::string> out;
-    for (size_t i = 0; i < algorithm.parameters.size(); ++i) {
-        char text[64];
-        const auto end = std::to_chars(text, text + sizeof text, values.values[i]).ptr;
-        out[std::string(algorithm.parameters[i].name)] = std::string(text, end);
-    }
-    return out;
 }
 
 }  // namespace

@@ -105,28 +105,33 @@ std::string to_json(const Manifest& m) {
     return json.dump(1) + "\n";
 }
 
+Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers) {
+    std::string parameters;
+    for (const auto& [key, value] : spec.parameters) parameters += (parameters.empty() ? "" : " ") + key + "=" + value;
+    ExrImage image;
+    image.frame = spec.frame;
+    image.color = std::move(developed.color);
+    image.layers = std::move(layers);
+    image.layers.push_back({"variance", "RGB", std::move(developed.variance.pixels)});
+    image.attributes = {{exr_attribute::kAlgorithm, spec.algorithm},
+                        {exr_attribute::kParameters, parameters},
+                        {exr_attribute::kSeed, std::to_string(spec.seed)},
+                        {exr_attribute::kMaxDepth, std::to_string(spec.max_depth)},
+                        {exr_attribute::kSamples, std::to_string(developed.iterations)},
+                        {"lightloom.groups", std::to_string(developed.groups)},
+                        {exr_attribute::kScene, spec.scene_root.hex()},
+                        {"lightloom.specDigest", spec.image_digest().hex()}};
+    return encode_exr(image);
+}
+
 Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, float exposure_scale,
                                  std::vector<ImageLayer> layers) {
     auto color = reducer.image(exposure_scale);
     if (!color.ok()) return color.status();
     auto variance = reducer.variance(exposure_scale);
     if (!variance.ok()) return variance.status();
-    std::string parameters;
-    for (const auto& [key, value] : spec.parameters) parameters += (parameters.empty() ? "" : " ") + key + "=" + value;
-    ExrImage image;
-    image.frame = spec.frame;
-    image.color = *std::move(color);
-    image.layers = std::move(layers);
-    image.layers.push_back({"variance", "RGB", std::move(variance->pixels)});
-    image.attributes = {{exr_attribute::kAlgorithm, spec.algorithm},
-                        {exr_attribute::kParameters, parameters},
-                        {exr_attribute::kSeed, std::to_string(spec.seed)},
-                        {exr_attribute::kMaxDepth, std::to_string(spec.max_depth)},
-                        {exr_attribute::kSamples, std::to_string(reducer.iterations())},
-                        {"lightloom.groups", std::to_string(reducer.folded_groups())},
-                        {exr_attribute::kScene, spec.scene_root.hex()},
-                        {"lightloom.specDigest", spec.image_digest().hex()}};
-    return encode_exr(image);
+    return encode_image(spec, {*std::move(color), *std::move(variance), reducer.iterations(), reducer.folded_groups()},
+                        std::move(layers));
 }
 
 Result<std::string> read_image(const std::filesystem::path& job_directory) {

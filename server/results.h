@@ -43,7 +43,16 @@ std::string replay_command(const JobSpec& spec, const std::string& scene, const 
 /// The manifest as JSON text.
 std::string to_json(const Manifest& manifest);
 
-/// The EXR's bytes for the merged groups of `reducer`: colour, its variance, and `layers`.
+/// Complete groups, developed.
+struct DevelopedImage {
+    RgbImage color, variance;
+    uint64_t iterations = 0;
+    uint32_t groups = 0;
+};
+
+/// The EXR's bytes: colour, its variance, and `layers`. Who rendered it, and how, does not enter.
+Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers);
+/// The same for the merged groups of `reducer`.
 Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, float exposure_scale,
                                  std::vector<ImageLayer> layers);
 Result<std::string> read_image(const std::filesystem::path& job_directory);

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "common/import/import.h"
+#include "common/transport/training.h"
 
 namespace lightloom {
 namespace {
@@ -108,10 +109,11 @@ Result<std::shared_ptr<const Renderer>> RendererCache::renderer(const JobSpec& s
     }
     if (scene->frame() != spec.frame)
         return failed_precondition("this worker reads another frame from the scene than the coordinator did");
-    auto renderer = Renderer::create(scene, {.algorithm = spec.algorithm,
+    auto renderer = create_with_tables(scene, {.algorithm = spec.algorithm,
                                              .parameters = spec.parameters,
                                              .seed = spec.seed,
-                                             .max_depth = spec.max_depth});
+                                             .max_depth = spec.max_depth},
+                                       stop);
     if (!renderer.ok()) return renderer.status();
     std::shared_ptr<const Renderer> shared = std::move(renderer).value();
     renderer_entries_.push_front({image, shared});

@@ -61,7 +61,7 @@ float luminance_at(const RgbImage& image, size_t pixel) {
 
 }  // namespace
 
-Result<Metrics> compute_metrics(const RgbImage& image, const RgbImage& reference, double trim_percent) {
+Result<Metrics> compute_pixel_metrics(const RgbImage& image, const RgbImage& reference, double trim_percent) {
     LL_RETURN_IF_ERROR(check_images(image, reference));
     if (!(trim_percent >= 0 && trim_percent < 100)) {
         return invalid_argument("metrics: the share of trimmed terms must lie in [0, 100) percent");
@@ -97,10 +97,17 @@ Result<Metrics> compute_metrics(const RgbImage& image, const RgbImage& reference
     m.mean_ratio = ratio_of(m.mean_image[0] + m.mean_image[1] + m.mean_image[2],
                             m.mean_reference[0] + m.mean_reference[1] + m.mean_reference[2]);
     for (size_t c = 0; c < 3; ++c) m.mean_image[c] /= pixels, m.mean_reference[c] /= pixels;
+    return m;
+}
+
+Result<Metrics> compute_metrics(const RgbImage& image, const RgbImage& reference, double trim_percent) {
+    Result<Metrics> metrics = compute_pixel_metrics(image, reference, trim_percent);
+    if (!metrics.ok()) return metrics;
+    Metrics& m = *metrics;
     m.ssim = ssim(image, reference);
     m.flip = mean_of(ldr_flip(image, reference));
     m.hdr_flip = mean_of(hdr_flip(image, reference).map);
-    return m;
+    return metrics;
 }
 
 Result<std::vector<RegionRatio>> region_ratios(const RgbImage& image, const RgbImage& reference, int columns, int rows) {

@@ -113,6 +113,16 @@ double parameter_value(const AlgorithmInfo& algorithm, const AlgorithmParameters
     return 0;
 }
 
+std::map<std::string, std::string> complete_parameters(const AlgorithmInfo& algorithm, const AlgorithmParameters& values) {
+    std::map<std::string, std::string> out;
+    for (size_t i = 0; i < algorithm.parameters.size(); ++i) {
+        char text[64];
+        const auto end = std::to_chars(text, text + sizeof text, values.values[i]).ptr;
+        out[std::string(algorithm.parameters[i].name)] = std::string(text, end);
+    }
+    return out;
+}
+
 double light_paths_per_pixel(const AlgorithmInfo& algorithm, const AlgorithmParameters& parameters) {
     if (!algorithm.splats) return 0;
     return has_parameter(algorithm, "light-paths") ? parameter_value(algorithm, parameters, "light-paths") : 1;

@@ -47,6 +47,8 @@ Result<AlgorithmParameters> parse_parameters(const AlgorithmInfo& algorithm, con
 bool has_parameter(const AlgorithmInfo& algorithm, std::string_view name);
 /// Value of a parameter that the algorithm has.
 double parameter_value(const AlgorithmInfo& algorithm, const AlgorithmParameters& parameters, std::string_view name);
+/// All parameters with their values as canonical text, so that an image says what was rendered even where defaults applied.
+std::map<std::string, std::string> complete_parameters(const AlgorithmInfo& algorithm, const AlgorithmParameters& values);
 /// N1: light paths splatted per pixel and iteration, one constant of the frame.
 double light_paths_per_pixel(const AlgorithmInfo& algorithm, const AlgorithmParameters& parameters);
 

@@ -182,4 +182,18 @@ Result<SubspaceTables> make_tables(const Scene& scene, const RenderSettings& set
     return train_tables(*data, scene.emitters(), parameters->training, stop, report);
 }
 
+Result<std::unique_ptr<Renderer>> create_with_tables(std::shared_ptr<const Scene> scene, const RenderSettings& settings,
+                                                     std::stop_token stop) {
+    const Result<TransportParameters> parameters = TransportParameters::read(settings);
+    if (!parameters.ok()) return parameters.status();
+    std::shared_ptr<const SubspaceTables> tables;
+    if (parameters->needs_tables) {
+        TrainingReport report;
+        auto made = make_tables(*scene, settings, stop, &report);
+        if (!made.ok()) return made.status();
+        tables = std::make_shared<const SubspaceTables>(*std::move(made));
+    }
+    return Renderer::create(std::move(scene), settings, std::move(tables));
+}
+
 }  // namespace lightloom

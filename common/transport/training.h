@@ -28,4 +28,8 @@ Result<TrainingData> trace_training(const Scene& scene, const RenderSettings& se
 Result<SubspaceTables> make_tables(const Scene& scene, const RenderSettings& settings, std::stop_token stop,
                                    TrainingReport* report);
 
+/// Renderer::create() for a process on its own: makes the tables first where the algorithm needs them.
+Result<std::unique_ptr<Renderer>> create_with_tables(std::shared_ptr<const Scene> scene, const RenderSettings& settings,
+                                                     std::stop_token stop);
+
 }  // namespace lightloom

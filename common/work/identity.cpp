@@ -3,6 +3,7 @@
 #include "common/film/partial_exr.h"
 #include "common/scene/scene.h"
 #include "common/transport/renderer.h"
+#include "common/transport/training.h"
 
 namespace lightloom {
 namespace {
@@ -83,9 +84,23 @@ Result<Digest> golden_unit_digest() {
     const std::shared_ptr<const Scene> scene = std::move(built).value();
     Sha256 hash;
     for (const AlgorithmInfo& algorithm : catalog()) {
-        const auto parameters = parse_parameters(algorithm, {});
+        RenderSettings settings{.algorithm = std::string(algorithm.name), .seed = 1, .max_depth = 6};
+        // Tables and caches large enough to run every line, small enough for a registration that nobody waits for.
+        for (const auto& [name, value] : {std::pair{"training-paths", "2000"}, std::pair{"cache", "500"},
+                                          std::pair{"light-subspaces", "40"}, std::pair{"eye-subspaces", "20"}})
+            if (has_parameter(algorithm, name)) settings.parameters[name] = value;
+        const auto parameters = parse_parameters(algorithm, settings.parameters);
         if (!parameters.ok()) return parameters.status();
-        const auto renderer = Renderer::create(scene, {.algorithm = std::string(algorithm.name), .seed = 1, .max_depth = 6});
+        std::shared_ptr<const SubspaceTables> tables;
+        if (algorithm.needs_tables) {
+            TrainingReport report;
+            auto made = make_tables(*scene, settings, {}, &report);
+            if (!made.ok()) return made.status();
+            const std::string bytes = serialize(*made);
+            hash.update(bytes.data(), bytes.size());
+            tables = std::make_shared<const SubspaceTables>(std::move(*made));
+        }
+        const auto renderer = Renderer::create(scene, settings, tables);
         if (!renderer.ok()) return renderer.status();
         const Rect tile{0, 0, kGoldenSize, kGoldenSize};
         const std::vector<WorkUnit> units =

@@ -8,6 +8,7 @@
 #include "common/transport/light.h"
 #include "common/transport/path.h"
 #include "common/transport/renderer.h"
+#include "common/transport/training.h"
 #include "common/transport/unit_loop.h"
 #include "tests/support/statistics.h"
 
@@ -44,7 +45,7 @@ inline ImageOfSeed catalog_image(std::shared_ptr<const Scene> scene, const std::
                                  std::map<std::string, std::string> parameters = {}) {
     return [=](uint64_t seed) {
         RenderSettings settings{algorithm, parameters, seed, max_depth};
-        Result<std::unique_ptr<Renderer>> renderer = Renderer::create(scene, settings);
+        Result<std::unique_ptr<Renderer>> renderer = create_with_tables(scene, settings, {});
         if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
         Result<Partial> partial = (*renderer)->render(whole_frame(*scene, samples_per_pixel), {});
         if (!partial.ok()) throw std::runtime_error(partial.status().message());

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "common/core/distributions.h"
+
 namespace lightloom::testing {
 
 /// Upper regularised incomplete gamma function Q(a, x): series below a + 1, continued fraction
@@ -71,39 +73,9 @@ inline ChiSquare chi_square_test(const std::vector<double>& observed,
     return r;
 }
 
-/// The level of each of `count` independent tests whose family-wise level is `level`.
-inline double sidak(double level, int count) { return -std::expm1(std::log1p(-level) / count); }
-
-/// Two-sided p-value of a standard normal deviate.
-inline double normal_p_value(double z) { return std::erfc(std::fabs(z) / std::sqrt(2.0)); }
-
-/// Regularised incomplete beta function I_x(a, b) by its continued fraction (modified Lentz).
-inline double incomplete_beta(double a, double b, double x) {
-    if (x <= 0) return 0;
-    if (x >= 1) return 1;
-    if (x > (a + 1) / (a + b + 2)) return 1 - incomplete_beta(b, a, 1 - x);
-    const double scale = std::exp(std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) +
-                                  a * std::log(x) + b * std::log1p(-x)) /
-                         a;
-    double c = 1, d = 1 / (1 - (a + b) * x / (a + 1)), h = d;
-    for (int m = 1; m < 10000; ++m) {
-        const double even = m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m));
-        d = 1 / (1 + even * d);
-        c = 1 + even / c;
-        h *= c * d;
-        const double odd = -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1));
-        d = 1 / (1 + odd * d);
-        c = 1 + odd / c;
-        h *= c * d;
-        if (std::fabs(c * d - 1) < 1e-15) break;
-    }
-    return scale * h;
-}
-
-/// Two-sided p-value of Student's t with `degrees` of freedom.
-inline double student_p_value(double t, double degrees) {
-    return incomplete_beta(0.5 * degrees, 0.5, degrees / (degrees + t * t));
-}
+using lightloom::normal_p_value;
+using lightloom::sidak;
+using lightloom::student_p_value;
 
 /// Mean of independent replications (renders with different seeds) and what is known of its error.
 struct Sample {

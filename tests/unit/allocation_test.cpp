@@ -34,7 +34,7 @@ namespace {
 uint64_t allocations_of(const std::shared_ptr<const Scene>& scene, const std::string& algorithm,
                         uint32_t samples_per_pixel) {
     RenderSettings settings{algorithm, {}, 1, 5};
-    Result<std::unique_ptr<Renderer>> renderer = Renderer::create(scene, settings);
+    Result<std::unique_ptr<Renderer>> renderer = create_with_tables(scene, settings, {});
     const UnitWork work = testing::whole_frame(*scene, samples_per_pixel);
     const uint64_t before = allocations;
     const Result<Partial> partial = (*renderer)->render(work, {});

@@ -25,7 +25,7 @@ const char* const kAlgorithms[] = {"path", "light", "bdpt"};
 Partial render(const std::shared_ptr<const Scene>& scene, const std::string& algorithm,
                const UnitWork& work, uint64_t seed = 5) {
     RenderSettings settings{algorithm, {}, seed, 5};
-    Result<std::unique_ptr<Renderer>> renderer = Renderer::create(scene, settings);
+    Result<std::unique_ptr<Renderer>> renderer = create_with_tables(scene, settings, {});
     if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
     Result<Partial> partial = (*renderer)->render(work, {});
     if (!partial.ok()) throw std::runtime_error(partial.status().message());

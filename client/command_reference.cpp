@@ -1,0 +1,191 @@
+// lightloom reference: an image to measure others by, with its variance, who made it, and whether another algorithm agrees.
+
+#include <tbb/global_control.h>
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+#include "client/commands.h"
+#include "client/cross_check.h"
+#include "client/job_options.h"
+#include "client/progress.h"
+#include "client/run_job.h"
+#include "common/film/atomic_file.h"
+#include "common/work/identity.h"
+#include "server/results.h"
+
+namespace lightloom::client {
+namespace {
+
+constexpr const char* kFooter = R"(Examples:
+  lightloom reference room.pbrt -o room-ref.exr --algorithm bdpt --time 3600
+  lightloom reference room.pbrt -o room-ref.exr --algorithm bdpt --time 3600 --cross-check path --cross-time 1200
+
+The EXR is the one that `lightloom render` makes with as many samples: colour, variance of each pixel, and in its header
+algorithm, parameters, seed, samples and scene digest. Beside it REF.json says how it was made, with the standard error of its
+mean. --cross-check renders with another algorithm and compares mean luminance: whole image, 3 x 3 regions, and every path
+length (by renderings whose --max-depth differs by one). The intervals are 95 % for all rows together (Sidak); a row differs
+when even the 99.9 % interval excludes 1. Then the exit code is 1: one of the algorithms is wrong or misses paths.)";
+
+struct ReferenceOptions {
+    JobOptions job;
+    std::string cross_check;
+    double cross_time = 60;
+    uint32_t threads = 0;
+};
+
+/// Renders until the options' bound, collecting the means of groups.
+Result<RegionMeans> render(ProgressiveRender& render, const JobSpec& spec, bool quiet) {
+    RegionMeans means(kCheckColumns, kCheckRows);
+    const uint64_t limit = spec.samples_per_pixel > 0 ? spec.samples_per_pixel : std::numeric_limits<uint64_t>::max();
+    double next_report = 10;
+    while (render.iterations() < limit && (spec.time_limit_seconds <= 0 || render.seconds() < spec.time_limit_seconds)) {
+        LL_RETURN_IF_ERROR(render.advance(limit, interrupt_token()));
+        const auto image = render.last_group_image();
+        if (!image.ok()) return image.status();
+        means.add(*image, render.last_group_iterations());
+        if (quiet || render.seconds() < next_report) continue;
+        const Estimate mean = means.estimates().front();
+        std::fprintf(stderr, "%llu spp in %s, mean luminance %.6g +- %.2g %%\n",
+                     static_cast<unsigned long long>(render.iterations()), duration_text(render.seconds()).c_str(), mean.mean,
+                     100 * mean.standard_error() / mean.mean);
+        next_report *= 2;
+    }
+    return means;
+}
+
+nlohmann::ordered_json describe(const ReferenceOptions& options, const JobSpec& spec, const ProgressiveRender& render,
+                                const Estimate& mean, const std::string& exr) {
+    const UnitCounters& counters = render.counters();
+    return {{"format", "lightloom-reference 1"},
+            {"sha256", sha256(exr).hex()},
+            {"scene", options.job.scene},
+            {"scene_digest", spec.scene_root.hex()},
+            {"algorithm", spec.algorithm},
+            {"parameters", spec.parameters},
+            {"seed", spec.seed},
+            {"max_depth", spec.max_depth},
+            {"width", spec.frame.width},
+            {"height", spec.frame.height},
+            {"samples_per_pixel", render.iterations()},
+            {"groups", render.groups()},
+            {"seconds", render.seconds()},
+            {"preparation_seconds", render.preparation_seconds()},
+            {"threads", options.threads},
+            {"rays", counters.rays},
+            {"dropped_samples", render.dropped()},
+            {"mean_y", mean.mean},
+            {"mean_y_se", mean.standard_error()},
+            {"build", kBuildId}};
+}
+
+int reference(ReferenceOptions& options) {
+    (void)interrupt_token();
+    if (Status s = check_outputs(options.job); !s.ok()) return report_error(s);
+    AlgorithmChoice checker_choice;
+    if (!options.cross_check.empty()) {
+        auto parsed = parse_algorithm(options.cross_check);
+        if (!parsed.ok()) return report_error(parsed.status());
+        checker_choice = std::move(parsed).value();
+        if (checker_choice.name == options.job.algorithm) {
+            return report_error(invalid_argument("--cross-check " + checker_choice.name +
+                                                 " is what makes the reference; name another algorithm"));
+        }
+    }
+    auto local = load_scene(options.job);
+    if (!local.ok()) return report_error(local.status());
+    auto spec = make_spec(options.job, *local);
+    if (!spec.ok()) return report_error(spec.status());
+    if (spec->max_depth < 0) spec->max_depth = local->imported.description.max_depth;
+    const auto algorithm = find_algorithm(spec->algorithm);
+    spec->parameters = complete_parameters(**algorithm, *parse_parameters(**algorithm, spec->parameters));
+    const tbb::global_control parallelism(tbb::global_control::max_allowed_parallelism, options.threads);
+    auto built = Scene::build(std::move(local->imported.description), {.width = spec->width, .height = spec->height});
+    if (!built.ok()) return report_error(built.status());
+    const std::shared_ptr<const Scene> scene = std::move(built).value();
+    spec->frame = scene->frame();
+    if (spec->frame.crop.width() < kCheckColumns || spec->frame.crop.height() < kCheckRows)
+        return report_error(invalid_argument("a reference has at least 3 x 3 pixels"));
+
+    const RenderSettings settings{spec->algorithm, spec->parameters, spec->seed, spec->max_depth};
+    const auto preparation = prepare(*scene, settings, interrupt_token());
+    if (!preparation.ok()) return report_error(preparation.status());
+    if (!preparation->note.empty())
+        std::fprintf(stderr, "lightloom reference: warning: %s\n", preparation->note.c_str());
+    auto progressive = ProgressiveRender::start(scene, settings, *preparation);
+    if (!progressive.ok()) return report_error(progressive.status());
+    const auto means = render(*progressive, *spec, options.job.quiet);
+    if (!means.ok()) return report_error(means.status());
+    const std::vector<Estimate> made = means->estimates();
+    const auto exr = encode_image(
+        *spec, {progressive->image(), progressive->variance(), progressive->iterations(), progressive->groups()}, {});
+    if (!exr.ok()) return report_error(exr.status());
+    const std::filesystem::path output = output_path(options.job);
+    std::filesystem::path json_path = output;
+    json_path.replace_extension(".json");
+    nlohmann::ordered_json json = describe(options, *spec, *progressive, made.front(), *exr);
+    // Both files before the cross-check: what took hours is safe whatever comes.
+    Status status = write_file_atomically(output.string(), *exr);
+    if (status.ok()) status = write_file_atomically(json_path.string(), json.dump(1) + "\n");
+    if (!status.ok()) return report_error(status);
+    if (!options.job.quiet) {
+        std::printf("%s  %s  %llu spp in %s  mean luminance %.6g +- %.2g\n", output.string().c_str(), spec->algorithm.c_str(),
+                    static_cast<unsigned long long>(progressive->iterations()),
+                    duration_text(progressive->seconds()).c_str(), made.front().mean, made.front().standard_error());
+        std::fflush(stdout);
+    }
+    if (progressive->dropped() > 0) {
+        std::fprintf(stderr, "lightloom reference: warning: %llu non-finite sample(s) were dropped\n",
+                     static_cast<unsigned long long>(progressive->dropped()));
+    }
+    if (checker_choice.name.empty()) return kSuccess;
+    if (progressive->groups() < kLeastGroups) {
+        return report_error(failed_precondition(
+            output.string() + " consists of " + std::to_string(progressive->groups()) + " groups of iterations; a cross-check needs " +
+            std::to_string(kLeastGroups) + " to know its error: render longer"));
+    }
+
+    const RenderSettings checker{checker_choice.name, checker_choice.parameters, spec->seed + 1, spec->max_depth};
+    const auto check = cross_check(scene, settings, made, checker, options.cross_time, interrupt_token());
+    if (!check.ok()) return report_error(check.status());
+    json["cross_check"] = {{"algorithm", checker.algorithm}, {"parameters", checker.parameters}, {"seed", checker.seed}};
+    json["cross_check"].update(check->json());
+    if (Status s = write_file_atomically(json_path.string(), json.dump(1) + "\n"); !s.ok()) return report_error(s);
+    std::printf("cross-check by %s, %llu spp\n%s", checker_choice.label.c_str(),
+                static_cast<unsigned long long>(check->iterations), check->table().c_str());
+    if (check->verdict() != Verdict::kDiffer) return kSuccess;
+    std::fflush(stdout);
+    std::fprintf(stderr, "lightloom reference: %s and %s differ; one of them is biased or misses paths\n",
+                 spec->algorithm.c_str(), checker_choice.name.c_str());
+    return kFailure;
+}
+
+}  // namespace
+
+void add_reference_command(CLI::App& app, int* exit_code) {
+    auto options = std::make_shared<ReferenceOptions>();
+    CLI::App* command = app.add_subcommand("reference", "Render an image that others are measured by, and check it");
+    command->footer(kFooter);
+    add_render_settings(*command, options->job);
+    command->add_option("-o,--output", options->job.output, "EXR to write; its description goes beside it as .json")->required();
+    auto* spp = command->add_option("--spp", options->job.samples_per_pixel, "Samples per pixel")
+                    ->check(CLI::Range(1u, 1u << 24));
+    auto* time = command->add_option("--time", options->job.time_seconds, "Render for this many seconds")
+                     ->check(CLI::Range(0.001, 30 * 86400.0))->excludes(spp);
+    command->add_option("--cross-check", options->cross_check, "Another algorithm, NAME[:KEY=VALUE]..., that must agree");
+    command->add_option("--cross-time", options->cross_time,
+                        "Seconds for its image, and as many again for the path lengths of both")
+        ->capture_default_str()->check(CLI::Range(0.001, 30 * 86400.0));
+    command->add_option("--threads", options->threads, "Threads (default: all processors)")->check(CLI::Range(1, 1024));
+    command->add_flag("-q,--quiet", options->job.quiet, "No progress; errors and the cross-check only");
+    command->callback([options, spp, time, exit_code] {
+        if (spp->count() + time->count() == 0) throw CLI::RequiredError("--time or --spp");
+        if (options->threads == 0) options->threads = std::max(1u, std::thread::hardware_concurrency());
+        *exit_code = reference(*options);
+    });
+}
+
+}  // namespace lightloom::client

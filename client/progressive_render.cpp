@@ -1,0 +1,130 @@
+#include "client/progressive_render.h"
+
+#include <ctime>
+
+#include <algorithm>
+#include <chrono>
+
+#include "common/transport/catalog.h"
+#include "common/transport/training.h"
+
+namespace lightloom::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+double process_seconds() {
+    timespec now{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
+}
+
+void add(UnitCounters& sum, const UnitCounters& unit) {
+    sum.camera_samples += unit.camera_samples;
+    sum.light_paths += unit.light_paths;
+    sum.rays += unit.rays;
+    sum.vertices += unit.vertices;
+    sum.connections += unit.connections;
+}
+
+}  // namespace
+
+Result<AlgorithmChoice> parse_algorithm(const std::string& text) {
+    AlgorithmChoice choice{.label = text};
+    size_t begin = std::min(text.find(':'), text.size());
+    choice.name = text.substr(0, begin);
+    while (begin < text.size()) {
+        const size_t end = std::min(text.find(':', begin + 1), text.size());
+        const std::string setting = text.substr(begin + 1, end - begin - 1);
+        const size_t equals = setting.find('=');
+        if (equals == std::string::npos || equals == 0)
+            return invalid_argument("algorithm \"" + text + "\": write NAME:KEY=VALUE:KEY=VALUE, not \"" + setting + "\"");
+        if (!choice.parameters.emplace(setting.substr(0, equals), setting.substr(equals + 1)).second)
+            return invalid_argument("algorithm \"" + text + "\" sets " + setting.substr(0, equals) + " twice");
+        begin = end;
+    }
+    const auto info = find_algorithm(choice.name);
+    if (!info.ok()) return invalid_argument(info.status().message());
+    const auto parameters = parse_parameters(**info, choice.parameters);
+    if (!parameters.ok()) return parameters.status();
+    choice.parameters = complete_parameters(**info, *parameters);
+    return choice;
+}
+
+Result<Preparation> prepare(const Scene& scene, const RenderSettings& settings, std::stop_token stop) {
+    const auto info = find_algorithm(settings.algorithm);
+    if (!info.ok()) return invalid_argument(info.status().message());
+    if (!(*info)->needs_tables) return Preparation{};
+    const auto begin = Clock::now();
+    TrainingReport report;
+    auto tables = make_tables(scene, settings, std::move(stop), &report);
+    if (!tables.ok()) return tables.status();
+    return Preparation{std::make_shared<const SubspaceTables>(std::move(tables).value()), seconds_since(begin), report.note};
+}
+
+Result<ProgressiveRender> ProgressiveRender::start(std::shared_ptr<const Scene> scene, const RenderSettings& settings,
+                                                   const Preparation& preparation) {
+    const auto info = find_algorithm(settings.algorithm);
+    if (!info.ok()) return invalid_argument(info.status().message());
+    const auto parameters = parse_parameters(**info, settings.parameters);
+    if (!parameters.ok()) return parameters.status();
+    const FrameLayout frame = scene->frame();
+    const float exposure_scale = scene->description().film.exposure_scale;
+    const auto begin = Clock::now();
+    auto renderer = Renderer::create(std::move(scene), settings, preparation.tables);
+    if (!renderer.ok()) return renderer.status();
+    return ProgressiveRender(std::move(renderer).value(), frame, Plan(frame, light_paths_per_pixel(**info, *parameters)),
+                             exposure_scale, preparation.seconds + seconds_since(begin));
+}
+
+ProgressiveRender::ProgressiveRender(std::unique_ptr<const Renderer> renderer, const FrameLayout& frame, const Plan& plan,
+                                     float exposure_scale, double preparation_seconds)
+    : renderer_(std::move(renderer)),
+      frame_(frame),
+      plan_(plan),
+      exposure_scale_(exposure_scale),
+      preparation_seconds_(preparation_seconds),
+      total_(frame),
+      last_(frame) {}
+
+Status ProgressiveRender::advance(uint64_t iteration_limit, std::stop_token stop) {
+    if (cut_short_ || iterations() >= iteration_limit)
+        return failed_precondition("the rendering has reached its " + std::to_string(iterations()) + " iterations");
+    Group group = plan_.group(groups());
+    const uint64_t left = iteration_limit - group.first_iteration;
+    const bool cut = group.iteration_count > left;
+    if (cut) group.iteration_count = uint32_t(left);
+
+    GroupSum sum(frame_);
+    UnitCounters counters = counters_;
+    double seconds = 0, cpu_seconds = 0;
+    for (const WorkUnit& unit : plan_.units(group)) {
+        const auto begin = Clock::now();
+        const double cpu_begin = process_seconds();
+        const auto partial = renderer_->render(unit_work(unit), stop);
+        cpu_seconds += process_seconds() - cpu_begin;
+        seconds += seconds_since(begin);
+        if (!partial.ok()) return partial.status();
+        LL_RETURN_IF_ERROR(sum.add(*partial));
+        add(counters, partial->counters);
+    }
+    LL_RETURN_IF_ERROR(total_.fold(sum, group.iteration_count));
+    last_ = std::move(sum);
+    last_iterations_ = group.iteration_count;
+    cut_short_ = cut;
+    counters_ = counters;
+    seconds_ += seconds;
+    cpu_seconds_ += cpu_seconds;
+    return {};
+}
+
+Result<RgbImage> ProgressiveRender::last_group_image() const {
+    if (last_iterations_ == 0) return failed_precondition("no group has been rendered yet");
+    Accumulation alone(frame_);
+    LL_RETURN_IF_ERROR(alone.fold(last_, last_iterations_));
+    return alone.develop(exposure_scale_);
+}
+
+}  // namespace lightloom::client

@@ -1,0 +1,240 @@
+// What a benchmark concludes from its measurements, and how its file survives a kill.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "client/bench_log.h"
+#include "client/bench_reference.h"
+#include "common/film/atomic_file.h"
+
+namespace lightloom::client {
+namespace {
+
+std::vector<CurvePoint> square_root_law(double error_at_one, double seconds_per_iteration) {
+    std::vector<CurvePoint> curve;
+    for (const double n : {1., 2., 4., 10., 30., 100.})
+        curve.push_back({n, n * seconds_per_iteration, error_at_one / std::sqrt(n)});
+    return curve;
+}
+
+TEST(ErrorCurve, InterpolationIsExactOnAPowerLaw) {
+    const auto crossing = find_crossing(square_root_law(60, 0.5), 12);  // (60 / 12)^2 = 25 iterations
+    ASSERT_TRUE(crossing);
+    EXPECT_EQ(crossing->kind, Crossing::Kind::kInterpolated);
+    EXPECT_NEAR(crossing->iterations, 25, 1e-9);
+    EXPECT_NEAR(crossing->seconds, 12.5, 1e-9);
+}
+
+TEST(ErrorCurve, APointOnTheThresholdIsTheCrossing) {
+    const std::vector<CurvePoint> curve{{1, 2, 40}, {2, 4, 12}, {3, 6, 10}};
+    EXPECT_DOUBLE_EQ(find_crossing(curve, 12)->iterations, 2);
+}
+
+TEST(ErrorCurve, TheCrossingIsTheOneAfterWhichTheErrorStaysBelow) {
+    const std::vector<CurvePoint> curve{{1, 1, 20}, {10, 10, 11}, {12, 12, 14}, {100, 100, 5}};
+    const double n = find_crossing(curve, 12)->iterations;
+    EXPECT_GT(n, 12);
+    EXPECT_LT(n, 100);
+}
+
+TEST(ErrorCurve, AnErrorThatRisesFirstIsNeitherReachedNorExtrapolatedAsIfItFell) {
+    // Nearly black, hence nearly right, until the first bright paths are found.
+    std::vector<CurvePoint> curve{{1, 1, 11}, {2, 2, 13}, {4, 4, 15}, {8, 8, 19}};
+    auto crossing = find_crossing(curve, 12);
+    EXPECT_EQ(crossing->kind, Crossing::Kind::kExtrapolated);
+    EXPECT_TRUE(crossing->lower_bound);
+    EXPECT_GT(*final_slope(curve), 0);
+    for (const double n : {100., 150., 225., 337.}) curve.push_back({n, n, 300 / std::sqrt(n)});
+    crossing = find_crossing(curve, 12);
+    EXPECT_EQ(crossing->kind, Crossing::Kind::kExtrapolated);
+    EXPECT_FALSE(crossing->lower_bound);
+    EXPECT_NEAR(*final_slope(curve), -0.5, 1e-9);
+    EXPECT_FALSE(final_slope({curve.data(), 2}));
+}
+
+TEST(ErrorCurve, AnEasySceneIsReachedAtMostAtItsFirstPoint) {
+    const auto crossing = find_crossing(square_root_law(5, 2), 12);
+    ASSERT_TRUE(crossing);
+    EXPECT_EQ(crossing->kind, Crossing::Kind::kAtMost);
+    EXPECT_EQ(crossing->iterations, 1);
+    EXPECT_EQ(crossing->seconds, 2);
+}
+
+TEST(ErrorCurve, ExtrapolationFollowsTheSquareRootLaw) {
+    const auto crossing = find_crossing(square_root_law(240, 0.5), 12);  // (240 / 12)^2 = 400
+    ASSERT_TRUE(crossing);
+    EXPECT_EQ(crossing->kind, Crossing::Kind::kExtrapolated);
+    EXPECT_NEAR(crossing->iterations, 400, 1e-9);
+    EXPECT_NEAR(crossing->seconds, 200, 1e-9);
+}
+
+TEST(ErrorCurve, NoPointsAndNoErrorAreHandled) {
+    EXPECT_FALSE(find_crossing({}, 12));
+    const std::vector<CurvePoint> exact{{1, 1, 20}, {2, 2, 0}};
+    EXPECT_EQ(find_crossing(exact, 12)->iterations, 2);
+}
+
+TEST(ErrorCurve, CheckpointsGrowGeometrically) {
+    std::vector<double> n{1};
+    while (n.back() < 1000) n.push_back(next_checkpoint(n.back()));
+    EXPECT_EQ((std::vector<double>(n.begin(), n.begin() + 8)), (std::vector<double>{1, 2, 3, 4, 5, 7, 9, 12}));
+    for (size_t i = 8; i < n.size(); ++i) EXPECT_NEAR(n[i] / n[i - 1], 1.25, 0.1);
+}
+
+TEST(AlgorithmChoice, ParsesSettingsAndNamesMistakes) {
+    const auto choice = parse_algorithm("bdpt:rr-start=6:heuristic=1");
+    ASSERT_TRUE(choice.ok()) << choice.status().message();
+    EXPECT_EQ(choice->name, "bdpt");
+    EXPECT_EQ(choice->parameters, (std::map<std::string, std::string>{{"heuristic", "1"}, {"rr-min", "0.05"}, {"rr-start", "6"}}));
+    EXPECT_EQ(choice->label, "bdpt:rr-start=6:heuristic=1");
+    EXPECT_TRUE(parse_algorithm("path").ok());
+    for (const char* wrong : {"", "no-such", "bdpt:", "bdpt:=1", "bdpt:heuristic", "bdpt:heuristic=9", "bdpt:no-such=1",
+                              "bdpt:heuristic=1:heuristic=2"}) {
+        const auto refused = parse_algorithm(wrong);
+        ASSERT_FALSE(refused.ok()) << wrong;
+        EXPECT_EQ(refused.status().code(), StatusCode::kInvalidArgument) << wrong;
+        EXPECT_FALSE(refused.status().message().empty());
+    }
+}
+
+BenchRun some_run() {
+    BenchRun run;
+    run.scene_digest = "s", run.reference_digest = "r", run.algorithm = {"bdpt", {{"heuristic", "1"}}, ""}, run.build = "b";
+    run.width = 160, run.height = 90, run.max_depth = 10, run.time_limit = 60;
+    return run;
+}
+
+TEST(BenchRun, EveryFieldEntersTheKey) {
+    std::vector<BenchRun> runs(15, some_run());
+    runs[1].scene_digest = "t";
+    runs[2].reference_digest = "t";
+    runs[3].algorithm.name = "path";
+    runs[4].algorithm.parameters["heuristic"] = "2";
+    runs[5].width = 161;
+    runs[6].height = 91;
+    runs[7].max_depth = 11;
+    runs[8].seed = 1;
+    runs[9].threads = 2;
+    runs[10].time_limit = 61;
+    runs[11].iteration_limit = 5;
+    runs[12].threshold = 10;
+    runs[13].stop_after = 0;
+    runs[14].build = "c";
+    std::set<std::string> keys;
+    for (const BenchRun& run : runs) keys.insert(run.key());
+    EXPECT_EQ(keys.size(), runs.size());
+    EXPECT_EQ(some_run().key(), runs[0].key());
+}
+
+TEST(BenchHistory, ResumeKeepsFinishedRunsAndForgetsBegunOnes) {
+    const std::string finished = "{\"run\":\"a\",\"iterations\":1}\n{\"run\":\"a\",\"iterations\":2,\"done\":true}\n";
+    const std::string begun = "{\"run\":\"b\",\"iterations\":1}\n";
+    const std::string foreign = "{\"run\":\"z\",\"iterations\":1}\n";
+    const auto history = parse_history(begun + finished + foreign, "f", {"a", "b", "c"});
+    ASSERT_TRUE(history.ok()) << history.status().message();
+    EXPECT_EQ(history->kept, finished + foreign);
+    ASSERT_EQ(history->done.size(), 1u);
+    EXPECT_EQ(history->done.at("a")["iterations"], 2);
+}
+
+TEST(BenchHistory, ATornLastLineIsIgnoredWhereverItIsCut) {
+    const std::string whole = "{\"run\":\"a\",\"iterations\":2,\"done\":true}\n";
+    const std::string last = "{\"run\":\"b\",\"iterations\":7,\"done\":true}\n";
+    for (size_t cut = 0; cut + 2 < last.size(); ++cut) {
+        const auto history = parse_history(whole + last.substr(0, cut), "f", {"a", "b"});
+        ASSERT_TRUE(history.ok()) << cut;
+        EXPECT_EQ(history->kept, whole) << cut;
+        EXPECT_EQ(history->done.size(), 1u) << cut;
+    }
+    // Only the newline is missing: nothing of the line is.
+    EXPECT_EQ(parse_history(whole + last.substr(0, last.size() - 1), "f", {"a", "b"})->kept, whole + last);
+}
+
+TEST(BenchHistory, DamageElsewhereIsNamed) {
+    for (const std::string damaged : {"{\"run\":\"a\",", "[]", "17", "{\"done\":true}", "{\"run\":3}"}) {
+        const auto history = parse_history("{\"run\":\"a\"}\n" + damaged + "\n{\"run\":\"a\"}\n", "runs.jsonl", {"a"});
+        ASSERT_FALSE(history.ok()) << damaged;
+        EXPECT_NE(history.status().message().find("runs.jsonl:2"), std::string::npos) << history.status().message();
+    }
+}
+
+TEST(BenchWriter, LinesAreReadBack) {
+    const std::string path = (std::filesystem::temp_directory_path() / ("bench-writer-" + std::to_string(::getpid()))).string();
+    {
+        auto writer = BenchWriter::open(path, "{\"run\":\"a\",\"done\":true}\n");
+        ASSERT_TRUE(writer.ok()) << writer.status().message();
+        ASSERT_TRUE(writer->append({{"run", "b"}, {"done", true}}).ok());
+    }
+    EXPECT_EQ(parse_history(*read_file(path), path, {})->done.size(), 2u);
+    std::filesystem::remove(path);
+    EXPECT_FALSE(BenchWriter::open("/no/such/directory/file", "").ok());
+}
+
+Json finished(const std::string& label, double preparation, const std::vector<CurvePoint>& curve) {
+    return done_line({{"label", label},
+                      {"iterations", curve.back().iterations},
+                      {"seconds", curve.back().seconds},
+                      {"preparation_seconds", preparation}},
+                     curve, 12);
+}
+
+TEST(BenchTable, ShowsMediansPreparationAndRatios) {
+    std::vector<Json> done;
+    for (const double error : {48., 60., 120.}) done.push_back(finished("slow", 0, square_root_law(error, 1)));
+    for (const double error : {24., 24., 36.}) done.push_back(finished("fast:m=2", 1, square_root_law(error, 1)));
+    const std::string table = bench_table({"slow", "fast:m=2"}, done, 12);
+    // 25 iterations against 4; 25 s against 4 + 1 s.
+    EXPECT_NE(table.find("slow          3      0         25.0      25.00       0.00      25.00        1.00        1.00"),
+              std::string::npos) << table;
+    EXPECT_NE(table.find("fast:m=2      3      0          4.0       4.00       1.00       5.00        6.25        5.00"),
+              std::string::npos) << table;
+    EXPECT_EQ(table.find('~'), std::string::npos) << table;
+}
+
+TEST(BenchTable, MarksWhatIsExtrapolated) {
+    const std::vector<Json> done{finished("path", 0, square_root_law(60, 1)), finished("path", 0, square_root_law(240, 1)),
+                                 finished("path", 0, square_root_law(360, 1))};
+    EXPECT_TRUE(done[1]["capped"].get<bool>());
+    EXPECT_FALSE(done[1].contains("reached"));
+    EXPECT_DOUBLE_EQ(done[1]["extrapolated"]["iterations"].get<double>(), 400);
+    const std::string table = bench_table({"path", "none"}, done, 12);
+    EXPECT_NE(table.find("~400.0"), std::string::npos) << table;
+    EXPECT_NE(table.find("> 100 iterations, > 100.00 s"), std::string::npos) << table;
+    EXPECT_NE(table.find("~ extrapolated"), std::string::npos) << table;
+}
+
+ExrImage grey(float value, float variance) {
+    const FrameLayout frame{8, 8, {0, 0, 8, 8}};
+    const std::vector<float> pixels(8 * 8 * 3, value);
+    return {frame, {8, 8, pixels}, {{"variance", "RGB", std::vector<float>(pixels.size(), variance)}},
+            {{exr_attribute::kAlgorithm, "bdpt"}, {exr_attribute::kMaxDepth, "5"}, {exr_attribute::kScene, "digest"}}};
+}
+
+TEST(BenchReference, IsRefusedWhereItCannotJudge) {
+    const BenchSubject subject{{8, 8, {0, 0, 8, 8}}, 5, "digest", {{"path", {}, "path"}}, 12};
+    const auto good = check_reference("ref.exr", grey(1, 1e-4f), subject);
+    ASSERT_TRUE(good.ok()) << good.status().message();
+    EXPECT_TRUE(good->empty());
+    BenchSubject other = subject;
+    other.max_depth = 6;
+    EXPECT_FALSE(check_reference("ref.exr", grey(1, 0), other).ok());
+    other = subject;
+    other.frame.width = 9;
+    EXPECT_FALSE(check_reference("ref.exr", grey(1, 0), other).ok());
+    EXPECT_FALSE(check_reference("ref.exr", grey(NAN, 0), subject).ok());
+    const auto dark = check_reference("ref.exr", grey(0.001f, 0), subject);
+    ASSERT_FALSE(dark.ok()) << "0.001 / 0.011 is 9 %, and so is what a black image shows";
+    EXPECT_NE(dark.status().message().find("black"), std::string::npos);
+}
+
+TEST(BenchReference, IsWarnedOfWhereItMayMislead) {
+    const BenchSubject subject{{8, 8, {0, 0, 8, 8}}, 5, "another", {{"bdpt", {}, "bdpt"}}, 12};
+    // Standard deviation 0.1 of 1: MAPE 100 % * sqrt(2 / pi) * 0.1 / 1.01 = 7.9 %.
+    EXPECT_NEAR(noise_mape(grey(1, 0.01f)), 7.9, 0.01);
+    EXPECT_EQ(check_reference("ref.exr", grey(1, 0.01f), subject)->size(), 3u);
+}
+
+}  // namespace
+}  // namespace lightloom::client

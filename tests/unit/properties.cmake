@@ -1,0 +1,1 @@
+lightloom_test(subspace_weights_test LINK lt_transport)
