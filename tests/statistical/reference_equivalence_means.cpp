@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "common/import/import.h"
+#include "common/transport/training.h"
 #include "tests/statistical/reference_equivalence.h"
 
 namespace lightloom::equivalence {
