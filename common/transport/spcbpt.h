@@ -159,7 +159,11 @@ struct SpcbptAlgorithm {
         const PreparedTables& prepared = *selection.prepared;
         const uint32_t light_count = prepared.tables.light_count;
         const AliasEntry* column = &prepared.draws[size_t(eye) * light_count];
-        const auto first = [&](int n) { return (double(u.x) + n) / connections; };
+        // u has 24 bits, a subspace of a large cache more candidates than that can tell apart: their rare ones would be drawn too
+        // often. The bits below come from the stream.
+        const Vec2 below = rng.uniform2();
+        const double ux = double(u.x) + double(below.x) * 0x1p-24, uy = double(u.y) + double(below.y) * 0x1p-24;
+        const auto first = [&](int n) { return (ux + n) / connections; };
         for (int n = 0; n < connections; ++n) __builtin_prefetch(&column[alias_part(light_count, first(n))]);
         struct Draw {
             const Candidate* candidates;
@@ -172,7 +176,7 @@ struct SpcbptAlgorithm {
             const uint32_t part = alias_part(light_count, first(n));
             const uint32_t i = draw_alias(column[part], light_count, part, first(n));
             const Subspace& subspace = state.subspaces[i];
-            const double second = n == 0 ? double(u.y) : rng.uniform_double();
+            const double second = n == 0 ? uy : rng.uniform_double();
             if (subspace.count == 0) continue;  // nothing there: its share of the estimate is zero
             Draw& d = draws[found++];
             d = {&state.candidates[subspace.begin], subspace.count, alias_part(subspace.count, second), second,

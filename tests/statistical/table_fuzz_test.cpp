@@ -295,10 +295,10 @@ TEST(TableFuzz, CountedEnergyIsTheExpectedOne) {
             UnitPreparation preparation;
             const auto state =
                 algorithm.prepare({*scene, uint64_t(31000 + seed), kMaxDepth + 1, {}, work, {}}, &preparation);
-            ASSERT_EQ(state.scale.size(), n);
+            ASSERT_EQ(state.subspaces.size(), n);
             double total = 0;
             for (uint32_t i = 0; i < n; ++i) {
-                counted[i].push_back(double(state.scale[i]) * options.connections);
+                counted[i].push_back(double(state.subspaces[i].scale) * options.connections);
                 total += counted[i].back();
             }
             counted[n].push_back(total);
