@@ -143,6 +143,7 @@ class Coordinator {
     const CoordinatorOptions options_;
     AssetStore assets_;
     const TableCache table_cache_;
+    std::mutex repair_mutex_;  ///< Before mutex_.
     mutable std::mutex mutex_;
     mutable std::condition_variable work_changed_, job_changed_;
     std::vector<std::shared_ptr<JobRecord>> jobs_;            // oldest first

@@ -350,11 +350,13 @@ bool Coordinator::repair_tables(const std::string& job_id) {
     {
         const std::lock_guard lock(mutex_);
         job = find_job(job_id);
-        if (!job || job->state != JobState::kRunning || job->tables.asset.size_bytes == 0) return false;
+        if (!job || job->state != JobState::kRunning) return false;
         tables = job->tables;
     }
     const Digest& digest = tables.asset.digest;
-    if (assets_.read(digest).ok()) return false;  // the worker's own trouble
+    if (tables.asset.size_bytes == 0) return false;
+    const std::lock_guard only_one(repair_mutex_);
+    if (assets_.read(digest).ok()) return false;  // the worker's own trouble, or repaired meanwhile
     assets_.remove(digest);
     const auto entry = table_cache_.find(tables.cache_key);
     const bool same = entry && entry->info.asset.digest == digest;

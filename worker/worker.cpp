@@ -149,13 +149,18 @@ bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
     const bool training = reference.key.kind != UnitKind::kRender;
     const Status made = training ? trace_unit(lease, unit_stop, stop) : render_unit(lease, unit_stop, stop);
     const bool able = made.ok() || made.code() == StatusCode::kCancelled;
+    if (!able) spdlog::error("{}: {}", name_of(reference), made.message());
+    // A heartbeat that still named a unit which is given back would take it again, and nobody would render it until that lease ran out.
+    std::unique_lock beat(beat_mutex_, std::defer_lock);
+    if (!made.ok()) beat.lock();
+    {
+        const std::lock_guard lock(mutex_);
+        running_.erase(reference);
+    }
     if (!made.ok()) {
         const Status status = port_.release_unit(id(), reference, made);
         if (!status.ok()) spdlog::debug("release: {}", status.message());
-        if (!able) spdlog::error("{}: {}", name_of(reference), made.message());
     }
-    const std::lock_guard lock(mutex_);
-    running_.erase(reference);
     return able;
 }
 
@@ -229,6 +234,7 @@ void Worker::announce_rendering(const UnitReference& unit) {
 }
 
 void Worker::send_heartbeat() {
+    const std::lock_guard beat(beat_mutex_);
     std::vector<RunningUnit> running;
     std::string worker_id;
     {

@@ -71,6 +71,7 @@ class Worker {
     tbb::task_arena arena_;
     std::mutex render_mutex_;  ///< One unit renders at a time, on all threads.
     std::mutex sign_in_mutex_;
+    std::mutex beat_mutex_;    ///< Heartbeats and units given back reach the coordinator in order. Before mutex_.
     std::mutex mutex_;         ///< Guards what follows.
     std::condition_variable_any wake_;
     WorkerGrant grant_;

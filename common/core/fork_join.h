@@ -1,9 +1,8 @@
 #pragma once
-// A parallel loop whose fork and join a race detector can see. Distributions ship TBB without instrumentation, so that
-// ThreadSanitizer knows nothing of the hand-over from the caller to its tasks and back, and would report every body that
-// reads what the caller wrote. The fences below say what TBB guarantees, and no more than that: the bodies of one loop stay
-// unordered among themselves, so that a true race between two of them is still found. Without ThreadSanitizer this is
-// tbb::parallel_for.
+// A parallel loop whose fork and join a race detector can see. Distributions ship TBB without instrumentation, but its
+// templates are compiled with our code: ThreadSanitizer sees tasks written by one thread and run by another and nothing of the
+// atomics that hand them over. Under it, and only then, the loop runs on threads of its own, whose creation and end it knows;
+// the bodies of one loop are unordered among themselves in both, so that a race between two of them is found.
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -11,43 +10,32 @@
 #include <cstddef>
 
 #ifdef __SANITIZE_THREAD__
-#include <sanitizer/tsan_interface.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <atomic>
+#include <thread>
+#include <vector>
 #endif
 
 namespace lightloom {
 
-#ifdef __SANITIZE_THREAD__
-namespace detail {
-
-/// Lives inside TBB's tasks, which one thread writes and another reads: no access is recorded before the fence is passed.
-template <class Body>
-struct FencedBody {
-    const Body* body;
-    char* forked;
-    char* joined;
-
-    __attribute__((no_sanitize("thread"))) void operator()(const tbb::blocked_range<size_t>& part) const {
-        __tsan_acquire(forked);
-        (*body)(part.begin(), part.end());
-        __tsan_release(joined);
-    }
-};
-
-}  // namespace detail
-#endif
-
-/// body(begin, end) for disjoint parts of [0, count), in any order, on the threads of the caller's arena; returns when all
-/// are done.
+/// body(begin, end) for disjoint parts of [0, count), in any order, on as many threads as the caller's arena has; returns when
+/// all are done.
 template <class Body>
 void fork_join(size_t count, const Body& body) {
-    const tbb::blocked_range<size_t> all(0, count);
 #ifdef __SANITIZE_THREAD__
-    char forked = 0, joined = 0;
-    __tsan_release(&forked);
-    tbb::parallel_for(all, detail::FencedBody<Body>{&body, &forked, &joined});
-    __tsan_acquire(&joined);
+    std::atomic<size_t> next{0};
+    const auto run = [&] {
+        for (size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) body(i, i + 1);
+    };
+    std::vector<std::thread> threads;
+    for (size_t i = 1; i < std::min(count, size_t(tbb::this_task_arena::max_concurrency())); ++i) threads.emplace_back(run);
+    run();
+    for (std::thread& thread : threads) thread.join();
 #else
-    tbb::parallel_for(all, [&body](const tbb::blocked_range<size_t>& part) { body(part.begin(), part.end()); });
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, count),
+                      [&body](const tbb::blocked_range<size_t>& part) { body(part.begin(), part.end()); });
 #endif
 }
 

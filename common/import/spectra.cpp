@@ -165,6 +165,11 @@ std::optional<Rgb> named_illuminant_rgb(const std::string& name, bool* clipped) 
     return std::nullopt;
 }
 
+Rgb d65_rgb_at(int nanometres) {
+    const Rgb3 c = colour_under_d65([=](double nm) { return nm == nanometres ? 1.0 : 0.0; });
+    return {float(c.r), float(c.g), float(c.b)};
+}
+
 Rgb reflectance_rgb(const Spectrum& spectrum) {
     const Rgb3 c = colour_under_d65([&](double nm) { return evaluate(spectrum, nm); });
     return {float(unit(c.r)), float(unit(c.g)), float(unit(c.b))};

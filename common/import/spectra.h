@@ -48,6 +48,8 @@ Rgb blackbody_rgb(double kelvin, bool* clipped);
 std::optional<Rgb> named_illuminant_rgb(const std::string& name, bool* clipped);
 
 Rgb reflectance_rgb(const Spectrum& spectrum);
+/// What D65's light of one wavelength (380 to 780 nm, else zero) adds to linear RGB, per nanometre; over all of them (1, 1, 1).
+Rgb d65_rgb_at(int nanometres);
 
 struct ConductorRgb {
     Rgb eta, k;

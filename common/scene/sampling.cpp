@@ -4,25 +4,27 @@
 
 namespace lightloom {
 
-AliasTable::AliasTable(std::span<const double> weights) {
+AliasTable::AliasTable(std::span<const double> weights) : entries_(weights.size()) {
+    make_alias(weights, entries_.data());
+}
+
+void make_alias(std::span<const double> weights, AliasEntry* entries) {
     const size_t n = weights.size();
-    if (n == 0) return;
     double sum = 0;
     for (const double w : weights) sum += w;
     std::vector<double> scaled(n);
-    entries_.resize(n);
     std::vector<uint32_t> small, large;
     for (uint32_t i = 0; i < n; ++i) {
         const double p = sum > 0 ? weights[i] / sum : 1.0 / double(n);
         scaled[i] = p * double(n);
-        entries_[i] = {float(p), 1, i};
+        entries[i] = {float(p), 1, i};
         (scaled[i] < 1 ? small : large).push_back(i);
     }
     while (!small.empty() && !large.empty()) {
         const uint32_t s = small.back(), l = large.back();
         small.pop_back();
-        entries_[s].keep = float(scaled[s]);
-        entries_[s].alias = l;
+        entries[s].keep = float(scaled[s]);
+        entries[s].alias = l;
         scaled[l] -= 1 - scaled[s];
         if (scaled[l] < 1) {
             large.pop_back();
@@ -31,20 +33,18 @@ AliasTable::AliasTable(std::span<const double> weights) {
     }
     // Rounding can strand an index of weight zero here: it must never be drawn, so it borrows from another.
     for (const uint32_t i : small)
-        if (entries_[i].pmf == 0) {
+        if (entries[i].pmf == 0) {
             uint32_t j = 0;
-            while (entries_[j].pmf == 0) ++j;
-            entries_[i].keep = 0;
-            entries_[i].alias = j;
+            while (entries[j].pmf == 0) ++j;
+            entries[i].keep = 0;
+            entries[i].alias = j;
         }
 }
 
 uint32_t AliasTable::sample(double u, float* remapped) const {
-    const double scaled = u * double(entries_.size());
-    uint32_t i = uint32_t(scaled);
-    if (i >= entries_.size()) i = uint32_t(entries_.size() - 1);
-    const double f = scaled - double(i);
-    const Entry& entry = entries_[i];
+    const uint32_t i = alias_part(uint32_t(entries_.size()), u);
+    const double f = u * double(entries_.size()) - double(i);
+    const AliasEntry& entry = entries_[i];
     const double keep = entry.keep;
     const bool own = f < keep;
     if (remapped != nullptr) {

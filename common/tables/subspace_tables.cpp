@@ -60,7 +60,7 @@ Status SubspaceTables::validate(const EmitterSet& emitters) const {
     }
     if (window.size() != light_count) return data_loss("the window table has the wrong size");
     for (const uint16_t w : window) {
-        if (w < 1) return data_loss("the window table holds a zero");
+        if (w < 1 || w > kMaxWindow) return data_loss("the window table holds a number out of range");
     }
     if (!(vertices_per_path > 0 && std::isfinite(vertices_per_path))) return data_loss("no light vertices per path");
     return {};
@@ -101,6 +101,9 @@ Result<SubspaceTables> parse_tables(std::string_view bytes) {
         at = line_end + 1;
         if (size >= bytes.size() || at + size + 1 > bytes.size()) return data_loss("the tables are cut short");
         const std::string_view content = bytes.substr(at, size_t(size));
+        // Nothing but what serialize() writes: no byte of the file may be wrong unnoticed.
+        if (line != std::string(name) + ' ' + std::to_string(size) + ' ' + hex || bytes[at + size_t(size)] != '\n')
+            return data_loss("malformed table header");
         if (sha256(content).hex() != hex) return data_loss(std::string("table ") + name + " is damaged");
         if (!sections.emplace(name, content).second) return data_loss(std::string("table ") + name + " occurs twice");
         at += size_t(size) + 1;

@@ -26,12 +26,14 @@ struct SubspaceTables {
     /// Gamma, eye_count columns of light_count entries each, all positive, every column sums to one: gamma[j * light_count + i]
     /// is the probability that eye subspace j connects to light subspace i. The conservative share is mixed in.
     std::vector<float> gamma;
-    /// J: light-only windows that a subspace keeps, light_count entries >= 1. [algorithms.md 1.6]
+    /// J: light-only windows that a subspace keeps, light_count entries, 1 .. kMaxWindow. [algorithms.md 1.6]
     std::vector<uint16_t> window;
     /// Connectible light vertices (y_0 included) per light path; for uniform selection (lvcbpt).
     double vertices_per_path = 1;
 
     static constexpr uint32_t kMaxSubspaces = 16384;  ///< Labels are 16 bit and one value is reserved.
+
+    static constexpr uint16_t kMaxWindow = 32;        ///< A unit traces so many caches at most.
 
     const float* column(uint32_t eye) const { return &gamma[size_t(eye) * light_count]; }
     uint32_t light_label(const SubPathEnd& end) const { return light_tree.label(end); }

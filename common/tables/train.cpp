@@ -80,7 +80,8 @@ void train_classifiers(const TrainingData& d, const std::vector<double>& brightn
             if (s >= 2) light.push_back({end_between(v[s - 1], v[s - 2]), weight});
         }
     }
-    const uint32_t source_cells = std::max(1u, uint32_t(double(o.light_subspaces) * o.source_share));
+    const uint32_t source_cells =  // at least one label is left for longer prefixes
+        std::clamp(uint32_t(double(o.light_subspaces) * o.source_share), 1u, SubspaceTables::kMaxSubspaces - 1);
     tables->division = LightDivision::divide(emitters, source_cells);
     const uint32_t sources = tables->division.cell_count();
     ClassifierOptions light_options;
@@ -189,6 +190,12 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
     gamma.seed = options.seed;
     tables.gamma = train_gamma(dataset, gamma, &report->gamma);
     report->gamma_seconds = watch.lap();
+    const uint32_t light = std::min(tables.light_count, report->gamma.light_resolution);
+    const uint32_t eye = std::min(tables.eye_count, report->gamma.eye_resolution);
+    if (report->note.empty() && (2 * light <= options.light_subspaces || 2 * eye <= options.eye_subspaces))
+        report->note = "the training set tells " + std::to_string(light) + " light and " + std::to_string(eye) +
+                       " eye subspaces apart, of " + std::to_string(options.light_subspaces) + " and " +
+                       std::to_string(options.eye_subspaces) + " asked for";
     LL_RETURN_IF_ERROR(tables.validate(emitters));
     return tables;
 }

@@ -59,6 +59,11 @@ Status TrainingData::validate(size_t emitter_count) const {
                 return data_loss("training data with a malformed path");
         }
     }
+    // Classifiers sort by these: an order needs numbers.
+    const auto finite = [](const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
+    for (const TrainingVertex& v : vertices)
+        if (!finite(v.position) || !finite(v.normal) || !std::isfinite(v.density))
+            return data_loss("training data with a vertex that is nowhere");
     return {};
 }
 

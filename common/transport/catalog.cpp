@@ -17,7 +17,7 @@ constexpr std::string_view kSwitch[] = {"off", "on"};
 
 constexpr ParameterInfo kHeuristic{"heuristic", 0, 0, 2, true,
                                    "balance [Veach 1997, eq. 9.8], power with exponent 2, or maximum", kHeuristics};
-constexpr ParameterInfo kLightPaths{"light-paths", 1, 0.001, 64, false,
+constexpr ParameterInfo kLightPaths{"light-paths", 0.3, 0.001, 64, false,
                                     "N1 and M: light sub-paths per pixel and iteration; all of them splat and fill the cache"};
 constexpr ParameterInfo kCache{"cache", 20000, 1, 1e8, true,
                                "smallest number of light sub-paths in a unit's cache, however few camera samples it has"};
@@ -35,7 +35,7 @@ constexpr ParameterInfo kSubspaces[] = {
     {"light-subspaces", 1000, 1, 16384, true, "N_L: upper bound of the light subspaces [Su et al. 2022, section 6]"},
     {"eye-subspaces", 1000, 1, 16384, true, "N_E: upper bound of the eye subspaces [Su et al. 2022, section 6]"},
     {"source-share", 0.2, 0, 1, false, "share of N_L that divides the lights themselves [Su et al. 2022, section 5.1]"},
-    {"training-paths", 200000, 1, 1e8, true,
+    {"training-paths", 500000, 1, 1e8, true,
      "D and M': camera samples and light sub-paths of the training set [Su et al. 2022: 1e6 and 2e6]"},
     {"direction-weight", 0.05, 0, 10, false, "k_d: weight of directions in the distance of sub-paths"},
     {"mix", 0.1, 0.001, 1, false, "share of Gamma that is not learned: half uniform, half in proportion to Q"},

@@ -8,6 +8,7 @@
 
 #include <vector>
 
+#include "common/core/huge_pages.h"
 #include "common/path/camera_walk.h"
 #include "common/path/throughput.h"
 #include "common/transport/unit_loop.h"
@@ -15,9 +16,18 @@
 namespace lightloom {
 
 struct LightCache {
-    std::vector<PathVertex> vertices;      ///< Path after path.
-    std::vector<uint32_t> first_vertex;    ///< Of every path; one more at the end.
+    std::vector<PathVertex, HugePageAllocator<PathVertex>> vertices;  ///< Path after path.
+    std::vector<uint32_t> first_vertex;                               ///< Of every path; one more at the end.
     uint64_t path_count() const { return first_vertex.size() - 1; }
+};
+
+inline constexpr int kMaxConnections = 64;
+
+/// A draw from the cache, made before the connections of a vertex so that their memory is on its way.
+struct LightPick {
+    const PathVertex* y = nullptr;
+    int s = 0;
+    float scale = 0;  ///< Of the contribution: one over what was really drawn.
 };
 
 /// A prefix y_0 ... y_{s-1} that can be connected.

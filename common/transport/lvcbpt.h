@@ -29,8 +29,10 @@ struct UniformSelection {
     }
 };
 
+/// A selection with fewer techniques (connect_factor 0) makes an algorithm of those that remain.
+template <class Selection = UniformSelection>
 struct LvcbptAlgorithm {
-    UniformSelection selection;
+    Selection selection;
     Heuristic heuristic = Heuristic::kBalance;
     int connections = 3;         ///< N
     uint64_t minimum_paths = 1;  ///< Of a unit's cache.
@@ -78,13 +80,20 @@ struct LvcbptAlgorithm {
             if (v.emitter != kNone)
                 if (const Rgb c = emitter_hit(scene, z, t, &view); !c.is_black()) sum += c * weight(view, 0);
             if (t > context.max_edges || count == 0 || !v.bsdf.has_smooth_lobe()) return;
+            LightPick picks[kMaxConnections];
+            int pick_count = 0;
             for (int n = 0; n < connections; ++n) {
-                const LightCandidate& pick = state.candidates[sampler.rng().below(count)];
-                const int s = int(pick.s);
+                const LightCandidate& candidate = state.candidates[sampler.rng().below(count)];
+                const int s = int(candidate.s);
                 if (s + t - 1 > context.max_edges) continue;
-                const PathVertex* y = &state.cache.vertices[pick.first_vertex];
-                const Rgb c = connect_candidate<ViewDetail::kFull>(scene, y, s, z, t, &view, &context.counters);
-                if (!c.is_black()) sum += c * (scale * weight(view, s));
+                const PathVertex* y = &state.cache.vertices[candidate.first_vertex];
+                prefetch(&y[s - 1]);
+                picks[pick_count++] = {y, s, scale};
+            }
+            for (int n = 0; n < pick_count; ++n) {
+                const LightPick& p = picks[n];
+                const Rgb c = connect_candidate<ViewDetail::kFull>(scene, p.y, p.s, z, t, &view, &context.counters);
+                if (!c.is_black()) sum += c * (p.scale * weight(view, p.s));
             }
         };
         const auto escape = [&](int t, const WalkRay& ray) {

@@ -16,6 +16,8 @@
 
 #include <algorithm>
 #include <memory>
+#include <span>
+#include <utility>
 
 #include "common/path/mis.h"
 #include "common/scene/sampling.h"
@@ -27,15 +29,15 @@ namespace lightloom {
 /// The tables and what every unit derives from them once.
 struct PreparedTables {
     SubspaceTables tables;
-    std::vector<AliasTable> columns;  ///< Gamma(. | j) for drawing.
-    std::vector<float> inv_energy;    ///< 1 / Q
-    int windows = 1;                  ///< Largest J.
+    std::vector<AliasEntry, HugePageAllocator<AliasEntry>> draws;  ///< Gamma(. | j), column by column like gamma.
+    std::vector<float> inv_energy;                                 ///< 1 / Q
+    int windows = 1;                                               ///< Largest J.
 
-    explicit PreparedTables(SubspaceTables t) : tables(std::move(t)) {
+    explicit PreparedTables(SubspaceTables t) : tables(std::move(t)), draws(tables.gamma.size()) {
         std::vector<double> weights(tables.light_count);
         for (uint32_t j = 0; j < tables.eye_count; ++j) {
             std::copy_n(tables.column(j), tables.light_count, weights.begin());
-            columns.emplace_back(weights);
+            make_alias(weights, &draws[size_t(j) * tables.light_count]);
         }
         for (const float q : tables.energy) inv_energy.push_back(1 / q);
         for (const uint16_t w : tables.window) windows = std::max(windows, int(w));
@@ -61,19 +63,29 @@ struct SubspaceSelection {
     }
 };
 
+/// A selection with fewer techniques (connect_factor 0) makes an algorithm of those that remain.
+template <class Selection = SubspaceSelection>
 struct SpcbptAlgorithm {
-    SubspaceSelection selection;
+    Selection selection;
     Heuristic heuristic = Heuristic::kBalance;
     int connections = 3;         ///< N
     uint64_t minimum_paths = 1;  ///< Of a unit's cache.
 
+    /// A prefix and its part of the alias table of its subspace, drawn in proportion to r.
+    struct Candidate {
+        LightCandidate prefix;
+        float keep = 1;
+        uint32_t alias = 0;  ///< Within the subspace.
+    };
+    struct Subspace {
+        uint32_t begin = 0, count = 0;  ///< Of its candidates.
+        float scale = 0;                ///< R_i / (M_i N)
+    };
     /// The cache, sorted by light subspace.
     struct State {
         LightCache cache;
-        std::vector<uint32_t> begin;            ///< First candidate of a subspace; light_count + 1 entries.
-        std::vector<LightCandidate> candidates;
-        std::vector<double> cumulative;         ///< Of r, within its subspace, up to and including the candidate.
-        std::vector<float> scale;               ///< R_i / (M_i N)
+        std::vector<Subspace> subspaces;
+        std::vector<Candidate, HugePageAllocator<Candidate>> candidates;
     };
 
     float weight(const PathView& view, int s) const {
@@ -102,7 +114,7 @@ struct SpcbptAlgorithm {
         if (scope.stop.stop_requested()) return state;
 
         // Counting sort by subspace; path order within one.
-        state.begin.assign(tables.light_count + 1, 0);
+        state.subspaces.assign(tables.light_count, {});
         const auto each = [&](auto&& visit) {
             for (uint64_t m = 0; m < state.cache.path_count(); ++m) {
                 for_each_candidate(state.cache, m, scope.max_edges, [&](const LightCandidate& c, const PathVertex& v) {
@@ -110,25 +122,79 @@ struct SpcbptAlgorithm {
                 });
             }
         };
-        each([&](const LightCandidate&, const PathVertex& v) { ++state.begin[size_t(v.label) + 1]; });
-        for (size_t i = 1; i < state.begin.size(); ++i) state.begin[i] += state.begin[i - 1];
-        std::vector<uint32_t> next(state.begin.begin(), state.begin.end() - 1);
-        std::vector<double> sums(tables.light_count, 0.0);
-        state.candidates.resize(state.begin.back());
-        state.cumulative.resize(state.begin.back());
+        uint32_t total = 0;
+        each([&](const LightCandidate&, const PathVertex& v) { ++state.subspaces[v.label].count, ++total; });
+        uint32_t begin = 0;
+        for (Subspace& i : state.subspaces) i.begin = std::exchange(begin, begin + i.count);
+        state.candidates.resize(total);
+        std::vector<double> r(total);
+        std::vector<uint32_t> filled(tables.light_count, 0);
         each([&](const LightCandidate& c, const PathVertex& v) {
-            sums[v.label] += double(scalar_of(v.alpha));
-            state.candidates[next[v.label]] = c;
-            state.cumulative[next[v.label]++] = sums[v.label];
+            const size_t at = state.subspaces[v.label].begin + filled[v.label]++;
+            state.candidates[at].prefix = c;
+            r[at] = double(scalar_of(v.alpha));
         });
-        for (uint32_t i = 0; i < tables.light_count; ++i)
-            state.scale.push_back(float(sums[i] / (double(window) * tables.window[i] * connections)));
+        fork_join(tables.light_count, [&](size_t first, size_t last) {
+            std::vector<AliasEntry> entries;
+            for (size_t i = first; i < last; ++i) {
+                Subspace& subspace = state.subspaces[i];
+                const std::span<const double> part(r.data() + subspace.begin, subspace.count);
+                entries.assign(part.size(), {});
+                make_alias(part, entries.data());
+                double sum = 0;
+                for (uint32_t c = 0; c < subspace.count; ++c) {
+                    sum += part[c];
+                    state.candidates[subspace.begin + c].keep = entries[c].keep;
+                    state.candidates[subspace.begin + c].alias = entries[c].alias;
+                }
+                subspace.scale = float(sum / (double(window) * tables.window[i] * connections));
+            }
+        });
         return state;
+    }
+
+    /// N draws for a vertex of eye subspace `eye`, stage by stage, so that the memory of all of them is fetched at once. The
+    /// first stage is stratified over the draws. Returns how many of them found a prefix.
+    int draw(const State& state, uint32_t eye, Vec2 u, Rng& rng, int longest_prefix, LightPick* picks) const {
+        const PreparedTables& prepared = *selection.prepared;
+        const uint32_t light_count = prepared.tables.light_count;
+        const AliasEntry* column = &prepared.draws[size_t(eye) * light_count];
+        const auto first = [&](int n) { return (double(u.x) + n) / connections; };
+        for (int n = 0; n < connections; ++n) __builtin_prefetch(&column[alias_part(light_count, first(n))]);
+        struct Draw {
+            const Candidate* candidates;
+            uint32_t count, part;
+            double second;
+            float scale;
+        } draws[kMaxConnections];
+        int found = 0;
+        for (int n = 0; n < connections; ++n) {
+            const uint32_t part = alias_part(light_count, first(n));
+            const uint32_t i = draw_alias(column[part], light_count, part, first(n));
+            const Subspace& subspace = state.subspaces[i];
+            const double second = n == 0 ? double(u.y) : rng.uniform_double();
+            if (subspace.count == 0) continue;  // nothing there: its share of the estimate is zero
+            Draw& d = draws[found++];
+            d = {&state.candidates[subspace.begin], subspace.count, alias_part(subspace.count, second), second,
+                 subspace.scale / column[i].pmf};
+            __builtin_prefetch(&d.candidates[d.part]);
+        }
+        int count = 0;
+        for (int n = 0; n < found; ++n) {
+            const Draw& d = draws[n];
+            const Candidate& part = d.candidates[d.part];
+            const bool own = d.second * double(d.count) - double(d.part) < double(part.keep);
+            const LightCandidate& prefix = (own ? part : d.candidates[part.alias]).prefix;
+            if (int(prefix.s) > longest_prefix) continue;
+            const PathVertex* y = &state.cache.vertices[prefix.first_vertex];
+            prefetch(&y[prefix.s - 1]);
+            picks[count++] = {y, int(prefix.s), d.scale};
+        }
+        return count;
     }
 
     Rgb sample(SampleContext& context, const State& state) const {
         const Scene& scene = context.scene;
-        const PreparedTables& prepared = *selection.prepared;
         const SubspaceLabeller label = labeller(scene);
         PathVertex* z = context.camera_path;
         PathView view;
@@ -145,28 +211,17 @@ struct SpcbptAlgorithm {
                 if (const Rgb c = emitter_hit<ViewDetail::kSubspace>(scene, z, t, &view); !c.is_black()) sum += c * hit_weight(t, {});
             if (t > context.max_edges || !v.bsdf.has_smooth_lobe()) return;
             label.label_camera_vertex(&v);
-            const AliasTable& column = prepared.columns[v.label];
-            // The N draws of a vertex are stratified, and at the first vertex low-discrepancy over the iterations of the pixel.
-            const Vec2 u = sampler.next_event(t);
-            for (int n = 0; n < connections; ++n) {
-                const uint32_t i = column.sample((double(u.x) + n) / connections);
-                const uint32_t begin = state.begin[i], end = state.begin[i + 1];
-                if (begin == end) continue;
-                const double* cumulative = state.cumulative.data();
-                const double second = n == 0 ? double(u.y) : sampler.rng().uniform_double();
-                const size_t chosen = std::min(
-                    size_t(end - 1),
-                    size_t(std::upper_bound(cumulative + begin, cumulative + end, second * cumulative[end - 1]) - cumulative));
-                const LightCandidate& pick = state.candidates[chosen];
-                const int s = int(pick.s);
-                if (s + t - 1 > context.max_edges) continue;
-                const PathVertex* y = &state.cache.vertices[pick.first_vertex];
-                const Rgb c = connect_candidate<ViewDetail::kSubspace>(scene, y, s, z, t, &view, &context.counters);
+            LightPick picks[kMaxConnections];
+            // Low-discrepancy at the first vertex, over the iterations of the pixel.
+            const int pick_count = draw(state, v.label, sampler.next_event(t), sampler.rng(), context.max_edges + 1 - t, picks);
+            for (int n = 0; n < pick_count; ++n) {
+                const LightPick& p = picks[n];
+                const Rgb c = connect_candidate<ViewDetail::kSubspace>(scene, p.y, p.s, z, t, &view, &context.counters);
                 if (c.is_black()) continue;
-                const PathVertex& x0 = y[s - 1];
-                const bool direction = s == 1 && scene.emitters()[uint32_t(x0.emitter)].is_infinite();
-                label.complete(y, s, z, t, direction ? -x0.ng : normalize(x0.p - v.p), &view);
-                sum += c * (weight(view, s) * state.scale[i] / (scalar_of(x0.alpha) * column.pmf(i)));
+                const PathVertex& end = p.y[p.s - 1];
+                const bool direction = p.s == 1 && scene.emitters()[uint32_t(end.emitter)].is_infinite();
+                label.complete(p.y, p.s, z, t, direction ? -end.ng : normalize(end.p - v.p), &view);
+                sum += c * (weight(view, p.s) * p.scale / scalar_of(end.alpha));
             }
         };
         const auto escape = [&](int t, const WalkRay& ray) {

@@ -46,6 +46,7 @@ struct SubspaceLabeller {
         for (int j = 1; j < t; ++j) view->eye_label[k - j] = z[j].label;
         const bool hit = s == 0 && k == t - 1;
         if (s == 0 && hit) view->light_label[1] = source(uint32_t(z[t - 1].emitter), z[t - 1].p, z[t - 1].wo);
+        if (s == 0 && !hit) view->light_label[1] = source(uint32_t(emitters.environment_index()), {}, -towards);
         // Prefixes that end on the camera side, at z_j; the camera's end vertex z_{t-1} has no successor of its own unless it was
         // the emitter.
         for (int j = 2; j < t; ++j) {

@@ -7,6 +7,8 @@
 
 #include "common/path/connect.h"
 #include "common/path/mis.h"
+#include "common/transport/light_cache.h"
+#include "common/transport/subspace_view.h"
 
 namespace lightloom::testing {
 
@@ -51,7 +53,10 @@ bool leave_towards(PathVertex* v, PathVertex* previous, const Vec3& w, bool delt
             ray->pdf = s.pdf_fwd;
             previous->rev = double(s.pdf_rev) * v->to_previous;
             Rgb weight = s.weight;
-            if (mode == TransportMode::kImportance) weight *= v->adjoint * abs_dot(w, v->ng) / std::fabs(s.wi.z);
+            if (mode == TransportMode::kImportance)
+                weight *= v->adjoint * abs_dot(w, v->ng) / std::fabs(s.wi.z);
+            else
+                v->step = light_step(*v, s, w);
             ray->alpha = v->alpha * weight;
             found = true;
         }
@@ -63,6 +68,14 @@ bool leave_towards(PathVertex* v, PathVertex* previous, const Vec3& w, bool delt
         previous->rev = double(e.pdf_rev) * v->to_previous;
         const Scatter s = scatter<mode>(*v, w);
         ray->alpha = v->alpha * s.value / e.pdf_fwd;
+        if (mode == TransportMode::kRadiance) {
+            BsdfSample sampled;
+            sampled.wi = wi;
+            sampled.weight = s.value / e.pdf_fwd;
+            sampled.pdf_fwd = e.pdf_fwd, sampled.pdf_rev = e.pdf_rev;
+            sampled.delta = false;
+            v->step = light_step(*v, sampled, w);
+        }
     }
     v->delta = delta;
     ray->from_infinite = false;
@@ -88,7 +101,9 @@ inline std::optional<std::vector<PathVertex>> rebuild_light(const Scene& scene, 
     ray.previous_hittable = !e.is_delta();
     const float cosine = e.is_area() ? abs_dot(y0.ng, first) : 1;
     ray.alpha = emitters.emitted(e, y0.ng, first) * (cosine / float(y0.fwd * ray.pdf));
-    y0.alpha = ray.alpha;
+    y0.alpha = emitters.strength(e, first) / float(y0.fwd);
+    y0.survival = 1;
+    y0.label = y0.reverse_label = kNoLabel;
     y.push_back(y0);
     for (int i = 1; i < s; ++i) {
         PathVertex v;
@@ -136,56 +151,72 @@ struct Rebuilt {
     PathView view;
 };
 
-/// The path as technique s would have produced it; nothing when that technique cannot.
-inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, int s) {
+/// The path as technique s would have produced it; nothing when that technique cannot. With a labeller: as a method that
+/// selects by subspaces would have, x_0 of s = 1 from a light sub-path, the view with throughput and labels.
+inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, int s, const SubspaceLabeller* labeller = nullptr) {
     const int k = path.k();
     const Emitter& e = scene.emitters()[uint32_t(path.x[0].emitter)];
     const auto smooth = [&](int i) { return !path.x[size_t(i)].delta && path.x[size_t(i)].bsdf.has_smooth_lobe(); };
     Rebuilt r;
     WalkCounters counters;
+    std::optional<std::vector<PathVertex>> y, z;
+    const int t = k + 1 - s;
+    Vec3 towards;  // from z_{t-1} to x_{s-1}
     if (s == 0) {
         if (e.is_delta()) return std::nullopt;
-        if (path.infinite) {
-            WalkRay ray;
-            const auto z = rebuild_camera(scene, path, k, &ray, true);
-            if (!z) return std::nullopt;
-            r.contribution = environment_hit(scene, z->data(), k, ray, &r.view);
-        } else {
-            const auto z = rebuild_camera(scene, path, k + 1, nullptr, false);
-            if (!z) return std::nullopt;
-            r.contribution = emitter_hit(scene, z->data(), k + 1, &r.view);
-        }
+        WalkRay ray;
+        z = rebuild_camera(scene, path, path.infinite ? k : k + 1, &ray, path.infinite);
+        if (!z) return std::nullopt;
+        towards = ray.direction;
+        r.contribution = path.infinite ? environment_hit<ViewDetail::kSubspace>(scene, z->data(), k, ray, &r.view)
+                                       : emitter_hit<ViewDetail::kSubspace>(scene, z->data(), k + 1, &r.view);
     } else if (s == 1) {
         if (k < 2 || !smooth(1)) return std::nullopt;
-        const auto z = rebuild_camera(scene, path, k, nullptr, false);
+        z = rebuild_camera(scene, path, k, nullptr, false);
         if (!z) return std::nullopt;
         const PathVertex& ref = z->back();
         NextEventSample light;
         light.emitter = uint32_t(path.x[0].emitter);
-        light.wi = path.infinite ? -path.x[0].ng : normalize(path.x[0].p - ref.p);
+        light.wi = towards = path.infinite ? -path.x[0].ng : normalize(path.x[0].p - ref.p);
         light.position = path.infinite ? ref.p + light.wi * (2 * scene.emitters().scene_radius()) : path.x[0].p;
         light.normal = e.is_area() ? path.x[0].ng : -light.wi;
         light.radiance = scene.emitters().emitted(e, light.normal, -light.wi);
         light.geometry = e.is_infinite() ? 1.0f
                                          : (e.is_area() ? abs_dot(light.normal, light.wi) : 1.0f) /
                                                length_squared(light.position - ref.p);
-        light.pdf = scene.emitters().pdf_next_event(e, ref.p, light.position, light.normal, light.wi);
-        if (!(light.pdf > 0)) return std::nullopt;
-        r.contribution = next_event(scene, z->data(), k, light, &r.view, &counters);
+        if (labeller != nullptr) {
+            y = rebuild_light(scene, path, 1);
+            if (!y) return std::nullopt;
+            r.contribution = connect_candidate<ViewDetail::kSubspace>(scene, y->data(), 1, z->data(), k, &r.view, &counters);
+        } else {
+            light.pdf = scene.emitters().pdf_next_event(e, ref.p, light.position, light.normal, light.wi);
+            if (!(light.pdf > 0)) return std::nullopt;
+            r.contribution = next_event<ViewDetail::kSubspace>(scene, z->data(), k, light, &r.view, &counters);
+        }
     } else if (s < k) {
         if (!smooth(s - 1) || !smooth(s)) return std::nullopt;
-        const auto y = rebuild_light(scene, path, s);
-        const auto z = rebuild_camera(scene, path, k + 1 - s, nullptr, false);
+        y = rebuild_light(scene, path, s);
+        z = rebuild_camera(scene, path, t, nullptr, false);
         if (!y || !z) return std::nullopt;
-        r.contribution = connect(scene, y->data(), s, z->data(), k + 1 - s, &r.view, &counters);
+        towards = normalize(y->back().p - z->back().p);
+        r.contribution = connect<ViewDetail::kSubspace>(scene, y->data(), s, z->data(), t, &r.view, &counters);
     } else {
         if (k < 2 || !smooth(k - 1)) return std::nullopt;
-        const auto y = rebuild_light(scene, path, k);
+        y = rebuild_light(scene, path, k);
         if (!y) return std::nullopt;
+        z.emplace(1);
+        (*z)[0].p = path.lens;
+        towards = normalize(y->back().p - path.lens);
         Vec2 film;
         r.contribution = connect_to_camera(scene, y->data(), k, path.lens, &film, &r.view, &counters);
     }
     if (r.contribution.is_black()) return std::nullopt;
+    if (labeller != nullptr && k >= 2) {
+        if (y) labeller->label_light_path(y->data(), int(y->size()));
+        for (size_t j = 1; j < z->size(); ++j)
+            if ((*z)[j].bsdf.has_smooth_lobe()) labeller->label_camera_vertex(&(*z)[j]);
+        labeller->complete(y ? y->data() : nullptr, s, z->data(), int(z->size()), towards, &r.view);
+    }
     return r;
 }
 

@@ -297,6 +297,9 @@ TEST(ImportSpectra, Reductions) {
     EXPECT_TRUE(clipped);
     const import::Spectrum flat{{300, 0.4}, {900, 0.4}};
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(import::reflectance_rgb(flat)[c], 0.4, 1e-6);
+    Rgb white;
+    for (int nm = 380; nm <= 780; ++nm) white += import::d65_rgb_at(nm);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(white[c], 1, 1e-5);
     EXPECT_NEAR(import::illuminant_rgb(flat, &clipped)->luminance(), 1, 1e-3);
     // A conductor's colour at normal incidence is that of its spectral reflectance.
     const import::ConductorRgb constant = import::conductor_rgb({{300, 0.3}, {900, 0.3}}, {{300, 2.5}, {900, 2.5}});

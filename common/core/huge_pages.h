@@ -1,0 +1,40 @@
+#pragma once
+// Memory for arrays that are large and read at random: asks for huge pages, without which most reads of a light-vertex cache miss
+// the translation buffer before they miss the cache. Where the system has none to give, it is ordinary memory.
+
+#include <sys/mman.h>
+
+#include <cstddef>
+#include <cstdlib>
+#include <new>
+
+namespace lightloom {
+
+template <class T>
+struct HugePageAllocator {
+    using value_type = T;
+    static constexpr size_t kPage = size_t(2) << 20;
+
+    HugePageAllocator() = default;
+    template <class U>
+    HugePageAllocator(const HugePageAllocator<U>&) {}  // NOLINT: allocators convert
+
+    T* allocate(size_t count) {
+        const size_t bytes = (count * sizeof(T) + kPage - 1) / kPage * kPage;
+        void* memory = std::aligned_alloc(kPage, bytes);
+        if (!memory) throw std::bad_alloc();
+        (void)madvise(memory, bytes, MADV_HUGEPAGE);  // advice: failing costs time only
+        return static_cast<T*>(memory);
+    }
+    void deallocate(T* memory, size_t) { std::free(memory); }
+    friend bool operator==(const HugePageAllocator&, const HugePageAllocator&) { return true; }
+};
+
+/// Fetches the cache lines of an object that is needed soon.
+template <class T>
+void prefetch(const T* object) {
+    const char* bytes = reinterpret_cast<const char*>(object);
+    for (size_t offset = 0; offset < sizeof(T); offset += 64) __builtin_prefetch(bytes + offset);
+}
+
+}  // namespace lightloom

@@ -1,0 +1,232 @@
+// The weight suites of the methods with a light-vertex cache: whatever the tables hold, the weights of all techniques sum to one
+// on the very same path, and every technique describes that path, its labels and the throughput of its light prefixes alike.
+// Everything is rebuilt through production code.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/transport/lvcbpt.h"
+#include "common/transport/spcbpt.h"
+#include "tests/support/path_generator.h"
+#include "tests/support/random_tables.h"
+#include "tests/support/test_scenes.h"
+
+namespace lightloom {
+namespace {
+
+using testing::FullPath;
+using testing::random_tables;
+using testing::rebuild;
+
+constexpr int kEdges = 7;
+
+/// Deviations of single-precision quantities; see weights_test.cpp for what the two bounds mean. What was traced is compared with
+/// what is rebuilt: directions that were sampled, and throughput that was accumulated along the other sub-path, so that narrow
+/// lobes and total reflection amplify the last bits more often than there. The tail of that falls as one over the deviation; a
+/// wrong factor would show up in a good part of the paths.
+struct Tally {
+    uint64_t count = 0, loose = 0, gross = 0;
+    void add(double deviation) {
+        ++count;
+        loose += !(std::fabs(deviation) <= 1e-4);
+        gross += !(std::fabs(deviation) <= 1e-2);
+    }
+    void check(const std::string& what, uint64_t at_least = 500) const {
+        EXPECT_GE(count, at_least) << what;
+        EXPECT_LT(double(loose), 1e-2 * double(count)) << what << ": " << loose << " of " << count << " deviate by over 1e-4";
+        EXPECT_LE(double(gross), 5e-4 * double(count)) << what << ": " << gross << " of " << count << " deviate by over 1e-2";
+    }
+};
+
+bool can_be_hit(const Scene& scene) {
+    const auto& emitters = scene.emitters().all();
+    return std::any_of(emitters.begin(), emitters.end(), [](const Emitter& e) { return !e.is_delta(); });
+}
+
+SubspaceSelection selection_of(const Scene& scene, SubspaceTables tables, double connections, double cache_paths) {
+    SubspaceSelection s;
+    s.prepared = std::make_shared<const PreparedTables>(std::move(tables));
+    s.light_paths_per_iteration = 0.7 * double(scene.frame().crop.area());
+    s.connections = connections;
+    s.cache_paths = cache_paths;
+    return s;
+}
+
+class SubspaceWeights : public ::testing::TestWithParam<testing::NamedScene> {};
+
+/// As the technique itself filled its view in while it was traced (with Russian roulette), and as all others would.
+TEST_P(SubspaceWeights, SumToOneWhateverTheTablesHold) {
+    const auto scene = GetParam().make();
+    const UniformSelection uniform{double(scene->frame().crop.area()), 0.37};
+    Tally lvc, balance, power, aware, traced;
+    std::vector<int> made(kEdges + 1, 0);
+    for (uint64_t seed = 1; seed <= 3; ++seed) {
+        const SubspaceSelection blind = selection_of(*scene, random_tables(scene->emitters(), seed), double(seed), 0);
+        SubspaceSelection knowing = blind;
+        knowing.cache_paths = 50;
+        const SubspaceLabeller labeller{blind.prepared->tables, scene->emitters()};
+        testing::for_each_path(
+            *scene, can_be_hit(*scene) ? 4000 : 8000, kEdges, 40 + seed,
+            [&](const FullPath& path, int own, const PathView& view, const Rgb&) {
+                ++made[size_t(own)];
+                const int k = path.k();
+                if (k < 2) return;
+                double sums[5] = {};
+                for (int s = 0; s <= k; ++s) {
+                    const auto r = rebuild(*scene, path, s, &labeller);
+                    if (!r) continue;
+                    const Technique technique{TechniqueKind::kConnect, s};
+                    sums[0] += mis_weight(r->view, technique, uniform);
+                    const double w = mis_weight(r->view, technique, blind);
+                    sums[1] += w;
+                    sums[2] += mis_weight(r->view, technique, blind, Heuristic::kPower);
+                    sums[3] += mis_weight(r->view, technique, knowing);
+                    sums[4] += s == own ? mis_weight(view, technique, blind) : w;
+                }
+                Tally* tallies[] = {&lvc, &balance, &power, &aware, &traced};
+                for (int i = 0; i < 5; ++i) tallies[i]->add(sums[i] - 1);
+            },
+            &labeller);
+    }
+    lvc.check("lvcbpt");
+    balance.check("spcbpt balance");
+    power.check("spcbpt power");
+    aware.check("spcbpt, ris_aware");
+    traced.check("spcbpt, own view as traced");
+    for (int s = can_be_hit(*scene) ? 0 : 1; s <= 4; ++s)
+        EXPECT_GT(made[size_t(s)], 20) << "technique s = " << s << " was hardly exercised";
+}
+
+TEST_P(SubspaceWeights, EveryTechniqueSeesTheSameLabelsAndThroughput) {
+    const auto scene = GetParam().make();
+    testing::RandomTableOptions options;
+    options.light_count = options.eye_count = 200, options.source_cells = 60, options.tree_leaves = 300;
+    const SubspaceTables tables = random_tables(scene->emitters(), 5, options);
+    const SubspaceLabeller labeller{tables, scene->emitters()};
+    Tally throughput, labels;
+    testing::for_each_path(
+        *scene, can_be_hit(*scene) ? 4000 : 8000, kEdges, 51,
+        [&](const FullPath& path, int, const PathView& traced, const Rgb&) {
+            const int k = path.k();
+            if (k < 2) return;
+            for (int s = 0; s <= k; ++s) {
+                const auto other = rebuild(*scene, path, s, &labeller);
+                if (!other) continue;
+                // What a connection of s' light vertices reads, where it is possible and light tracing reaches it.
+                double reached = 1;
+                for (int c = 1; c <= k - 1; ++c) {
+                    reached *= traced.fwd[c - 1] > 0 ? 1 : 0;
+                    if (reached == 0 || traced.delta[c - 1] || traced.delta[c]) continue;
+                    if (!path.x[size_t(c)].bsdf.has_smooth_lobe()) continue;
+                    if (c >= 2 && !path.x[size_t(c - 1)].bsdf.has_smooth_lobe()) continue;
+                    labels.add(other->view.light_label[c] == traced.light_label[c] ? 0 : 1);
+                    labels.add(other->view.eye_label[c] == traced.eye_label[c] ? 0 : 1);
+                    throughput.add(other->view.light_throughput[c] / traced.light_throughput[c] - 1);
+                }
+            }
+        },
+        &labeller);
+    throughput.check("throughput of light prefixes");
+    // A direction is recomputed to the last bits only: a split between its two values is as likely as that.
+    EXPECT_GT(labels.count, 500u);
+    EXPECT_LE(double(labels.gross), 1e-4 * double(labels.count)) << labels.gross << " of " << labels.count;
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, SubspaceWeights, ::testing::ValuesIn(testing::kScenes),
+                         [](const ::testing::TestParamInfo<testing::NamedScene>& param) { return param.param.name; });
+
+/// Numbers of subspaces are names: the weights do not know them.
+TEST(Labels, PermutedWithTheirRowsKeepEveryWeight) {
+    const auto scene = testing::glossy();
+    testing::RandomTableOptions options;
+    options.source_cells = 1;  // one cell: its number may be any
+    const SubspaceTables tables = random_tables(scene->emitters(), 8, options);
+    const uint32_t n = tables.light_count;
+    const auto renamed = [n](uint32_t i) { return (5 * i + 3) % n; };  // 5 and 12 have no common factor
+    SubspaceTables other = tables;
+    std::vector<SubspaceTree::Node> nodes = tables.light_tree.nodes();
+    for (SubspaceTree::Node& node : nodes)
+        if (node.axis() == SubspaceTree::kLeaf) node = SubspaceTree::make_leaf(renamed(node.child()));
+    other.light_tree = SubspaceTree(std::move(nodes));
+    std::vector<LightDivision::Cells> cells = tables.division.cells();
+    for (LightDivision::Cells& c : cells) {
+        ASSERT_EQ(c.side, 1);
+        c.first = uint16_t(renamed(c.first));
+    }
+    other.division = LightDivision(std::move(cells));
+    for (uint32_t i = 0; i < n; ++i) {
+        other.energy[renamed(i)] = tables.energy[i];
+        for (uint32_t j = 0; j < tables.eye_count; ++j) other.gamma[size_t(j) * n + renamed(i)] = tables.column(j)[i];
+    }
+    ASSERT_TRUE(other.validate(scene->emitters()).ok());
+    const SubspaceSelection a = selection_of(*scene, tables, 3, 0), b = selection_of(*scene, other, 3, 0);
+    const SubspaceLabeller labeller_a{a.prepared->tables, scene->emitters()}, labeller_b{b.prepared->tables, scene->emitters()};
+    uint64_t compared = 0;
+    testing::for_each_path(
+        *scene, 500, 6, 61,
+        [&](const FullPath& path, int, const PathView&, const Rgb&) {
+            for (int s = 0; s <= path.k() && path.k() >= 2; ++s) {
+                const auto ra = rebuild(*scene, path, s, &labeller_a), rb = rebuild(*scene, path, s, &labeller_b);
+                ASSERT_EQ(ra.has_value(), rb.has_value());
+                if (!ra) continue;
+                EXPECT_EQ(mis_weight(ra->view, {TechniqueKind::kConnect, s}, a),
+                          mis_weight(rb->view, {TechniqueKind::kConnect, s}, b));
+                ++compared;
+            }
+        },
+        &labeller_a);
+    EXPECT_GT(compared, 2000u);
+}
+
+/// A subspace that is split, with Gamma shared in proportion to Q, has the same weights: coarse tables are among the fine ones
+/// [algorithms.md 9.1].
+TEST(Labels, SplitSubspacesWithSharedGammaKeepEveryWeight) {
+    const auto scene = testing::glossy();
+    const SubspaceTables tables = random_tables(scene->emitters(), 9);
+    SubspaceTables fine = tables;
+    const uint32_t n = tables.light_count;
+    fine.light_count = n + 1;
+    // Half of the places of subspace `split` get the new label.
+    const uint32_t split = tables.light_tree.nodes().back().child();
+    std::vector<SubspaceTree::Node> nodes = tables.light_tree.nodes();
+    for (size_t i = 0, count = nodes.size(); i < count; ++i) {
+        if (nodes[i].axis() != SubspaceTree::kLeaf || nodes[i].child() != split) continue;
+        nodes[i] = SubspaceTree::make_inner(0, 0.05f, uint32_t(nodes.size()));
+        nodes.push_back(SubspaceTree::make_leaf(split));
+        nodes.push_back(SubspaceTree::make_leaf(n));
+    }
+    fine.light_tree = SubspaceTree(std::move(nodes));
+    const float share = 0.3f;
+    fine.energy.push_back(share * tables.energy[split]);
+    fine.energy[split] = (1 - share) * tables.energy[split];
+    fine.window.push_back(tables.window[split]);
+    fine.gamma.clear();
+    for (uint32_t j = 0; j < tables.eye_count; ++j) {
+        for (uint32_t i = 0; i < n; ++i) fine.gamma.push_back(tables.column(j)[i] * (i == split ? 1 - share : 1));
+        fine.gamma.push_back(tables.column(j)[split] * share);
+    }
+    ASSERT_TRUE(fine.validate(scene->emitters()).ok());
+    const SubspaceSelection a = selection_of(*scene, tables, 2, 0), b = selection_of(*scene, fine, 2, 0);
+    const SubspaceLabeller labeller_a{a.prepared->tables, scene->emitters()}, labeller_b{b.prepared->tables, scene->emitters()};
+    uint64_t compared = 0, in_new = 0;
+    testing::for_each_path(
+        *scene, 500, 6, 62,
+        [&](const FullPath& path, int, const PathView&, const Rgb&) {
+            for (int s = 0; s <= path.k() && path.k() >= 2; ++s) {
+                const auto ra = rebuild(*scene, path, s, &labeller_a), rb = rebuild(*scene, path, s, &labeller_b);
+                if (!ra || !rb) continue;
+                const double wa = mis_weight(ra->view, {TechniqueKind::kConnect, s}, a);
+                EXPECT_NEAR(mis_weight(rb->view, {TechniqueKind::kConnect, s}, b), wa, 1e-6 * wa);
+                ++compared;
+                for (int c = 2; c < path.k(); ++c) in_new += rb->view.light_label[c] == n;
+            }
+        },
+        &labeller_b);
+    EXPECT_GT(compared, 2000u);
+    EXPECT_GT(in_new, 50u);
+}
+
+}  // namespace
+}  // namespace lightloom

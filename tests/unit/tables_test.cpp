@@ -1,0 +1,356 @@
+// The tables as data: what is written is read again, what is damaged is refused, and what trains them is deterministic.
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <cstring>
+#include <limits>
+
+#include "common/tables/train_classifier.h"
+#include "common/transport/training.h"
+#include "tests/support/random_tables.h"
+#include "tests/support/test_scenes.h"
+
+namespace lightloom {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
+
+RenderSettings small_settings(uint64_t seed = 3) {
+    return {"spcbpt",
+            {{"training-paths", "3000"}, {"light-subspaces", "60"}, {"eye-subspaces", "40"}, {"cache", "500"}, {"windows", "4"}},
+            seed,
+            5};
+}
+
+TrainingData small_data(const std::shared_ptr<const Scene>& scene, uint64_t samples = 600) {
+    Result<TrainingData> data = trace_training(*scene, small_settings(), {0, samples, samples}, {});
+    EXPECT_TRUE(data.ok());
+    return *std::move(data);
+}
+
+TEST(Tables, SerializedAndParsedAreTheSame) {
+    for (const testing::NamedScene& named : testing::kScenes) {
+        const auto scene = named.make();
+        const SubspaceTables random = testing::random_tables(scene->emitters(), 1);
+        TrainingReport report;
+        const Result<SubspaceTables> trained = make_tables(*scene, small_settings(), {}, &report);
+        ASSERT_TRUE(trained.ok()) << named.name << ": " << trained.status().message();
+        for (const SubspaceTables& tables : {random, *trained, trivial_tables(scene->emitters())}) {
+            ASSERT_TRUE(tables.validate(scene->emitters()).ok()) << named.name;
+            const std::string bytes = serialize(tables);
+            const Result<SubspaceTables> again = parse_tables(bytes);
+            ASSERT_TRUE(again.ok()) << again.status().message();
+            EXPECT_TRUE(again->validate(scene->emitters()).ok());
+            EXPECT_EQ(serialize(*again), bytes);
+            EXPECT_EQ(again->light_count, tables.light_count);
+            EXPECT_EQ(again->gamma, tables.gamma);
+            EXPECT_EQ(again->energy, tables.energy);
+            EXPECT_EQ(again->window, tables.window);
+            EXPECT_EQ(again->vertices_per_path, tables.vertices_per_path);
+        }
+    }
+}
+
+/// Whichever byte it is: of the magic, a name, a size, a digest, a separator or a value.
+TEST(Tables, EveryDamagedByteIsDetected) {
+    const auto scene = testing::diffuse_box();
+    testing::RandomTableOptions options;
+    options.light_count = 5, options.eye_count = 3, options.tree_leaves = 6;
+    const std::string bytes = serialize(testing::random_tables(scene->emitters(), 2, options));
+    for (size_t i = 0; i < bytes.size(); ++i) {
+        for (const char flip : {char(0x01), char(0x20), char(0x80)}) {
+            std::string damaged = bytes;
+            damaged[i] = char(damaged[i] ^ flip);
+            const Result<SubspaceTables> parsed = parse_tables(damaged);
+            EXPECT_FALSE(parsed.ok()) << "byte " << i << " flipped by " << int(flip);
+            if (!parsed.ok()) {
+                EXPECT_EQ(parsed.status().code(), StatusCode::kDataLoss);
+            }
+        }
+    }
+    for (size_t size = 0; size < bytes.size(); ++size)
+        EXPECT_FALSE(parse_tables(std::string_view(bytes).substr(0, size)).ok()) << "cut to " << size << " bytes";
+    EXPECT_FALSE(parse_tables(bytes + "x").ok());
+    EXPECT_FALSE(parse_tables(bytes + bytes.substr(bytes.find('\n') + 1)).ok()) << "every table twice";
+}
+
+TEST(Tables, EveryBadTableIsRefusedByName) {
+    const auto scene = testing::environment_lit();
+    const SubspaceTables good = testing::random_tables(scene->emitters(), 4);
+    ASSERT_TRUE(good.validate(scene->emitters()).ok());
+    const auto leaf = [](uint32_t label) { return SubspaceTree({SubspaceTree::make_leaf(label)}); };
+    const std::pair<const char*, std::function<void(SubspaceTables&)>> mutations[] = {
+        {"no light subspace", [](SubspaceTables& t) { t.light_count = 0; }},
+        {"no eye subspace", [](SubspaceTables& t) { t.eye_count = 0; }},
+        {"too many subspaces", [](SubspaceTables& t) { t.light_count = SubspaceTables::kMaxSubspaces + 1; }},
+        {"division of no scene", [](SubspaceTables& t) { t.division = LightDivision(); }},
+        {"division of another scene",
+         [](SubspaceTables& t) { t.division = LightDivision(std::vector<LightDivision::Cells>(t.division.cells().size() + 1)); }},
+        {"cells beyond", [](SubspaceTables& t) {
+             auto cells = t.division.cells();
+             cells.back() = {uint16_t(t.light_count - 1), 2};
+             t.division = LightDivision(cells);
+         }},
+        {"cells without a side", [](SubspaceTables& t) {
+             auto cells = t.division.cells();
+             cells.back().side = 0;
+             t.division = LightDivision(cells);
+         }},
+        {"light label beyond", [&](SubspaceTables& t) { t.light_tree = leaf(t.light_count); }},
+        {"eye label beyond", [&](SubspaceTables& t) { t.eye_tree = leaf(t.eye_count); }},
+        {"tree without nodes", [](SubspaceTables& t) { t.eye_tree = SubspaceTree(std::vector<SubspaceTree::Node>()); }},
+        {"tree with a loop", [](SubspaceTables& t) {
+             t.eye_tree = SubspaceTree({SubspaceTree::make_inner(0, 0, 0), SubspaceTree::make_leaf(0)});
+         }},
+        {"tree with a missing child", [](SubspaceTables& t) {
+             t.eye_tree = SubspaceTree({SubspaceTree::make_inner(0, 0, 1), SubspaceTree::make_leaf(0)});
+         }},
+        {"tree with an unknown axis", [](SubspaceTables& t) {
+             t.light_tree = SubspaceTree({SubspaceTree::make_inner(SubspaceTree::kAxes, 0, 1), SubspaceTree::make_leaf(0),
+                                          SubspaceTree::make_leaf(0)});
+         }},
+        {"tree with a threshold that is no number", [](SubspaceTables& t) {
+             t.light_tree = SubspaceTree({SubspaceTree::make_inner(0, kNan, 1), SubspaceTree::make_leaf(0), SubspaceTree::make_leaf(0)});
+         }},
+        {"Q too short", [](SubspaceTables& t) { t.energy.pop_back(); }},
+        {"Q zero", [](SubspaceTables& t) { t.energy[1] = 0; }},
+        {"Q negative", [](SubspaceTables& t) { t.energy[1] = -1; }},
+        {"Q not a number", [](SubspaceTables& t) { t.energy[1] = kNan; }},
+        {"Q infinite", [](SubspaceTables& t) { t.energy[1] = kInfinity; }},
+        {"Gamma too short", [](SubspaceTables& t) { t.gamma.pop_back(); }},
+        {"Gamma zero", [](SubspaceTables& t) { t.gamma[2] += std::exchange(t.gamma[3], 0.0f); }},
+        {"Gamma not a number", [](SubspaceTables& t) { t.gamma[3] = kNan; }},
+        {"column that does not sum to one", [](SubspaceTables& t) { t.gamma[3] *= 1.5f; }},
+        {"windows too short", [](SubspaceTables& t) { t.window.pop_back(); }},
+        {"window of nothing", [](SubspaceTables& t) { t.window[0] = 0; }},
+        {"window beyond what a unit can trace", [](SubspaceTables& t) { t.window[0] = 60000; }},
+        {"no vertices", [](SubspaceTables& t) { t.vertices_per_path = 0; }},
+        {"vertices not a number", [](SubspaceTables& t) { t.vertices_per_path = std::nan(""); }},
+        {"vertices infinite", [](SubspaceTables& t) { t.vertices_per_path = HUGE_VAL; }},
+    };
+    for (const auto& [name, change] : mutations) {
+        SubspaceTables bad = good;
+        change(bad);
+        const Status status = bad.validate(scene->emitters());
+        EXPECT_EQ(status.code(), StatusCode::kDataLoss) << name;
+        EXPECT_FALSE(status.message().empty()) << name;
+        // And nothing renders from them.
+        EXPECT_FALSE(Renderer::create(scene, {"spcbpt", {}, 1, 4}, std::make_shared<const SubspaceTables>(bad)).ok()) << name;
+    }
+}
+
+TEST(TrainingData, SerializedAndParsedAreTheSame) {
+    for (const auto make : {testing::diffuse_box, testing::environment_lit, testing::caustic_of_a_point_light}) {
+        const auto scene = make();
+        const TrainingData data = small_data(scene);
+        ASSERT_TRUE(data.validate(scene->emitters().all().size()).ok());
+        const std::string bytes = serialize(data);
+        const Result<TrainingData> again = parse_training_data(bytes);
+        ASSERT_TRUE(again.ok());
+        EXPECT_TRUE(again->validate(scene->emitters().all().size()).ok());
+        EXPECT_EQ(serialize(*again), bytes);
+    }
+}
+
+/// Units are joined in their order: the data do not know how they were cut.
+TEST(TrainingData, PartsJoinToTheWhole) {
+    const auto scene = testing::glossy();
+    const uint64_t total = 2048;
+    const TrainingData whole = small_data(scene, total);
+    TrainingData joined;
+    for (uint64_t first = 0; first < total; first += 512) {
+        const Result<TrainingData> part = trace_training(*scene, small_settings(), {first, 512, total}, {});
+        ASSERT_TRUE(part.ok());
+        ASSERT_TRUE(joined.append(*part).ok());
+    }
+    EXPECT_EQ(serialize(joined), serialize(whole));
+    const auto other_frame = testing::environment_lit();
+    TrainingData other = small_data(other_frame);
+    other.blocks_x += 1;
+    other.block_sum.resize(size_t(other.blocks_x) * size_t(other.blocks_y));
+    EXPECT_FALSE(joined.append(other).ok());
+}
+
+/// The wire carries a digest beside them; what the parser owes is that no damage leads out of the arrays: it refuses, validation
+/// refuses, or training works, with valid tables.
+TEST(TrainingData, DamageIsRefusedOrHarmless) {
+    const auto scene = testing::diffuse_box();
+    const size_t emitters = scene->emitters().all().size();
+    const TrainingData data = small_data(scene, 60);
+    const std::string bytes = serialize(data);
+    const size_t header = 48, block_sums = data.block_sum.size() * sizeof(double);
+    Rng rng({5, Stage::kTraining, 0, 0});
+    for (int round = 0; round < 3000; ++round) {
+        std::string damaged = bytes;
+        // Every byte of the header, then any.
+        const size_t at = round < int(header) ? size_t(round) : rng.below(uint32_t(bytes.size()));
+        damaged[at] = char(damaged[at] ^ char(1 + rng.below(255)));
+        const Result<TrainingData> parsed = parse_training_data(damaged);
+        if (at < 16 || (at >= 24 && at < header)) {
+            EXPECT_FALSE(parsed.ok()) << "byte " << at;
+        }
+        if (at >= header + block_sums) {
+            ASSERT_TRUE(parsed.ok());
+        }
+        if (!parsed.ok() || !parsed->validate(emitters).ok()) continue;
+        TrainingReport report;
+        TrainingOptions options;
+        options.light_subspaces = options.eye_subspaces = 20;
+        const Result<SubspaceTables> tables = train_tables(*parsed, scene->emitters(), options, {}, &report);
+        if (tables.ok()) {
+            EXPECT_TRUE(tables->validate(scene->emitters()).ok());
+        }
+    }
+    for (size_t size = 0; size < bytes.size(); size += 1 + size / 50)
+        EXPECT_FALSE(parse_training_data(std::string_view(bytes).substr(0, size)).ok()) << "cut to " << size;
+    EXPECT_FALSE(parse_training_data(bytes + "12345678").ok());
+}
+
+TEST(TrainingData, BadPathsAreRefused) {
+    const auto scene = testing::diffuse_box();
+    const TrainingData good = small_data(scene);
+    ASSERT_FALSE(good.paths.empty());
+    ASSERT_FALSE(good.light_paths.empty());
+    const size_t emitters = scene->emitters().all().size();
+    const std::pair<const char*, std::function<void(TrainingData&)>> mutations[] = {
+        {"no frame", [](TrainingData& d) { d.blocks_x = 0; }},
+        {"another frame", [](TrainingData& d) { d.block_sum.pop_back(); }},
+        {"no vertex", [](TrainingData& d) { d.paths[0].vertex_count = 0; }},
+        {"vertices beyond", [](TrainingData& d) { d.paths.back().first_vertex = uint32_t(d.vertices.size()) - 1; }},
+        {"vertices that wrap around", [](TrainingData& d) { d.paths[0].first_vertex = 0xffffffffu; }},
+        {"light path beyond", [](TrainingData& d) { d.light_paths[0].vertex_count = 1u << 30; }},
+        {"block beyond", [](TrainingData& d) { d.paths[0].block = uint32_t(d.block_sum.size()); }},
+        {"emitter beyond", [&](TrainingData& d) { d.vertices[d.paths[0].first_vertex].emitter = uint32_t(emitters); }},
+        {"estimate not a number", [](TrainingData& d) { d.paths[0].estimate = kNan; }},
+        {"vertex nowhere", [](TrainingData& d) { d.vertices[1].position.y = kNan; }},
+        {"density infinite", [](TrainingData& d) { d.vertices[1].density = kInfinity; }},
+        {"square infinite", [](TrainingData& d) { d.paths[0].square = kInfinity; }},
+    };
+    for (const auto& [name, change] : mutations) {
+        TrainingData bad = good;
+        change(bad);
+        EXPECT_FALSE(bad.validate(emitters).ok()) << name;
+    }
+}
+
+/// Training twice, on one thread and on two, makes the same bytes; another seed others.
+TEST(Training, IsDeterministicOnAnyNumberOfThreads) {
+    tbb::global_control allowance(tbb::global_control::max_allowed_parallelism, 4);
+    for (const auto make : {testing::glossy, testing::environment_lit, testing::delta_lights}) {
+        const auto scene = make();
+        const auto on_threads = [&](int threads, uint64_t seed) {
+            std::string bytes;
+            tbb::task_arena(threads).execute([&] {
+                TrainingReport report;
+                const Result<SubspaceTables> tables = make_tables(*scene, small_settings(seed), {}, &report);
+                ASSERT_TRUE(tables.ok());
+                bytes = serialize(*tables);
+            });
+            return bytes;
+        };
+        const std::string alone = on_threads(1, 3);
+        EXPECT_EQ(on_threads(2, 3), alone);
+        EXPECT_EQ(on_threads(4, 3), alone);
+        EXPECT_NE(on_threads(1, 4), alone);
+    }
+}
+
+std::vector<WeightedEnd> random_ends(int count, uint64_t seed, bool on_a_line) {
+    Rng rng({seed, Stage::kTraining, 0, 0});
+    std::vector<WeightedEnd> ends;
+    for (int i = 0; i < count; ++i) {
+        WeightedEnd e;
+        const Vec3 p{rng.uniform(), rng.uniform(), rng.uniform()};
+        e.end.position = on_a_line ? Vec3{4 * p.x, 1, 2} : p;
+        e.end.normal = on_a_line || rng.uniform() < 0.5f ? Vec3{0, 1, 0} : Vec3{0, -1, 0};
+        const Vec2 u = rng.uniform2();
+        e.end.direction = on_a_line ? Vec3{0, 1, 0} : face_forward(sample_sphere(u), e.end.normal);
+        e.weight = 0.1f + rng.uniform();
+        ends.push_back(e);
+    }
+    return ends;
+}
+
+TEST(Classifier, LabelsStayBelowTheirCountAndItsSizeIsBounded) {
+    const auto ends = random_ends(4000, 1, false);
+    for (const uint32_t subspaces : {1u, 2u, 3u, 17u, 256u, 5000u}) {
+        ClassifierOptions options;
+        options.subspaces = subspaces, options.first_label = 7, options.seed = 2;
+        const SubspaceTree tree = train_classifier(ends, options);
+        EXPECT_TRUE(tree.validate(7 + subspaces).ok()) << subspaces;
+        EXPECT_LE(tree.nodes().size(), size_t(64 * subspaces + 1));
+        std::vector<bool> used(subspaces, false);
+        for (const WeightedEnd& e : ends) {
+            const uint32_t label = tree.label(e.end);
+            ASSERT_GE(label, 7u);
+            ASSERT_LT(label, 7 + subspaces);
+            used[label - 7] = true;
+        }
+        if (subspaces <= 256) {
+            EXPECT_GT(std::count(used.begin(), used.end(), true), 8 * int(subspaces) / 10);
+        }
+        // The same again.
+        const SubspaceTree again = train_classifier(ends, options);
+        ASSERT_EQ(again.nodes().size(), tree.nodes().size());
+        EXPECT_EQ(std::memcmp(again.nodes().data(), tree.nodes().data(), tree.nodes().size() * sizeof(SubspaceTree::Node)), 0);
+    }
+}
+
+/// Neighbouring numbers are neighbours in space: on a line they ascend with it, and dropping lower bits coarsens.
+TEST(Classifier, LabelsAreNested) {
+    auto ends = random_ends(5000, 3, true);
+    ClassifierOptions options;
+    options.subspaces = 64, options.seed = 4;
+    const SubspaceTree tree = train_classifier(ends, options);
+    std::sort(ends.begin(), ends.end(), [](const WeightedEnd& a, const WeightedEnd& b) { return a.end.position.x < b.end.position.x; });
+    uint32_t previous = 0;
+    for (const WeightedEnd& e : ends) {
+        const uint32_t label = tree.label(e.end);
+        EXPECT_GE(label, previous);
+        previous = std::max(previous, label);
+    }
+    EXPECT_GT(previous, 40u);
+
+    // In space: two ends of one coarse class are nearer than two of any, and coarser classes are wider.
+    const auto cloud = random_ends(3000, 5, false);
+    const SubspaceTree in_space = train_classifier(cloud, options);
+    double last = 0;
+    for (const uint32_t bits : {0u, 2u, 4u, 6u}) {
+        double sum = 0, pairs = 0;
+        for (size_t i = 0; i < cloud.size(); i += 3)
+            for (size_t j = i + 1; j < cloud.size(); j += 5) {
+                if (in_space.label(cloud[i].end) >> bits != in_space.label(cloud[j].end) >> bits) continue;
+                sum += double(length_squared(cloud[i].end.position - cloud[j].end.position) +
+                              length_squared(cloud[i].end.normal - cloud[j].end.normal));
+                pairs += 1;
+            }
+        EXPECT_GT(sum / pairs, last) << bits;
+        last = sum / pairs;
+    }
+}
+
+TEST(Classifier, SurvivesWhatCannotBeTrained) {
+    ClassifierOptions options;
+    options.subspaces = 100, options.first_label = 3;
+    const auto only_label = [&](const std::vector<WeightedEnd>& ends) {
+        const SubspaceTree tree = train_classifier(ends, options);
+        EXPECT_TRUE(tree.validate(103).ok());
+        return tree.label({{0, 0, 0}, {0, 1, 0}, {0, 1, 0}});
+    };
+    EXPECT_EQ(only_label({}), 3u);
+    auto weightless = random_ends(50, 6, false);
+    for (WeightedEnd& e : weightless) e.weight = 0;
+    EXPECT_EQ(only_label(weightless), 3u);
+    const auto one = random_ends(1, 7, false);
+    EXPECT_EQ(only_label(one), 3u);
+    EXPECT_EQ(only_label(std::vector<WeightedEnd>(500, one[0])), 3u);
+    // All the light in one place.
+    auto spike = random_ends(500, 8, false);
+    spike[17].weight = 1e30f;
+    only_label(spike);
+}
+
+}  // namespace
+}  // namespace lightloom
