@@ -332,7 +332,9 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
         case UnitTable::Completion::kFirst: break;
     }
     job->training_bytes += payload.size();
-    if (job->training_bytes > options_.training_bytes) {
+    // Units differ little in size: a set that is far too large shows before hours were spent on it.
+    const double projected = double(job->training_bytes) * units->group_total() / double(units->done_count());
+    if (job->training_bytes > options_.training_bytes || projected > 1.25 * double(options_.training_bytes)) {
         fail_job(*job, {StatusCode::kResourceExhausted, "the training data need more than the " + std::to_string(options_.training_bytes >> 20) +
                                                             " MiB that a job may have; choose fewer training-paths"});
         return SubmitAck{SubmitOutcome::kRejected, job->message};
