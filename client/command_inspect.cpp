@@ -8,8 +8,11 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "client/commands.h"
+#include "client/inspect_tables.h"
+#include "client/job_options.h"
 #include "common/import/import.h"
 #include "common/scene/scene.h"
 
@@ -17,7 +20,7 @@ namespace lightloom::client {
 namespace {
 
 struct Options {
-    std::string scene, json;
+    std::string scene, json, tables, draw;
     bool strict = false, quiet = false;
 };
 
@@ -128,9 +131,20 @@ int run(const Options& options) {
     const SceneDescription& description = (*scene)->description();
     const SceneSummary& summary = (*scene)->summary();
     if (!options.quiet) print(description, summary, options.scene, imported->files.size(), seconds);
+    std::optional<TableFile> tables;
+    if (!options.tables.empty()) {
+        auto read = read_tables(options.tables, **scene);
+        if (!read.ok()) return report_error(read.status());
+        tables = *std::move(read);
+        if (!options.quiet) print(*tables);
+        if (!options.draw.empty())
+            if (const Status s = draw(*tables, **scene, options.draw); !s.ok()) return report_error(s);
+    }
     if (!options.json.empty()) {
+        nlohmann::json out = describe(description, summary, imported->files, seconds);
+        if (tables) out["tables"] = describe(*tables);
         std::ofstream file(options.json);
-        file << describe(description, summary, imported->files, seconds).dump(2) << "\n";
+        file << out.dump(2) << "\n";
         file.close();
         if (!file) {
             std::fprintf(stderr, "cannot write %s; check that its folder exists and is writable\n",
@@ -151,6 +165,13 @@ void add_inspect_command(CLI::App& app, int* exit_code) {
                            "memory, and everything in the file that is ignored");
     command->add_option("scene", options->scene, "The .pbrt file")->required();
     command->add_option("--json", options->json, "Write the same as JSON to this file");
+    auto* tables = command->add_option("--tables", options->tables,
+                                       "Also show the learned tables in this file: KEY.tables of a table cache, KEY being "
+                                       "tables.cache_key of a manifest");
+    command->add_option("--draw", options->draw,
+                        "Write PREFIX-kappa-eye.png, -kappa-light.png, -gamma.png and -q.png: subspaces of what the camera sees, "
+                        "connection matrix, energies")
+        ->needs(tables);
     command->add_flag("--strict", options->strict, "Treat every ignored thing as an error");
     command->add_flag("--quiet", options->quiet, "Print nothing on success");
     command->callback([options, exit_code] { *exit_code = run(*options); });

@@ -3,8 +3,11 @@
 #include <tbb/global_control.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <thread>
 
 #include "client/commands.h"
@@ -38,7 +41,19 @@ struct ScratchDirectory {
     }
 };
 
-int render(const JobOptions& options, uint32_t threads, uint32_t worker_count) {
+/// Where tables of earlier renders are kept.
+struct TableCacheOptions {
+    std::string directory;
+    uint64_t megabytes = 1024;
+};
+
+std::string default_table_cache() {
+    if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache) return std::string(cache) + "/lightloom/tables";
+    if (const char* home = std::getenv("HOME"); home && *home) return std::string(home) + "/.cache/lightloom/tables";
+    return "off";
+}
+
+int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, const TableCacheOptions& cache) {
     (void)interrupt_token();
     if (Status s = check_outputs(options); !s.ok()) return report_error(s);
     auto scene = load_scene(options);
@@ -57,7 +72,26 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count) {
     coordinator_options.directory = scratch.path;
     coordinator_options.identity = *identity;
     coordinator_options.scene_files_needed = false;
-    coordinator_options.read_scene = [&](const AssetStore&, const JobSpec&, std::stop_token) { return facts; };
+    // Everybody in this process shares the one scene; it is built when somebody asks for it. A build takes the description over, so
+    // its failure is final: a second attempt would build and render an empty scene.
+    std::mutex build_mutex;
+    std::optional<Result<std::shared_ptr<const Scene>>> built_scene;
+    const auto build_scene = [&]() -> Result<std::shared_ptr<const Scene>> {
+        const std::lock_guard only_one(build_mutex);
+        if (!built_scene) {
+            auto built = Scene::build(std::move(scene->imported.description), {.width = spec->width, .height = spec->height});
+            built_scene = built.ok() ? Result<std::shared_ptr<const Scene>>(std::shared_ptr<const Scene>(std::move(built).value()))
+                                     : Result<std::shared_ptr<const Scene>>(built.status());
+        }
+        return *built_scene;
+    };
+    coordinator_options.read_scene = [&](const AssetStore&, const JobSpec&, std::stop_token) {
+        auto answer = facts;
+        answer->build_scene = build_scene;
+        return answer;
+    };
+    if (cache.directory != "off") coordinator_options.table_cache = cache.directory;
+    coordinator_options.table_cache_bytes = cache.megabytes << 20;
     // A worker of this process cannot get lost, but its machine may be suspended.
     coordinator_options.lease_seconds = 3600;
     Coordinator coordinator(std::move(coordinator_options));
@@ -65,22 +99,15 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count) {
     LocalWorkerPort work(coordinator);
     if (Status s = jobs.upload_bytes(spec->scene_root, scene->manifest.canonical_text()); !s.ok()) return report_error(s);
 
-    // All workers share the one scene; it is built when the first unit asks for it. A build takes the description over, so
-    // its failure is final: a second attempt would build and render an empty scene.
-    Status build_failure;
-    RendererCache renderers([&](const JobSpec& job, std::stop_token) -> Result<std::shared_ptr<const Scene>> {
-        if (!build_failure.ok()) return build_failure;
-        auto built = Scene::build(std::move(scene->imported.description), {.width = job.width, .height = job.height});
-        if (!built.ok()) return build_failure = built.status();
-        return std::shared_ptr<const Scene>(std::move(built).value());
-    });
+    RendererCache renderers([&](const JobSpec&, std::stop_token) { return build_scene(); }, direct_tables(work));
     std::vector<std::unique_ptr<Worker>> workers;
     std::vector<std::jthread> running;
     for (uint32_t i = 0; i < worker_count; ++i) {
         workers.push_back(std::make_unique<Worker>(
             work,
             WorkerOptions{.identity = *identity, .thread_count = threads, .host = "embedded", .process_id = uint64_t(::getpid())},
-            [&](const JobSpec& job, std::stop_token stop) { return renderers.renderer(job, stop); }));
+            [&](const UnitLease& lease, std::stop_token stop) { return renderers.renderer(lease, stop); },
+            [&](const JobSpec& job, std::stop_token stop) { return renderers.tracer(job, stop); }));
         running.emplace_back([worker = workers.back().get()](std::stop_token stop) { (void)worker->run(stop); });
     }
     ClientTimes times{.import_seconds = scene->import_seconds, .digest_seconds = scene->digest_seconds};
@@ -101,6 +128,7 @@ void add_render_command(CLI::App& app, int* exit_code) {
     struct Options {
         JobOptions job;
         uint32_t threads = 0, workers = 1;
+        TableCacheOptions cache{.directory = default_table_cache()};
     };
     auto options = std::make_shared<Options>();
     CLI::App* command = app.add_subcommand("render", "Render a scene on this machine");
@@ -111,10 +139,15 @@ void add_render_command(CLI::App& app, int* exit_code) {
         ->check(CLI::Range(1, 1024));
     command->add_option("--workers", options->workers, "Embedded workers; the bytes do not depend on it")
         ->check(CLI::Range(1, 256))->capture_default_str();
+    command->add_option("--table-cache", options->cache.directory,
+                        "Directory in which learned tables are kept for the next render, or off")
+        ->envname("LIGHTLOOM_TABLE_CACHE")->capture_default_str();
+    command->add_option("--table-cache-size", options->cache.megabytes, "MB that it may hold; the tables used least recently go first")
+        ->check(CLI::Range(uint64_t(1), uint64_t(1) << 30))->capture_default_str();
     command->callback([options, exit_code] {
         uint32_t threads = options->threads;
         if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency() / options->workers);
-        *exit_code = render(options->job, threads, options->workers);
+        *exit_code = render(options->job, threads, options->workers, options->cache);
     });
 }
 

@@ -14,6 +14,7 @@
 #include "common/film/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "common/film/png.h"
+#include "server/results.h"
 
 namespace lightloom::client {
 namespace {
@@ -32,7 +33,7 @@ std::string random_id() {
 
 Status write_statistics(const std::string& path, const JobInfo& job, const Digest& digest, const ClientTimes& times) {
     const double seconds = job.render_seconds > 0 ? job.render_seconds : 1e-9;
-    const Json json = {
+    Json json = {
         {"job", job.job_id},
         {"algorithm", job.spec.algorithm},
         {"state", to_string(job.state)},
@@ -59,6 +60,7 @@ Status write_statistics(const std::string& path, const JobInfo& job, const Diges
         {"dropped_samples", job.dropped_samples},
         {"duplicates_same", job.duplicates_same},
         {"duplicates_different", job.duplicates_different}};
+    if (job.tables.asset.size_bytes > 0) json["tables"] = to_json(job.tables);
     return write_file_atomically(path, json.dump(1) + "\n");
 }
 

@@ -51,13 +51,17 @@ Status no_job(const std::string& id) {
 
 Coordinator::Coordinator(CoordinatorOptions options)
     : options_(std::move(options)), assets_(options_.directory / "assets"),
+      table_cache_(options_.table_cache, options_.table_cache_bytes),
       ticker_([this](std::stop_token stop) { tick(stop); }) {}
 
 Coordinator::~Coordinator() {
     {
         const std::lock_guard lock(mutex_);
         closing_ = true;
-        for (const auto& job : jobs_) job->prepare_task.request_stop();
+        for (const auto& job : jobs_) {
+            job->prepare_task.request_stop();
+            job->train_task.request_stop();
+        }
     }
     work_changed_.notify_all();
     job_changed_.notify_all();
@@ -175,6 +179,7 @@ Result<JobInfo> Coordinator::cancel_job(const std::string& job_id) {
     if (!job) return no_job(job_id);
     if (!is_terminal(job->state)) {
         job->prepare_task.request_stop();
+        job->train_task.request_stop();
         end_job(*job, JobState::kCancelled);
     }
     return snapshot(*job);
@@ -266,6 +271,15 @@ JobInfo Coordinator::snapshot(const JobRecord& job) const {
     info.image_size_bytes = job.image_size;
     info.duplicates_same = job.duplicates_same;
     info.duplicates_different = job.duplicates_different;
+    info.tables = job.tables;
+    info.phase = job.phase;
+    if (job.training) {
+        info.unit_leased = job.training->leased_count();
+        info.phase_total = job.training_samples;
+        info.phase_done = std::min(info.phase_total, job.training->done_count() * kTrainingUnitSamples);
+        if (job.phase == PreparePhase::kTracing && info.phase_done > 0)
+            info.eta_seconds = seconds_between(job.training_begin, now) * double(info.phase_total - info.phase_done) / double(info.phase_done);
+    }
     return info;
 }
 
@@ -278,6 +292,7 @@ void Coordinator::end_job(JobRecord& job, JobState state) {
         discarded_.push_back(std::make_shared<UnitTable>(*std::move(job.units)));
         job.units.reset();
     }
+    discard_training(job);
     if (job.reducer) discarded_.push_back(std::move(job.reducer));
     discarded_.push_back(std::make_shared<std::vector<ImageLayer>>(std::move(job.layers)));
     job.reducer.reset();
@@ -292,7 +307,8 @@ void Coordinator::fail_job(JobRecord& job, const Status& why) {
 }
 
 void Coordinator::unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Failures failures, const Status& why) {
-    const std::string unit = std::to_string(key.group) + "/" + std::to_string(key.tile);
+    const std::string unit = key.kind == UnitKind::kRender ? std::to_string(key.group) + "/" + std::to_string(key.tile)
+                                                           : "of training " + std::to_string(key.group);
     spdlog::warn("{}: unit {} failed ({}): {}", job.id, unit, failures.total, why.message());
     // Units are pure functions: what is wrong with the request is wrong on every worker.
     if (failures.workers >= kMaxFailedWorkers || failures.total >= kMaxUnitFailures || why.code() == StatusCode::kInvalidArgument)
@@ -321,8 +337,9 @@ void Coordinator::tick(std::stop_token stop) {
         work_changed_.wait_for(lock, kTick);
         const TimePoint now = options_.clock();
         for (const auto& job : jobs_) {
-            if (job->state != JobState::kRunning) continue;
-            const size_t expired = job->units->expire(now);
+            UnitTable* const units = open_table(*job);
+            if (!units) continue;
+            const size_t expired = units->expire(now);
             if (expired > 0) {
                 job->expired_leases += expired;
                 spdlog::warn("{}: {} lease(s) ran out; the units go to other workers", job->id, expired);

@@ -1,6 +1,7 @@
 #pragma once
-// Coordinator: accepts jobs, leases their units to workers, merges what comes back exactly once, and writes the image. It knows
-// neither gRPC nor light transport; time comes from an injected clock. Safe for any number of threads.
+// Coordinator: accepts jobs, leases their units to workers, merges what comes back exactly once, and writes the image. Before that
+// it has workers trace the training set of algorithms that need tables, and learns these. It knows neither gRPC nor light
+// transport; time comes from an injected clock. Safe for any number of threads.
 
 #include <condition_variable>
 #include <filesystem>
@@ -13,8 +14,10 @@
 
 #include "common/film/exr_io.h"
 #include "common/film/partial_exr.h"
+#include "common/tables/training_data.h"
 #include "common/work/service.h"
 #include "server/reducer.h"
+#include "server/table_cache.h"
 #include "server/unit_table.h"
 
 namespace lightloom {
@@ -25,6 +28,8 @@ struct SceneFacts {
     float exposure_scale = 1;  ///< Multiplies the developed image.
     int max_depth = 5;         ///< Bounces, if the job leaves them to the scene.
     std::vector<ImageLayer> layers;  ///< First-hit layers, if the job asks for them.
+    /// The built scene, of which learning needs the lights. Called once, and only for a job whose tables have to be made.
+    std::function<Result<std::shared_ptr<const Scene>>()> build_scene;
 };
 
 using SceneReader = std::function<Result<SceneFacts>(const AssetStore& assets, const JobSpec& spec, std::stop_token stop)>;
@@ -39,6 +44,9 @@ struct CoordinatorOptions {
     std::optional<uint64_t> shuffle_seed;          ///< Lease units in a random order (tests).
     std::function<TimePoint()> clock = [] { return std::chrono::steady_clock::now(); };
     uint64_t waiting_bytes = uint64_t(512) << 20;  ///< Room for partials that wait for earlier groups.
+    std::filesystem::path table_cache;             ///< Tables of earlier jobs; empty: none are kept.
+    uint64_t table_cache_bytes = uint64_t(4) << 30;
+    uint64_t training_bytes = uint64_t(4) << 30;   ///< Room for the training data of one job.
     size_t max_jobs = 10000;  ///< That have not ended.
     size_t kept_jobs = 1000;  ///< Ended jobs that are remembered; the oldest are forgotten, their files stay.
 };
@@ -85,6 +93,11 @@ class Coordinator {
     /// A partial of this process. `digest` is its payload's.
     Result<SubmitAck> submit_partial(const std::string& worker_id, const UnitReference& unit, const Digest& digest,
                                      Partial partial);
+    /// What the training data of a unit may be at most; errors as those of expected_partial().
+    Result<uint64_t> expected_training_bytes(const UnitReference& unit) const;
+    /// Training data, serialized; checked against digest and unit before they count.
+    Result<SubmitAck> submit_training(const std::string& worker_id, const UnitReference& unit, const Digest& digest,
+                                      std::string_view payload, double trace_seconds);
     std::vector<WorkerStatus> workers() const;
 
   private:
@@ -103,7 +116,21 @@ class Coordinator {
     void fail_job(JobRecord& job, const Status& why);
     void end_job(JobRecord& job, JobState state);
     void prepare(JobRecord& job, std::stop_token stop);
-    void plan_units(JobRecord& job, JobSpec spec, SceneFacts facts);
+    void plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables);
+    void prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts);
+    void open_training(JobRecord& job, UnitKind kind, uint64_t samples);
+    void make_tables(JobRecord& job, std::stop_token stop);
+    Status learn(JobRecord& job, std::stop_token stop);
+    Result<TrainingData> collect_training(JobRecord& job, size_t emitter_count, std::stop_token stop);
+    Status choose_training_samples(JobRecord& job, const TrainingData& probe, const Scene& scene, std::stop_token stop);
+    bool adopt_cached_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts);
+    Status adopt_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts, std::string_view bytes, TablesInfo tables);
+    bool repair_tables(const std::string& job_id);
+    void discard_training(JobRecord& job);
+    /// The open units of a kind, or null.
+    static UnitTable* table_for(JobRecord& job, UnitKind kind);
+    /// The units that can be leased now, or null.
+    static UnitTable* open_table(JobRecord& job);
     void size_window(JobRecord& job) const;
     void finish(JobRecord& job);
     void write_results(JobRecord& job);
@@ -115,6 +142,8 @@ class Coordinator {
 
     const CoordinatorOptions options_;
     AssetStore assets_;
+    const TableCache table_cache_;
+    std::mutex repair_mutex_;  ///< Before mutex_.
     mutable std::mutex mutex_;
     mutable std::condition_variable work_changed_, job_changed_;
     std::vector<std::shared_ptr<JobRecord>> jobs_;            // oldest first

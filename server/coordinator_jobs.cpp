@@ -34,41 +34,47 @@ void Coordinator::prepare(JobRecord& job, std::stop_token stop) {
         spec = job.spec;
     }
     auto facts = options_.read_scene(assets_, spec, stop);
+    Status problem = facts.status();
     if (facts.ok()) {
-        plan_units(job, std::move(spec), *std::move(facts));
+        const Rect& crop = facts->frame.crop;
+        if (crop.empty() || crop.area() > kMaxPartialPixels)
+            problem = invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) + " pixels");
+    }
+    if (problem.ok()) {
+        const auto algorithm = find_algorithm(spec.algorithm);
+        const auto parameters = parse_parameters(**algorithm, spec.parameters);
+        spec.frame = facts->frame;
+        spec.parameters = complete_parameters(**algorithm, *parameters);
+        if (spec.max_depth < 0) spec.max_depth = facts->max_depth;
+        if ((*algorithm)->needs_tables) {
+            prepare_tables(job, std::move(spec), *std::move(facts));
+        } else {
+            plan_units(job, std::move(spec), *std::move(facts), {});
+        }
     } else {
         const std::lock_guard lock(mutex_);
-        fail_job(job, facts.status());
+        fail_job(job, problem);
     }
     const std::lock_guard lock(mutex_);
     --job.running_tasks;
 }
 
-void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts) {
+void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables) {
     const FrameLayout frame = facts.frame;
-    Status problem;
-    if (frame.crop.empty() || frame.crop.area() > kMaxPartialPixels)
-        problem = invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) + " pixels");
     const auto algorithm = find_algorithm(spec.algorithm);
     const auto parameters = parse_parameters(**algorithm, spec.parameters);
-    spec.frame = frame;
-    spec.parameters = complete_parameters(**algorithm, *parameters);
-    if (spec.max_depth < 0) spec.max_depth = facts.max_depth;
-
+    const Plan plan(frame, light_paths_per_pixel(**algorithm, *parameters));
+    const double unit_light_paths = light_paths_per_pixel(**algorithm, *parameters) * plan.max_group_iterations() *
+                                    double(frame.crop.area()) / plan.tile_count();
     // Gigabytes for a large frame: made before anybody has to wait for the mutex.
     std::optional<UnitTable> units;
+    units.emplace(plan, spec.samples_per_pixel, 1, options_.shuffle_seed);
     std::shared_ptr<Reducer> reducer;
-    double unit_light_paths = 0;
-    if (problem.ok()) {
-        const Plan plan(frame, light_paths_per_pixel(**algorithm, *parameters));
-        unit_light_paths = light_paths_per_pixel(**algorithm, *parameters) * plan.max_group_iterations() *
-                           double(frame.crop.area()) / plan.tile_count();
-        units.emplace(plan, spec.samples_per_pixel, 1, options_.shuffle_seed);
-        try {
-            reducer = std::make_shared<Reducer>(frame, plan.tile_count());
-        } catch (const std::bad_alloc&) {  // one job too large must not end the coordinator and all others
-            problem = {StatusCode::kResourceExhausted, "the coordinator has no memory for the sums of a frame this large"};
-        }
+    Status problem;
+    try {
+        reducer = std::make_shared<Reducer>(frame, plan.tile_count());
+    } catch (const std::bad_alloc&) {  // one job too large must not end the coordinator and all others
+        problem = {StatusCode::kResourceExhausted, "the coordinator has no memory for the sums of a frame this large"};
     }
 
     const std::lock_guard lock(mutex_);
@@ -81,6 +87,8 @@ void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts) {
     job.units = std::move(units);
     job.reducer = std::move(reducer);
     job.unit_light_paths = unit_light_paths;
+    job.tables = std::move(tables);
+    discard_training(job);
     size_window(job);
     job.state = JobState::kRunning;
     spdlog::info("{}: {}x{}, {} tile(s), {} unit(s)", job.id, frame.crop.width(), frame.crop.height(),

@@ -10,8 +10,6 @@ namespace {
 /// A worker may hold one unit beside the one that it renders, so that it does not idle between two.
 constexpr size_t kMaxHeld = 2;
 
-Status no_worker(const std::string& id) { return not_found("unknown worker " + id + "; register again"); }
-
 std::string describe(const BuildIdentity& identity) {
     return "build " + identity.build_id + ", math profile \"" + identity.math_profile + "\", golden unit " +
            identity.golden_digest.hex().substr(0, 16);
@@ -57,12 +55,20 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
         for (const auto& other : workers_) idle += other->held.empty() && other->waiting > 0;
     }
     for (const auto& job : jobs_) {
-        if (job->state != JobState::kRunning) continue;
-        if (!worker.held.empty() && !job->units->has_more_than(idle)) continue;
-        const auto unit = job->units->lease(worker.index, after(options_.lease_seconds));
+        UnitTable* const units = open_table(*job);
+        if (!units || (!worker.held.empty() && !units->has_more_than(idle))) continue;
+        const auto unit = units->lease(worker.index, after(options_.lease_seconds));
         if (!unit) continue;
         worker.held.insert({job->id, unit->key});
-        return UnitLease{job->id, job->spec, *unit};
+        if (unit->key.kind == UnitKind::kRender) return UnitLease{job->id, job->spec, *unit, job->tables.asset};
+        if (job->training_begin == TimePoint()) {
+            // Only a job that workers have begun with takes a thread and a built scene; both are made while paths are traced.
+            job->training_begin = options_.clock();
+            ++job->running_tasks;
+            JobRecord& record = *job;
+            job->train_task = std::jthread([this, &record](std::stop_token stop) { make_tables(record, stop); });
+        }
+        return UnitLease{job->id, job->spec, *unit, {}};
     }
     return std::nullopt;
 }
@@ -101,13 +107,13 @@ Result<std::vector<UnitReference>> Coordinator::heartbeat(const std::string& wor
     std::set<UnitReference> held;
     for (const RunningUnit& item : running) {
         const auto job = find_job(item.unit.job_id);
-        if (!job || job->state != JobState::kRunning ||
-            !job->units->renew(item.unit.key, worker->index, after(options_.lease_seconds))) {
+        UnitTable* const units = job ? table_for(*job, item.unit.key.kind) : nullptr;
+        if (!units || !units->renew(item.unit.key, worker->index, after(options_.lease_seconds))) {
             revoked.push_back(item.unit);
             continue;
         }
         held.insert(item.unit);
-        if (item.rendering && !job->rendering) {
+        if (item.rendering && item.unit.key.kind == UnitKind::kRender && !job->rendering) {
             job->rendering = true;
             job->first_render = options_.clock();
             changed(*job);
@@ -119,19 +125,22 @@ Result<std::vector<UnitReference>> Coordinator::heartbeat(const std::string& wor
 }
 
 Status Coordinator::release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why) {
+    const bool lost_bytes = why.code() == StatusCode::kDataLoss || why.code() == StatusCode::kNotFound;
+    const bool repaired = lost_bytes && repair_tables(unit.job_id);
     const std::lock_guard lock(mutex_);
     WorkerRecord* worker = find_worker(worker_id);
     if (!worker) return no_worker(worker_id);
     worker->held.erase(unit);
     const auto job = find_job(unit.job_id);
-    if (!job || job->state != JobState::kRunning) return {};
+    UnitTable* const units = job ? table_for(*job, unit.key.kind) : nullptr;
+    if (!units) return {};
     // What a network did to a worker says nothing about the unit: it costs time only.
-    const bool blameless = why.code() == StatusCode::kCancelled || why.code() == StatusCode::kUnavailable ||
+    const bool blameless = repaired || why.code() == StatusCode::kCancelled || why.code() == StatusCode::kUnavailable ||
                            why.code() == StatusCode::kDeadlineExceeded || why.code() == StatusCode::kAborted;
     if (why.ok() || blameless) {
-        job->units->release(unit.key, worker->index);
+        units->release(unit.key, worker->index);
     } else {
-        const UnitTable::Failures failures = job->units->fail(unit.key, worker->index);
+        const UnitTable::Failures failures = units->fail(unit.key, worker->index);
         unit_failed(*job, unit.key, failures, why);
     }
     work_changed_.notify_all();
@@ -143,7 +152,7 @@ Status Coordinator::goodbye(const std::string& worker_id) {
     WorkerRecord* worker = find_worker(worker_id);
     if (!worker) return no_worker(worker_id);
     for (const auto& job : jobs_) {
-        if (job->units) job->units->release_all(worker->index);
+        if (UnitTable* const units = open_table(*job)) units->release_all(worker->index);
     }
     worker->held.clear();
     worker->left = true;
@@ -157,7 +166,7 @@ Result<PartialExpectation> Coordinator::expected_partial(const UnitReference& re
     const auto job = find_job(reference.job_id);
     if (!job || job->state != JobState::kRunning)
         return not_found("job " + reference.job_id + " is not running (any more)");
-    const auto unit = job->units->find(reference.key);
+    const auto unit = reference.key.kind == UnitKind::kRender ? job->units->find(reference.key) : std::nullopt;
     if (!unit) return invalid_argument("job " + reference.job_id + " has leased no such unit");
     return PartialExpectation{job->spec.frame, unit->tile, unit->iteration_count, unit->light_path_count};
 }

@@ -53,9 +53,23 @@ struct Coordinator::JobRecord {
     Digest image_digest;
     uint64_t image_size = 0;
     std::filesystem::path directory;
-    std::jthread prepare_task, finish_task;
+    PreparePhase phase = PreparePhase::kReadingScene;
+    SceneFacts facts;                   ///< From the reading of the scene until the units are planned.
+    std::optional<UnitTable> training;  ///< Units of kind `training_kind`, in kPreparing.
+    UnitKind training_kind = UnitKind::kTraining;
+    uint64_t training_samples = 0;
+    std::vector<std::optional<TrainingData>> training_parts;  ///< By unit.
+    uint64_t training_bytes = 0;        ///< Of these.
+    double traced_seconds = 0;          ///< Of the workers, over these.
+    bool capped_by_time_limit = false;
+    TimePoint training_begin;           ///< The first training unit was leased; unset before.
+    TablesInfo tables;
+
+    std::jthread prepare_task, train_task, finish_task;
     int running_tasks = 0;  ///< Of these. A job is forgotten only without any, so that nobody waits for one under the mutex.
 };
+
+inline Status no_worker(const std::string& id) { return not_found("unknown worker " + id + "; register again"); }
 
 inline constexpr size_t kMaxDroppedPerJob = 64;
 /// A unit that failed on this many workers fails its job: it is the unit, not the workers.

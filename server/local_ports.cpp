@@ -69,6 +69,11 @@ Result<SubmitAck> LocalWorkerPort::submit_result(const std::string& worker_id, c
                                        std::move(partial));
 }
 
+Result<SubmitAck> LocalWorkerPort::submit_training(const std::string& worker_id, const UnitLease& lease, std::string_view payload,
+                                                   double trace_seconds) {
+    return coordinator_.submit_training(worker_id, lease.reference(), sha256(payload), payload, trace_seconds);
+}
+
 Status LocalWorkerPort::release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why) {
     return coordinator_.release_unit(worker_id, unit, why);
 }

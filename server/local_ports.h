@@ -34,6 +34,8 @@ class LocalWorkerPort final : public WorkerPort {
                                                  const std::vector<RunningUnit>& running) override;
     Result<SubmitAck> submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial,
                                     double render_seconds) override;
+    Result<SubmitAck> submit_training(const std::string& worker_id, const UnitLease& lease, std::string_view payload,
+                                      double trace_seconds) override;
     Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why) override;
     Status goodbye(const std::string& worker_id) override;
     Status read_asset(const Digest& digest, uint64_t offset,

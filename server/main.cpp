@@ -42,6 +42,7 @@ int main(int argc, char** argv) {
     app.footer(kFooter);
     std::string listen = "127.0.0.1:50051", data = "lightloom-data", status = "127.0.0.1:9464", level = "info", port_file;
     double lease = 10;
+    uint64_t table_cache_mb = 4096;
     bool plaintext = false;
     std::optional<uint64_t> shuffle;
     app.add_option("--listen", listen, "HOST:PORT for clients and workers; port 0 picks a free one")->capture_default_str();
@@ -49,6 +50,8 @@ int main(int argc, char** argv) {
     app.add_option("--status", status, "HOST:PORT of the status page (/healthz, /api/v1/status), or off")->capture_default_str();
     app.add_option("--lease", lease, "Seconds without a heartbeat after which a unit goes to another worker")
         ->check(CLI::Range(0.2, 3600.0))->capture_default_str();
+    app.add_option("--table-cache-size", table_cache_mb, "MB of learned tables that are kept in --data for later jobs; 0 keeps none")
+        ->capture_default_str();
     app.add_option("--port-file", port_file, "Write \"GRPC_PORT STATUS_PORT\" here once both listen");
     app.add_flag("--allow-plaintext", plaintext, "Listen on other than loopback addresses");
     app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
@@ -84,6 +87,8 @@ int main(int argc, char** argv) {
     options.lease_seconds = lease;
     options.heartbeat_seconds = std::min(1.0, lease / 4);
     options.shuffle_seed = shuffle;
+    if (table_cache_mb > 0) options.table_cache = std::filesystem::path(data) / "tables";
+    options.table_cache_bytes = table_cache_mb << 20;
     std::error_code error;
     std::filesystem::create_directories(data, error);
     if (error) {

@@ -27,6 +27,24 @@ std::string shell_word(const std::string& word) {
 
 }  // namespace
 
+Json to_json(const TablesInfo& t) {
+    return {{"sha256", t.asset.digest.hex()},
+            {"size_bytes", t.asset.size_bytes},
+            {"cache_key", t.cache_key.hex()},
+            {"from_cache", t.from_cache},
+            {"light_subspaces", t.light_subspaces},
+            {"eye_subspaces", t.eye_subspaces},
+            {"training_samples", t.training_samples},
+            {"capped_by_time_limit", t.capped_by_time_limit},
+            {"seconds",
+             {{"trace", t.trace_seconds},
+              {"classifiers", t.classifier_seconds},
+              {"energy", t.energy_seconds},
+              {"gamma", t.gamma_seconds}}},
+            {"held_out_loss", {{"uniform", t.uniform_loss}, {"tables", t.loss}, {"prior_strength", t.prior_strength}}},
+            {"note", t.note}};
+}
+
 std::string replay_command(const JobSpec& spec, const std::string& scene, const ManifestDropped& dropped) {
     const DroppedSample& sample = dropped.sample;
     const int width = spec.frame.crop.width();
@@ -72,6 +90,7 @@ std::string to_json(const Manifest& m) {
                      {"finished", m.finished_at},
                      {"prepare_seconds", m.job.prepare_seconds},
                      {"render_seconds", m.job.render_seconds}};
+    if (m.job.tables.asset.size_bytes > 0) json["tables"] = to_json(m.job.tables);
     json["work"] = {{"camera_samples", m.job.camera_samples},
                     {"light_paths", m.job.light_paths},
                     {"rays", m.job.rays},

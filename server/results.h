@@ -3,6 +3,7 @@
 // it the manifest, which also holds when, where and by whom it was rendered.
 
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,8 @@ struct Manifest {
 
 /// Command line for a shell that renders one dropped sample again; its unit for a splat, which is known only by where it would have landed.
 std::string replay_command(const JobSpec& spec, const std::string& scene, const ManifestDropped& dropped);
+/// Tables as manifests and statistics show them.
+nlohmann::ordered_json to_json(const TablesInfo& tables);
 /// The manifest as JSON text.
 std::string to_json(const Manifest& manifest);
 

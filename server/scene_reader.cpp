@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "common/scene/scene.h"
+#include "common/transport/catalog.h"
 #include "common/transport/first_hit.h"
 
 namespace lightloom {
@@ -10,7 +11,7 @@ namespace lightloom {
 Result<SceneFacts> scene_facts(const SceneDescription& description, const JobSpec& spec) {
     const auto frame = frame_layout(description.film, {.width = spec.width, .height = spec.height});
     if (!frame.ok()) return frame.status();
-    SceneFacts facts{*frame, description.film.exposure_scale, description.max_depth, {}};
+    SceneFacts facts{*frame, description.film.exposure_scale, description.max_depth, {}, {}};
     if (spec.first_hit_layers) {
         const auto scene = Scene::build(description, {.width = spec.width, .height = spec.height});
         if (!scene.ok()) return scene.status();
@@ -35,7 +36,17 @@ SceneReader make_scene_reader(std::filesystem::path scratch) {
                                  : Result<ImportedScene>(status);
         std::filesystem::remove_all(directory, error);
         if (!scene.ok()) return scene.status();
-        return scene_facts(scene->description, spec);
+        auto facts = scene_facts(scene->description, spec);
+        if (!facts.ok()) return facts;
+        const auto algorithm = find_algorithm(spec.algorithm);
+        if (!algorithm.ok() || !(*algorithm)->needs_tables) return facts;
+        const auto description = std::make_shared<SceneDescription>(std::move(scene->description));
+        facts->build_scene = [description, width = spec.width, height = spec.height]() -> Result<std::shared_ptr<const Scene>> {
+            auto built = Scene::build(std::move(*description), {.width = width, .height = height});
+            if (!built.ok()) return built.status();
+            return std::shared_ptr<const Scene>(std::move(built).value());
+        };
+        return facts;
     };
 }
 

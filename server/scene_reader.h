@@ -6,7 +6,7 @@
 
 namespace lightloom {
 
-/// The facts of an imported scene at the resolution of `spec`.
+/// The facts of an imported scene at the resolution of `spec`, but for what builds it.
 Result<SceneFacts> scene_facts(const SceneDescription& description, const JobSpec& spec);
 
 /// A reader that lays the scene's files out below `scratch` and imports them, so that a scene with an error fails its job

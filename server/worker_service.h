@@ -20,11 +20,17 @@ class WorkerServiceImpl final : public v1::WorkerService::Service {
                            v1::HeartbeatResponse* response) override;
     grpc::Status SubmitResult(grpc::ServerContext*, grpc::ServerReader<v1::SubmitResultRequest>* reader,
                               v1::SubmitResultResponse* response) override;
+    grpc::Status SubmitTraining(grpc::ServerContext*, grpc::ServerReader<v1::SubmitTrainingRequest>* reader,
+                                v1::SubmitResultResponse* response) override;
     grpc::Status ReleaseUnit(grpc::ServerContext*, const v1::ReleaseUnitRequest* request,
                              v1::ReleaseUnitResponse*) override;
     grpc::Status Goodbye(grpc::ServerContext*, const v1::GoodbyeRequest* request, v1::GoodbyeResponse*) override;
 
   private:
+    /// Takes the chunks that follow a header, `size` bytes in all.
+    template <class Request>
+    grpc::Status read_payload(grpc::ServerReader<Request>* reader, uint64_t size, std::string* payload) const;
+
     Coordinator& coordinator_;
     const std::atomic<bool>& closing_;
 };

@@ -19,6 +19,22 @@ void set_deadline(grpc::ClientContext& context, double seconds) {
                              std::chrono::duration<double>(seconds)));
 }
 
+/// `message` holds the header; the payload follows in chunks.
+template <class Request>
+grpc::Status send(grpc::ClientWriter<Request>& writer, Request& message, std::string_view payload) {
+    bool open = writer.Write(message);
+    for (size_t offset = 0; open && offset < payload.size(); offset += kMaxChunkBytes) {
+        v1::Chunk* chunk = message.mutable_chunk();
+        const std::string_view part = payload.substr(offset, kMaxChunkBytes);
+        chunk->set_offset_bytes(offset);
+        chunk->set_data(part.data(), part.size());
+        open = writer.Write(message);
+    }
+    // A stream that the coordinator closed early has its answer already; Finish() fetches it.
+    writer.WritesDone();
+    return writer.Finish();
+}
+
 }  // namespace
 
 GrpcWorkerPort::GrpcWorkerPort(const std::shared_ptr<grpc::Channel>& channel)
@@ -70,7 +86,11 @@ Result<std::vector<UnitReference>> GrpcWorkerPort::heartbeat(const std::string& 
     const grpc::Status status = worker_->Heartbeat(&context, request, &response);
     if (!status.ok()) return wire::from_grpc(status);
     std::vector<UnitReference> revoked;
-    for (const v1::UnitReference& item : response.revoked()) revoked.push_back(wire::get(item));
+    for (const v1::UnitReference& item : response.revoked()) {
+        const auto unit = wire::get(item);
+        if (!unit.ok()) return unit.status();
+        revoked.push_back(*unit);
+    }
     return revoked;
 }
 
@@ -88,17 +108,25 @@ Result<SubmitAck> GrpcWorkerPort::submit_result(const std::string& worker_id, co
     wire::put(lease.reference(), header->mutable_unit());
     wire::put(encoded->descriptor, header);
     header->set_render_seconds(render_seconds);
-    bool open = writer->Write(message);
-    const std::string& payload = encoded->payload;
-    for (size_t offset = 0; open && offset < payload.size(); offset += kMaxChunkBytes) {
-        v1::Chunk* chunk = message.mutable_chunk();
-        chunk->set_offset_bytes(offset);
-        chunk->set_data(payload.data() + offset, std::min<size_t>(kMaxChunkBytes, payload.size() - offset));
-        open = writer->Write(message);
-    }
-    // A stream that the coordinator closed early has its answer already; Finish() fetches it.
-    writer->WritesDone();
-    const grpc::Status status = writer->Finish();
+    const grpc::Status status = send(*writer, message, encoded->payload);
+    if (!status.ok()) return wire::from_grpc(status);
+    return wire::get(response);
+}
+
+Result<SubmitAck> GrpcWorkerPort::submit_training(const std::string& worker_id, const UnitLease& lease, std::string_view payload,
+                                                  double trace_seconds) {
+    grpc::ClientContext context;
+    set_deadline(context, 120 + double(payload.size()) / kSlowestBytesPerSecond);
+    v1::SubmitResultResponse response;
+    const auto writer = worker_->SubmitTraining(&context, &response);
+    v1::SubmitTrainingRequest message;
+    v1::SubmitTrainingHeader* header = message.mutable_header();
+    header->set_worker_id(worker_id);
+    wire::put(lease.reference(), header->mutable_unit());
+    wire::put(sha256(payload), header->mutable_payload_digest());
+    header->set_payload_size_bytes(payload.size());
+    header->set_trace_seconds(trace_seconds);
+    const grpc::Status status = send(*writer, message, payload);
     if (!status.ok()) return wire::from_grpc(status);
     return wire::get(response);
 }

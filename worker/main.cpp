@@ -51,7 +51,7 @@ int main(int argc, char** argv) {
     uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
     app.add_option("--server", server, "HOST:PORT of the coordinator")->capture_default_str();
     app.add_option("--threads", threads, "Threads to render with")->check(CLI::Range(1, 1024))->capture_default_str();
-    app.add_option("--cache", cache, "Directory for scene files; may be shared by the workers of a host")->capture_default_str();
+    app.add_option("--cache", cache, "Directory for scene files and tables; may be shared by the workers of a host")->capture_default_str();
     app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
     app.add_option("--pretend-golden-digest", golden_override, "")->group("");  // tests of the refusal
     try {
@@ -96,9 +96,11 @@ int main(int argc, char** argv) {
     arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2000);
     GrpcWorkerPort port(grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments));
     SceneFetcher fetcher(port, cache);
-    RendererCache renderers([&](const JobSpec& spec, std::stop_token s) { return fetcher.scene(spec, s); });
+    RendererCache renderers([&](const JobSpec& spec, std::stop_token s) { return fetcher.scene(spec, s); },
+                            [&](const AssetReference& tables, std::stop_token s) { return fetcher.tables(tables, s); });
     Worker worker(port, {.identity = *identity, .thread_count = threads, .host = host_name(), .process_id = uint64_t(::getpid())},
-                  [&](const JobSpec& spec, std::stop_token s) { return renderers.renderer(spec, s); });
+                  [&](const UnitLease& lease, std::stop_token s) { return renderers.renderer(lease, s); },
+                  [&](const JobSpec& spec, std::stop_token s) { return renderers.tracer(spec, s); });
     const Status status = worker.run(stop.get_token());
     if (!status.ok()) {
         spdlog::error("{}", status.message());

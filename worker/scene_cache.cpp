@@ -14,6 +14,8 @@ namespace {
 
 constexpr size_t kMaxScenes = 2;
 constexpr size_t kMaxRenderers = 4;
+/// A damaged copy, on disk or on its way, is thrown away and fetched again.
+constexpr int kTableAttempts = 3;
 /// The list of a scene's files; far above any real scene's.
 constexpr uint64_t kMaxManifestBytes = uint64_t(64) << 20;
 
@@ -85,14 +87,38 @@ Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, st
     return std::shared_ptr<const Scene>(std::move(scene).value());
 }
 
-Result<std::shared_ptr<const Renderer>> RendererCache::renderer(const JobSpec& spec, std::stop_token stop) {
-    const Digest image = spec.image_digest();
-    const std::lock_guard lock(mutex_);
-    for (auto item = renderer_entries_.begin(); item != renderer_entries_.end(); ++item) {
-        if (item->image != image) continue;
-        renderer_entries_.splice(renderer_entries_.begin(), renderer_entries_, item);
-        return item->renderer;
+Result<std::string> SceneFetcher::tables(const AssetReference& tables, std::stop_token stop) {
+    Status status;
+    for (int attempt = 0; attempt < kTableAttempts; ++attempt) {
+        status = fetch(tables.digest, tables.size_bytes, stop);
+        if (status.ok()) {
+            auto bytes = store_.read(tables.digest);
+            if (bytes.ok()) return bytes;
+            status = bytes.status();
+            store_.remove(tables.digest);
+        } else if (status.code() != StatusCode::kDataLoss) {
+            return status;
+        }
+        spdlog::warn("tables {} are fetched again: {}", tables.digest.hex().substr(0, 12), status.message());
     }
+    return status;
+}
+
+TableSource direct_tables(WorkerPort& port) {
+    return [&port](const AssetReference& tables, std::stop_token stop) -> Result<std::string> {
+        std::string bytes;
+        LL_RETURN_IF_ERROR(port.read_asset(tables.digest, 0, [&](std::string_view part) -> Status {
+            if (stop.stop_requested()) return {StatusCode::kCancelled, "stopped"};
+            if (part.size() > tables.size_bytes - bytes.size()) return data_loss("more bytes than announced");
+            bytes += part;
+            return {};
+        }));
+        if (sha256(bytes) != tables.digest) return data_loss("the bytes do not have the digest");
+        return bytes;
+    };
+}
+
+Result<std::shared_ptr<const Scene>> RendererCache::scene(const JobSpec& spec, std::stop_token stop) {
     std::shared_ptr<const Scene> scene;
     for (auto item = scene_entries_.begin(); item != scene_entries_.end(); ++item) {
         if (item->root != spec.scene_root || item->width != spec.width || item->height != spec.height) continue;
@@ -109,16 +135,51 @@ Result<std::shared_ptr<const Renderer>> RendererCache::renderer(const JobSpec& s
     }
     if (scene->frame() != spec.frame)
         return failed_precondition("this worker reads another frame from the scene than the coordinator did");
-    auto renderer = create_with_tables(scene, {.algorithm = spec.algorithm,
-                                             .parameters = spec.parameters,
-                                             .seed = spec.seed,
-                                             .max_depth = spec.max_depth},
-                                       stop);
+    return scene;
+}
+
+Result<std::shared_ptr<const SubspaceTables>> RendererCache::tables(const UnitLease& lease, const Scene& scene, std::stop_token stop) {
+    const AssetReference& asset = lease.tables;
+    if (asset.size_bytes == 0) return std::shared_ptr<const SubspaceTables>();
+    const auto bytes = tables_(asset, stop);
+    if (!bytes.ok()) {
+        if (bytes.status().code() == StatusCode::kCancelled) return bytes.status();
+        return Status(bytes.status().code(), "this worker cannot get the tables " + asset.digest.hex() + ": " + bytes.status().message());
+    }
+    auto tables = parse_tables(*bytes);
+    Status status = tables.ok() ? tables->validate(scene.emitters()) : tables.status();
+    if (!status.ok())
+        return failed_precondition("the tables " + asset.digest.hex() + " do not serve this scene: " + status.message());
+    return std::make_shared<const SubspaceTables>(*std::move(tables));
+}
+
+Result<std::shared_ptr<const Renderer>> RendererCache::renderer(const UnitLease& lease, std::stop_token stop) {
+    const Digest image = lease.spec.image_digest();
+    const std::lock_guard lock(mutex_);
+    for (auto item = renderer_entries_.begin(); item != renderer_entries_.end(); ++item) {
+        if (item->image != image || item->tables != lease.tables.digest) continue;
+        renderer_entries_.splice(renderer_entries_.begin(), renderer_entries_, item);
+        return item->renderer;
+    }
+    const auto built = scene(lease.spec, stop);
+    if (!built.ok()) return built.status();
+    auto learned = tables(lease, **built, stop);
+    if (!learned.ok()) return learned.status();
+    auto renderer = Renderer::create(*built, render_settings(lease.spec), *std::move(learned));
     if (!renderer.ok()) return renderer.status();
     std::shared_ptr<const Renderer> shared = std::move(renderer).value();
-    renderer_entries_.push_front({image, shared});
+    renderer_entries_.push_front({image, lease.tables.digest, shared});
     if (renderer_entries_.size() > kMaxRenderers) renderer_entries_.pop_back();
     return shared;
+}
+
+Result<TrainingTracer> RendererCache::tracer(const JobSpec& spec, std::stop_token stop) {
+    const std::lock_guard lock(mutex_);
+    const auto built = scene(spec, stop);
+    if (!built.ok()) return built.status();
+    return TrainingTracer([scene = *built, settings = render_settings(spec)](const TrainingWork& work, std::stop_token unit_stop) {
+        return trace_training(*scene, settings, work, unit_stop);
+    });
 }
 
 }  // namespace lightloom

@@ -1,6 +1,6 @@
 #pragma once
-// Where a worker's scenes come from: fetched by digest into a directory that outlives the process, imported and built once per
-// (root, resolution), and kept while recent jobs need them.
+// Where a worker's scenes and tables come from: fetched by digest into a directory that outlives the process, verified whenever they
+// are read from there, built once per scene and resolution, and kept while recent jobs need them.
 
 #include <filesystem>
 #include <list>
@@ -14,12 +14,18 @@ namespace lightloom {
 /// The built scene of a job.
 using SceneSource = std::function<Result<std::shared_ptr<const Scene>>(const JobSpec& spec, std::stop_token stop)>;
 
+/// The bytes of a job's tables, verified against their digest.
+using TableSource = std::function<Result<std::string>(const AssetReference& tables, std::stop_token stop)>;
+/// A table source without a directory, for workers in the coordinator's process. `port` must outlive it.
+TableSource direct_tables(WorkerPort& port);
+
 /// Fetches from the coordinator behind `port`. `directory` may be shared by several workers of a host.
 class SceneFetcher {
   public:
     SceneFetcher(WorkerPort& port, std::filesystem::path directory);
     ~SceneFetcher();
     Result<std::shared_ptr<const Scene>> scene(const JobSpec& spec, std::stop_token stop);
+    Result<std::string> tables(const AssetReference& tables, std::stop_token stop);
 
   private:
     Status fetch(const Digest& digest, uint64_t size_bytes, std::stop_token stop);
@@ -32,21 +38,27 @@ class SceneFetcher {
 /// Keeps the last few scenes and renderers.
 class RendererCache {
   public:
-    explicit RendererCache(SceneSource scenes) : scenes_(std::move(scenes)) {}
-    Result<std::shared_ptr<const Renderer>> renderer(const JobSpec& spec, std::stop_token stop);
+    RendererCache(SceneSource scenes, TableSource tables) : scenes_(std::move(scenes)), tables_(std::move(tables)) {}
+    /// Fails, naming the tables, when they cannot be had or do not fit the scene.
+    Result<std::shared_ptr<const Renderer>> renderer(const UnitLease& lease, std::stop_token stop);
+    Result<TrainingTracer> tracer(const JobSpec& spec, std::stop_token stop);
 
   private:
+    Result<std::shared_ptr<const Scene>> scene(const JobSpec& spec, std::stop_token stop);
+    Result<std::shared_ptr<const SubspaceTables>> tables(const UnitLease& lease, const Scene& scene, std::stop_token stop);
+
     struct SceneEntry {
         Digest root;
         int width = 0, height = 0;
         std::shared_ptr<const Scene> scene;
     };
     struct RendererEntry {
-        Digest image;
+        Digest image, tables;
         std::shared_ptr<const Renderer> renderer;
     };
     std::mutex mutex_;  ///< Held while a scene is built: a second caller would only build it again.
     SceneSource scenes_;
+    TableSource tables_;
     std::list<SceneEntry> scene_entries_;        // most recent first
     std::list<RendererEntry> renderer_entries_;  // most recent first
 };

@@ -28,10 +28,15 @@ class Backoff {
 constexpr double kLeaseWaitSeconds = 1;
 constexpr int kSubmitAttempts = 40;
 
+std::string name_of(const UnitReference& unit) {
+    if (unit.key.kind != UnitKind::kRender) return unit.job_id + " training unit " + std::to_string(unit.key.group);
+    return unit.job_id + " unit " + std::to_string(unit.key.group) + "/" + std::to_string(unit.key.tile);
+}
+
 }  // namespace
 
-Worker::Worker(WorkerPort& port, WorkerOptions options, RendererSource renderers)
-    : port_(port), options_(std::move(options)), renderers_(std::move(renderers)), arena_(int(options_.thread_count)) {}
+Worker::Worker(WorkerPort& port, WorkerOptions options, RendererSource renderers, TracerSource tracers)
+    : port_(port), options_(std::move(options)), renderers_(std::move(renderers)), tracers_(std::move(tracers)), arena_(int(options_.thread_count)) {}
 
 std::string Worker::id() {
     const std::lock_guard lock(mutex_);
@@ -141,45 +146,66 @@ bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
         if (!fresh) return true;  // the other lane has it: its lease ran out and came back to us
         unit_stop = item->second.stop.get_token();
     }
-    double seconds = 0;
-    auto partial = render(lease, unit_stop, stop, &seconds);
-    const bool able = partial.ok() || partial.status().code() == StatusCode::kCancelled;
-    if (partial.ok()) {
-        submit(lease, *std::move(partial), seconds, stop);
-    } else {
-        const Status status = port_.release_unit(id(), reference, partial.status());
-        if (!status.ok()) spdlog::debug("release: {}", status.message());
-        if (!able)
-            spdlog::error("{} unit {}/{}: {}", reference.job_id, reference.key.group, reference.key.tile,
-                          partial.status().message());
+    const bool training = reference.key.kind != UnitKind::kRender;
+    const Status made = training ? trace_unit(lease, unit_stop, stop) : render_unit(lease, unit_stop, stop);
+    const bool able = made.ok() || made.code() == StatusCode::kCancelled;
+    if (!able) spdlog::error("{}: {}", name_of(reference), made.message());
+    // A heartbeat that still named a unit which is given back would take it again, and nobody would render it until that lease ran out.
+    std::unique_lock beat(beat_mutex_, std::defer_lock);
+    if (!made.ok()) beat.lock();
+    {
+        const std::lock_guard lock(mutex_);
+        running_.erase(reference);
     }
-    const std::lock_guard lock(mutex_);
-    running_.erase(reference);
+    if (!made.ok()) {
+        const Status status = port_.release_unit(id(), reference, made);
+        if (!status.ok()) spdlog::debug("release: {}", status.message());
+    }
     return able;
 }
 
-Result<Partial> Worker::render(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain, double* seconds) {
-    const auto renderer = renderers_(lease.spec, unit_stop);
-    if (!renderer.ok()) return renderer.status();
+Result<double> Worker::in_turn(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain,
+                               const std::function<void()>& make) {
     const std::lock_guard only_one(render_mutex_);
     if (unit_stop.stop_requested() || drain.stop_requested()) return Status(StatusCode::kCancelled, "given back");
     announce_rendering(lease.reference());
-    const UnitWork work = unit_work(lease.unit);
     const auto begin = Clock::now();
-    auto partial = arena_.execute([&] { return (*renderer)->render(work, unit_stop); });
-    *seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-    return partial;
+    arena_.execute(make);
+    return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-void Worker::submit(const UnitLease& lease, Partial partial, double seconds, std::stop_token stop) {
+Status Worker::render_unit(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain) {
+    const auto renderer = renderers_(lease, unit_stop);
+    if (!renderer.ok()) return renderer.status();
+    Result<Partial> partial = internal_error("not rendered");
+    const auto seconds =
+        in_turn(lease, unit_stop, drain, [&] { partial = (*renderer)->render(unit_work(lease.unit), unit_stop); });
+    if (!seconds.ok()) return seconds.status();
+    if (!partial.ok()) return partial.status();
+    submit(lease, [&](const std::string& worker_id) { return port_.submit_result(worker_id, lease, *partial, *seconds); }, drain);
+    return {};
+}
+
+Status Worker::trace_unit(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain) {
+    const auto tracer = tracers_(lease.spec, unit_stop);
+    if (!tracer.ok()) return tracer.status();
+    Result<TrainingData> data = internal_error("not traced");
+    const auto seconds = in_turn(lease, unit_stop, drain, [&] { data = (*tracer)(lease.unit.training, unit_stop); });
+    if (!seconds.ok()) return seconds.status();
+    if (!data.ok()) return data.status();
+    const std::string payload = serialize(*data);
+    submit(lease, [&](const std::string& worker_id) { return port_.submit_training(worker_id, lease, payload, *seconds); }, drain);
+    return {};
+}
+
+void Worker::submit(const UnitLease& lease, const Send& send, std::stop_token stop) {
     Backoff backoff;
     for (int attempt = 0; attempt < kSubmitAttempts; ++attempt) {
         const std::string worker_id = id();
-        const auto ack = port_.submit_result(worker_id, lease, partial, seconds);
-        const WorkUnit& unit = lease.unit;
+        const auto ack = send(worker_id);
         if (ack.ok()) {
             if (ack->outcome == SubmitOutcome::kRejected || ack->outcome == SubmitOutcome::kDuplicateDifferent)
-                spdlog::error("{} unit {}/{}: {}", lease.job_id, unit.key.group, unit.key.tile, ack->reason);
+                spdlog::error("{}: {}", name_of(lease.reference()), ack->reason);
             return;
         }
         const StatusCode code = ack.status().code();
@@ -189,7 +215,7 @@ void Worker::submit(const UnitLease& lease, Partial partial, double seconds, std
             wait(backoff.next(), stop);
             if (stop.stop_requested() && attempt > 2) return;  // the unit will be leased again
         } else {
-            spdlog::error("{} unit {}/{}: {}", lease.job_id, unit.key.group, unit.key.tile, ack.status().message());
+            spdlog::error("{}: {}", name_of(lease.reference()), ack.status().message());
             (void)port_.release_unit(worker_id, lease.reference(), ack.status());
             return;
         }
@@ -201,13 +227,14 @@ void Worker::announce_rendering(const UnitReference& unit) {
     {
         const std::lock_guard lock(mutex_);
         running_[unit].rendering = true;
-        first = announced_jobs_.insert(unit.job_id).second;
+        first = unit.key.kind == UnitKind::kRender && announced_jobs_.insert(unit.job_id).second;
     }
     // The clock of a time-limited job starts here: the coordinator must hear of it at once.
     if (first) send_heartbeat();
 }
 
 void Worker::send_heartbeat() {
+    const std::lock_guard beat(beat_mutex_);
     std::vector<RunningUnit> running;
     std::string worker_id;
     {

@@ -18,8 +18,11 @@
 
 namespace lightloom {
 
-/// The renderer of a job; fetches and builds what it needs, and may keep it for the next call. Called from several threads.
-using RendererSource = std::function<Result<std::shared_ptr<const Renderer>>(const JobSpec& spec, std::stop_token stop)>;
+/// The renderer of a unit's job; fetches and builds what it needs, and may keep it for the next call. Called from several threads.
+using RendererSource = std::function<Result<std::shared_ptr<const Renderer>>(const UnitLease& lease, std::stop_token stop)>;
+/// Traces a training unit of a job; the same holds for what it needs.
+using TrainingTracer = std::function<Result<TrainingData>(const TrainingWork& work, std::stop_token stop)>;
+using TracerSource = std::function<Result<TrainingTracer>(const JobSpec& spec, std::stop_token stop)>;
 
 struct WorkerOptions {
     BuildIdentity identity;
@@ -31,7 +34,7 @@ struct WorkerOptions {
 
 class Worker {
   public:
-    Worker(WorkerPort& port, WorkerOptions options, RendererSource renderers);
+    Worker(WorkerPort& port, WorkerOptions options, RendererSource renderers, TracerSource tracers);
 
     /// Works until a stop is requested: then takes no new unit, finishes the one that it renders (or gives it back after
     /// drain_seconds), and returns OK. An unreachable coordinator is waited for; a refused registration is returned.
@@ -48,8 +51,14 @@ class Worker {
     void lane(std::stop_token stop);
     /// False when the unit could not be rendered here.
     bool run_unit(const UnitLease& lease, std::stop_token stop);
-    Result<Partial> render(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain, double* seconds);
-    void submit(const UnitLease& lease, Partial partial, double seconds, std::stop_token stop);
+    /// Makes the unit and submits it; an error gives it back.
+    Status render_unit(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain);
+    Status trace_unit(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain);
+    /// Waits for the unit's turn and calls `make` on all threads; how long that took.
+    Result<double> in_turn(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain, const std::function<void()>& make);
+    /// Sends until there is an answer.
+    using Send = std::function<Result<SubmitAck>(const std::string& worker_id)>;
+    void submit(const UnitLease& lease, const Send& send, std::stop_token stop);
     void heartbeats(std::stop_token stop);
     void send_heartbeat();
     void announce_rendering(const UnitReference& unit);
@@ -58,9 +67,11 @@ class Worker {
     WorkerPort& port_;
     const WorkerOptions options_;
     const RendererSource renderers_;
+    const TracerSource tracers_;
     tbb::task_arena arena_;
     std::mutex render_mutex_;  ///< One unit renders at a time, on all threads.
     std::mutex sign_in_mutex_;
+    std::mutex beat_mutex_;    ///< Heartbeats and units given back reach the coordinator in order. Before mutex_.
     std::mutex mutex_;         ///< Guards what follows.
     std::condition_variable_any wake_;
     WorkerGrant grant_;

@@ -177,9 +177,14 @@ Result<SubspaceTables> make_tables(const Scene& scene, const RenderSettings& set
     const Result<TransportParameters> parameters = TransportParameters::read(settings);
     if (!parameters.ok()) return parameters.status();
     const uint64_t samples = parameters->training_samples;
-    const Result<TrainingData> data = trace_training(scene, settings, {0, samples, samples}, stop);
-    if (!data.ok()) return data.status();
-    return train_tables(*data, scene.emitters(), parameters->training, stop, report);
+    TrainingData data;
+    for (uint64_t first = 0; first < samples; first += kTrainingUnitSamples) {
+        const Result<TrainingData> unit =
+            trace_training(scene, settings, {first, std::min(kTrainingUnitSamples, samples - first), samples}, stop);
+        if (!unit.ok()) return unit.status();
+        LL_RETURN_IF_ERROR(data.append(*unit));
+    }
+    return train_tables(data, scene.emitters(), parameters->training, stop, report);
 }
 
 Result<std::unique_ptr<Renderer>> create_with_tables(std::shared_ptr<const Scene> scene, const RenderSettings& settings,

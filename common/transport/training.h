@@ -19,12 +19,16 @@ struct TrainingWork {
     uint64_t total_samples = 0;  ///< Of the whole dataset: sets the size of the blocks.
 };
 
+/// Samples of a training unit; the last one may have fewer.
+inline constexpr uint64_t kTrainingUnitSamples = uint64_t(1) << 14;
+
 /// Traces camera samples first_sample .. of a sequence that is spread evenly over the frame, each with a light sub-path of its own.
 /// The result does not depend on the number of threads. kCancelled after a stop request.
 Result<TrainingData> trace_training(const Scene& scene, const RenderSettings& settings, const TrainingWork& work,
                                     std::stop_token stop);
 
-/// Training on this machine alone: traces all units and trains. What a coordinator does with workers, in one call.
+/// Training on this machine alone: traces unit by unit, as a coordinator has it done by workers, and trains. The tables have the same
+/// bytes as that coordinator's.
 Result<SubspaceTables> make_tables(const Scene& scene, const RenderSettings& settings, std::stop_token stop,
                                    TrainingReport* report);
 

@@ -55,7 +55,10 @@ class AssetStore {
     /// Bytes of an unfinished upload; the whole size if it is complete; 0 if unknown.
     uint64_t committed_size(const Digest& digest) const;
     Result<std::string> read(const Digest& digest) const;
+    /// Stores `bytes`; a complete file of that digest is trusted and left as it is.
     Status put(const Digest& digest, std::string_view bytes);
+    /// Forgets a file that turned out to be damaged, so that it can be fetched or stored again.
+    void remove(const Digest& digest);
 
     /// One upload in progress. Destroyed before it is complete, it leaves its bytes for a later one to go on from.
     class Upload {

@@ -92,6 +92,11 @@ Status AssetStore::put(const Digest& digest, std::string_view bytes) {
     return upload->finish();
 }
 
+void AssetStore::remove(const Digest& digest) {
+    std::error_code ignored;
+    fs::remove(path_of(digest), ignored);
+}
+
 Result<AssetStore::Upload> AssetStore::begin_upload(const Digest& digest, uint64_t size_bytes) {
     if (size_bytes > max_asset_bytes_)
         return Status(StatusCode::kResourceExhausted, "asset of " + std::to_string(size_bytes) +

@@ -11,6 +11,7 @@
 #include "common/core/result.h"
 #include "common/film/frame.h"
 #include "common/transport/renderer.h"
+#include "common/transport/training.h"
 
 namespace lightloom {
 
@@ -30,11 +31,23 @@ struct JobSpec {
     Digest image_digest() const;
 };
 
+/// What light transport needs of a spec.
+inline RenderSettings render_settings(const JobSpec& spec) {
+    return {.algorithm = spec.algorithm, .parameters = spec.parameters, .seed = spec.seed, .max_depth = spec.max_depth};
+}
+
+enum class UnitKind : uint8_t {
+    kRender,    ///< A partial of the image.
+    kTraining,  ///< Paths that the job's tables are learned from; never part of an image.
+    kProbe,     ///< The same, only to measure how many of them a time-limited job can afford.
+};
+
 /// Identity of a unit inside a job. Units of one group complete one another: their techniques' weights sum to one only
 /// over the whole group, so only complete groups enter an image.
 struct UnitKey {
     uint32_t group = 0;
     uint32_t tile = 0;
+    UnitKind kind = UnitKind::kRender;
     friend auto operator<=>(const UnitKey&, const UnitKey&) = default;
 };
 
@@ -47,6 +60,7 @@ struct WorkUnit {
     /// the plan. `first_light_path` numbers them within the group.
     uint64_t first_light_path = 0;
     uint64_t light_path_count = 0;
+    TrainingWork training = {};  ///< Kinds kTraining and kProbe only.
 };
 
 /// One full-frame group of iterations.
@@ -79,6 +93,9 @@ class Plan {
     /// `light_paths_per_pixel` is N1, in light paths per pixel and iteration (0 for algorithms that splat nothing).
     /// `whole_frame` forbids tiles (stratified pairing, photon maps).
     Plan(const FrameLayout& frame, double light_paths_per_pixel, bool whole_frame = false);
+    /// The plan of a training set of `samples`: group i is the unit of samples i * kTrainingUnitSamples onwards, its iterations are
+    /// samples.
+    static Plan training(uint64_t samples, UnitKind kind);
 
     /// Group `index` of an unbounded job.
     Group group(uint32_t index) const;
@@ -93,9 +110,13 @@ class Plan {
     uint32_t tile_count() const { return uint32_t(tiles_.size()); }
 
   private:
-    double light_paths_per_pixel_;
+    Plan() = default;
+
+    double light_paths_per_pixel_ = 0;
     std::vector<Rect> tiles_;
-    uint32_t max_group_iterations_;
+    uint32_t max_group_iterations_ = 1;
+    UnitKind kind_ = UnitKind::kRender;
+    uint64_t training_samples_ = 0;
 };
 
 }  // namespace lightloom

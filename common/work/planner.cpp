@@ -68,7 +68,20 @@ Plan::Plan(const FrameLayout& frame, double light_paths_per_pixel, bool whole_fr
     max_group_iterations_ = uint32_t(std::max<int64_t>(1, kUnitSamples / largest));
 }
 
+Plan Plan::training(uint64_t samples, UnitKind kind) {
+    Plan plan;
+    plan.tiles_.resize(1);
+    plan.max_group_iterations_ = uint32_t(kTrainingUnitSamples);
+    plan.kind_ = kind;
+    plan.training_samples_ = samples;
+    return plan;
+}
+
 Group Plan::group(uint32_t index) const {
+    if (kind_ != UnitKind::kRender) {
+        const uint64_t first = std::min(uint64_t(index) * kTrainingUnitSamples, training_samples_);
+        return {index, first, uint32_t(std::min(kTrainingUnitSamples, training_samples_ - first))};
+    }
     uint64_t done = 0;
     for (uint32_t i = 0; i < index; ++i) {
         const uint32_t size = group_size(done, max_group_iterations_);
@@ -94,6 +107,7 @@ std::vector<Group> Plan::groups_for(uint64_t iterations) const {
 }
 
 uint32_t Plan::group_count(uint64_t iterations) const {
+    if (kind_ != UnitKind::kRender) return uint32_t((iterations + kTrainingUnitSamples - 1) / kTrainingUnitSamples);
     uint64_t done = 0, count = 0;
     while (done < iterations) {
         const uint32_t size = group_size(done, max_group_iterations_);
@@ -105,6 +119,10 @@ uint32_t Plan::group_count(uint64_t iterations) const {
 }
 
 std::vector<WorkUnit> Plan::units(const Group& group) const {
+    if (kind_ != UnitKind::kRender) {
+        return {{.key = {group.index, 0, kind_},
+                 .training = {group.first_iteration, group.iteration_count, training_samples_}}};
+    }
     return split_group(group, tiles_, light_paths_per_pixel_);
 }
 

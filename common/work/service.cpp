@@ -18,4 +18,14 @@ std::string_view to_string(JobState state) {
     return "unknown";
 }
 
+std::string_view to_string(PreparePhase phase) {
+    switch (phase) {
+        case PreparePhase::kReadingScene: return "reading the scene";
+        case PreparePhase::kProbing: return "measuring how fast training is";
+        case PreparePhase::kTracing: return "tracing training paths";
+        case PreparePhase::kLearning: return "learning the tables";
+    }
+    return "preparing";
+}
+
 }  // namespace lightloom

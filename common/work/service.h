@@ -43,10 +43,17 @@ struct UnitReference {
     friend auto operator<=>(const UnitReference&, const UnitReference&) = default;
 };
 
+/// Content-addressed bytes; size 0 means none.
+struct AssetReference {
+    Digest digest;
+    uint64_t size_bytes = 0;
+};
+
 struct UnitLease {
     std::string job_id;
     JobSpec spec;
     WorkUnit unit;
+    AssetReference tables;  ///< What the unit reads; none where the algorithm needs none.
     UnitReference reference() const { return {job_id, unit.key}; }
 };
 
@@ -64,6 +71,24 @@ struct SubmitAck {
 
 enum class JobState { kPreparing, kRunning, kFinishing, kSucceeded, kFailed, kCancelled };
 bool is_terminal(JobState state);
+/// What a job in kPreparing is doing.
+enum class PreparePhase { kReadingScene, kProbing, kTracing, kLearning };
+/// For people: "tracing training paths".
+std::string_view to_string(PreparePhase phase);
+
+/// The tables that a job renders with, and what making them cost; see the message TablesSummary.
+struct TablesInfo {
+    AssetReference asset;  ///< None before they exist, and where the algorithm needs none.
+    uint32_t light_subspaces = 0, eye_subspaces = 0;
+    uint64_t training_samples = 0;
+    bool capped_by_time_limit = false;
+    bool from_cache = false;
+    double trace_seconds = 0, classifier_seconds = 0, energy_seconds = 0, gamma_seconds = 0;
+    double uniform_loss = 0, loss = 0, prior_strength = 0;
+    std::string note;
+    Digest cache_key;
+};
+
 /// Lower-case word.
 std::string_view to_string(JobState state);
 
@@ -85,6 +110,9 @@ struct JobInfo {
     uint64_t image_size_bytes = 0;
     uint64_t duplicates_same = 0, duplicates_different = 0;
     double prepare_seconds = 0, finish_seconds = 0;
+    PreparePhase phase = PreparePhase::kReadingScene;  ///< In kPreparing.
+    uint64_t phase_done = 0, phase_total = 0;          ///< Training samples.
+    TablesInfo tables;
 };
 
 enum class ImageKind { kFinal, kPreview };
@@ -122,6 +150,9 @@ class WorkerPort {
                                                          const std::vector<RunningUnit>& running) = 0;
     virtual Result<SubmitAck> submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial,
                                             double render_seconds) = 0;
+    /// The serialized training data of a unit of kind kTraining or kProbe.
+    virtual Result<SubmitAck> submit_training(const std::string& worker_id, const UnitLease& lease, std::string_view payload,
+                                              double trace_seconds) = 0;
     virtual Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why) = 0;
     virtual Status goodbye(const std::string& worker_id) = 0;
     /// Streams the asset from `offset` to its end into `sink`; stops with the sink's error.

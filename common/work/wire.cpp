@@ -16,6 +16,69 @@ void put_rect(const Rect& in, v1::Rect* out) {
 
 Rect get_rect(const v1::Rect& in) { return {in.x0(), in.y0(), in.x1(), in.y1()}; }
 
+void put_key(const UnitKey& in, v1::UnitKey* out) {
+    out->set_group(in.group);
+    out->set_tile(in.tile);
+    out->set_kind(v1::UnitKind(int(in.kind) + 1));
+}
+
+Result<UnitKey> get_key(const v1::UnitKey& in) {
+    if (in.kind() < v1::UNIT_KIND_RENDER || in.kind() > v1::UNIT_KIND_PROBE)
+        return invalid_argument("a unit of unknown kind; install the same build on both hosts");
+    return UnitKey{in.group(), in.tile(), UnitKind(int(in.kind()) - 1)};
+}
+
+void put_asset(const AssetReference& in, v1::AssetReference* out) {
+    put(in.digest, out->mutable_digest());
+    out->set_size_bytes(in.size_bytes);
+}
+
+Result<AssetReference> get_asset(const v1::AssetReference& in) {
+    const auto digest = get(in.digest());
+    if (!digest.ok()) return digest.status();
+    return AssetReference{*digest, in.size_bytes()};
+}
+
+void put_tables(const TablesInfo& in, v1::TablesSummary* out) {
+    put_asset(in.asset, out->mutable_asset());
+    out->set_light_subspace_count(in.light_subspaces);
+    out->set_eye_subspace_count(in.eye_subspaces);
+    out->set_training_sample_count(in.training_samples);
+    out->set_capped_by_time_limit(in.capped_by_time_limit);
+    out->set_from_cache(in.from_cache);
+    out->set_trace_seconds(in.trace_seconds);
+    out->set_classifier_seconds(in.classifier_seconds);
+    out->set_energy_seconds(in.energy_seconds);
+    out->set_gamma_seconds(in.gamma_seconds);
+    out->set_uniform_loss(in.uniform_loss);
+    out->set_loss(in.loss);
+    out->set_prior_strength(in.prior_strength);
+    out->set_note(clipped_utf8(in.note, kMaxMessageBytes));
+    put(in.cache_key, out->mutable_cache_key());
+}
+
+Result<TablesInfo> get_tables(const v1::TablesSummary& in) {
+    const auto asset = get_asset(in.asset());
+    if (!asset.ok()) return asset.status();
+    const auto key = get(in.cache_key());
+    if (!key.ok()) return key.status();
+    return TablesInfo{.asset = *asset,
+                      .light_subspaces = in.light_subspace_count(),
+                      .eye_subspaces = in.eye_subspace_count(),
+                      .training_samples = in.training_sample_count(),
+                      .capped_by_time_limit = in.capped_by_time_limit(),
+                      .from_cache = in.from_cache(),
+                      .trace_seconds = in.trace_seconds(),
+                      .classifier_seconds = in.classifier_seconds(),
+                      .energy_seconds = in.energy_seconds(),
+                      .gamma_seconds = in.gamma_seconds(),
+                      .uniform_loss = in.uniform_loss(),
+                      .loss = in.loss(),
+                      .prior_strength = in.prior_strength(),
+                      .note = in.note(),
+                      .cache_key = *key};
+}
+
 }  // namespace
 
 grpc::Status to_grpc(const Status& status) {
@@ -96,6 +159,10 @@ void put(const JobInfo& in, v1::Job* out) {
     out->set_duplicate_different_count(in.duplicates_different);
     out->set_prepare_seconds(in.prepare_seconds);
     out->set_finish_seconds(in.finish_seconds);
+    if (in.state == JobState::kPreparing) out->set_phase(v1::PreparePhase(int(in.phase) + 1));
+    out->set_phase_done_count(in.phase_done);
+    out->set_phase_total_count(in.phase_total);
+    if (in.tables.asset.size_bytes > 0) put_tables(in.tables, out->mutable_tables());
 }
 
 Result<JobInfo> get(const v1::Job& in) {
@@ -130,46 +197,71 @@ Result<JobInfo> get(const v1::Job& in) {
     info.duplicates_different = in.duplicate_different_count();
     info.prepare_seconds = in.prepare_seconds();
     info.finish_seconds = in.finish_seconds();
+    if (in.phase() >= v1::PREPARE_PHASE_READING_SCENE && in.phase() <= v1::PREPARE_PHASE_LEARNING)
+        info.phase = PreparePhase(int(in.phase()) - 1);
+    info.phase_done = in.phase_done_count();
+    info.phase_total = in.phase_total_count();
+    if (in.has_tables()) {
+        auto tables = get_tables(in.tables());
+        if (!tables.ok()) return tables.status();
+        info.tables = *std::move(tables);
+    }
     return info;
 }
 
 void put(const WorkUnit& in, v1::WorkUnit* out) {
-    out->mutable_key()->set_group(in.key.group);
-    out->mutable_key()->set_tile(in.key.tile);
+    put_key(in.key, out->mutable_key());
     out->set_first_iteration(in.first_iteration);
     out->set_iteration_count(in.iteration_count);
     put_rect(in.tile, out->mutable_tile());
     out->set_first_light_path(in.first_light_path);
     out->set_light_path_count(in.light_path_count);
+    out->set_first_training_sample(in.training.first_sample);
+    out->set_training_sample_count(in.training.sample_count);
+    out->set_training_sample_total_count(in.training.total_samples);
 }
 
-WorkUnit get(const v1::WorkUnit& in) {
-    return {.key = {in.key().group(), in.key().tile()},
-            .first_iteration = in.first_iteration(),
-            .iteration_count = in.iteration_count(),
-            .tile = get_rect(in.tile()),
-            .first_light_path = in.first_light_path(),
-            .light_path_count = in.light_path_count()};
+Result<WorkUnit> get(const v1::WorkUnit& in) {
+    const auto key = get_key(in.key());
+    if (!key.ok()) return key.status();
+    return WorkUnit{.key = *key,
+                    .first_iteration = in.first_iteration(),
+                    .iteration_count = in.iteration_count(),
+                    .tile = get_rect(in.tile()),
+                    .first_light_path = in.first_light_path(),
+                    .light_path_count = in.light_path_count(),
+                    .training = {in.first_training_sample(), in.training_sample_count(), in.training_sample_total_count()}};
 }
 
 void put(const UnitReference& in, v1::UnitReference* out) {
     out->set_job_id(in.job_id);
-    out->mutable_key()->set_group(in.key.group);
-    out->mutable_key()->set_tile(in.key.tile);
+    put_key(in.key, out->mutable_key());
 }
 
-UnitReference get(const v1::UnitReference& in) { return {in.job_id(), {in.key().group(), in.key().tile()}}; }
+Result<UnitReference> get(const v1::UnitReference& in) {
+    const auto key = get_key(in.key());
+    if (!key.ok()) return key.status();
+    return UnitReference{in.job_id(), *key};
+}
 
 void put(const UnitLease& in, v1::UnitLease* out) {
     out->set_job_id(in.job_id);
     put(in.spec, out->mutable_spec());
     put(in.unit, out->mutable_unit());
+    if (in.tables.size_bytes > 0) put_asset(in.tables, out->mutable_tables());
 }
 
 Result<UnitLease> get(const v1::UnitLease& in) {
     auto spec = get(in.spec());
     if (!spec.ok()) return spec.status();
-    return UnitLease{in.job_id(), *std::move(spec), get(in.unit())};
+    const auto unit = get(in.unit());
+    if (!unit.ok()) return unit.status();
+    UnitLease lease{in.job_id(), *std::move(spec), *unit, {}};
+    if (!in.has_tables()) return lease;
+    const auto tables = get_asset(in.tables());
+    if (!tables.ok()) return tables.status();
+    lease.tables = *tables;
+    return lease;
 }
 
 void put(const WorkerHello& in, v1::WorkerHello* out) {

@@ -75,9 +75,14 @@ class FakeRenderer final : public Renderer {
 };
 
 inline RendererSource fake_renderers(double seconds = 0) {
-    return [seconds](const JobSpec& spec, std::stop_token) -> Result<std::shared_ptr<const Renderer>> {
-        return std::shared_ptr<const Renderer>(std::make_shared<FakeRenderer>(spec.frame, seconds));
+    return [seconds](const UnitLease& lease, std::stop_token) -> Result<std::shared_ptr<const Renderer>> {
+        return std::shared_ptr<const Renderer>(std::make_shared<FakeRenderer>(lease.spec.frame, seconds));
     };
+}
+
+/// For workers that never see a training unit.
+inline TracerSource no_tracers() {
+    return [](const JobSpec&, std::stop_token) -> Result<TrainingTracer> { return internal_error("no light here"); };
 }
 
 struct FakeService {

@@ -148,6 +148,57 @@ TEST(Processes, AWorkerKilledMidUnitCostsTimeOnly) {
     EXPECT_GE(manifest["work"]["expired_leases"].get<int>(), 1);
 }
 
+const std::vector<std::string> kTableJob{"--algorithm", "spcbpt", "--spp", "8", "--resolution", "48x36", "--max-depth", "4",
+                                         "--set", "training-paths=150000", "--set", "light-subspaces=40",
+                                         "--set", "eye-subspaces=20", "--set", "cache=500"};
+
+TEST(Processes, TrainingIsSharedOutAndAWorkerKilledDuringItCostsTimeOnly) {
+    const Service service({"--table-cache-size", "0"});
+    std::vector<std::string> alone = kTableJob;
+    alone.insert(alone.end(), {"--table-cache", "off"});
+    const Digest reference = embedded(service, 1, 1, alone);
+    EXPECT_EQ(embedded(service, 4, 1, alone), reference);
+    auto victim = service.worker("victim", 1);
+    auto client = service.submit("image", kTableJob);
+    GrpcJobPort jobs = service.jobs();
+    ASSERT_TRUE(wait_until(60, [&] {
+        const auto list = jobs.list_jobs();
+        return list.ok() && !list->empty() && list->front().phase_done > 0;
+    }));
+    victim->signal(SIGKILL);
+    EXPECT_EQ(victim->wait(), 128 + SIGKILL);
+    EXPECT_EQ(jobs.list_jobs()->front().state, JobState::kPreparing) << "it was to die during training";
+    std::vector<std::unique_ptr<Process>> others;
+    for (const char* name : {"second", "third"}) others.push_back(service.worker(name, 1));
+    ASSERT_EQ(client->wait(), 0) << service.log("image") << service.log("server");
+    EXPECT_EQ(service.digest("image"), reference);
+    const Json manifest = service.manifest("image");
+    EXPECT_EQ(manifest["tables"]["training_samples"].get<int>(), 150000);
+    EXPECT_FALSE(manifest["tables"]["from_cache"].get<bool>());
+    EXPECT_GE(manifest["work"]["expired_leases"].get<int>(), 1);
+}
+
+TEST(Processes, TablesAreKeptForTheNextRenderAndCanBeInspected) {
+    const Service service;
+    std::vector<std::string> job = kTableJob;
+    job.insert(job.end(), {"--table-cache", service.path("tables"), "--json", service.path("statistics.json")});
+    const Digest first = embedded(service, 1, 1, job);
+    EXPECT_FALSE(Json::parse(*read_file(service.path("statistics.json")))["tables"]["from_cache"].get<bool>());
+    EXPECT_EQ(embedded(service, 2, 1, job), first);
+    const Json statistics = Json::parse(*read_file(service.path("statistics.json")));
+    EXPECT_TRUE(statistics["tables"]["from_cache"].get<bool>());
+    const std::string file = service.path("tables") + "/" + statistics["tables"]["cache_key"].get<std::string>() + ".tables";
+    ASSERT_EQ(Process("lightloom", {"inspect", kScene, "--tables", file, "--draw", service.path("seen"), "--json", service.path("seen.json")},
+                      service.path("inspect.log")).wait(), 0) << service.log("inspect");
+    EXPECT_EQ(Json::parse(*read_file(service.path("seen.json")))["tables"]["sha256"], statistics["tables"]["sha256"]);
+    for (const char* picture : {"-kappa-eye.png", "-kappa-light.png", "-gamma.png", "-q.png"})
+        EXPECT_TRUE(read_file(service.path("seen") + picture)->starts_with("\x89PNG")) << picture;
+    std::ofstream(file, std::ios::app) << "x";
+    EXPECT_EQ(Process("lightloom", {"inspect", kScene, "--quiet", "--tables", file}, service.path("damaged.log")).wait(), 1);
+    EXPECT_EQ(embedded(service, 1, 2, job), first) << "damaged tables are made again";
+    EXPECT_FALSE(Json::parse(*read_file(service.path("statistics.json")))["tables"]["from_cache"].get<bool>());
+}
+
 TEST(Processes, ATimeLimitedImageCanBeRenderedAgain) {
     const Service service;
     const auto worker = service.worker("worker", 2);

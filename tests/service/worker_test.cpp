@@ -23,7 +23,7 @@ class Crew {
     void add(WorkerPort& port, const BuildIdentity& identity, uint32_t threads, double seconds_per_unit) {
         workers_.push_back(std::make_unique<Worker>(
             port, WorkerOptions{.identity = identity, .thread_count = threads, .host = "h", .process_id = workers_.size()},
-            testing::fake_renderers(seconds_per_unit)));
+            testing::fake_renderers(seconds_per_unit), testing::no_tracers()));
         threads_.emplace_back([w = workers_.back().get()](std::stop_token stop) { EXPECT_TRUE(w->run(stop).ok()); });
     }
     ~Crew() {

@@ -1,0 +1,29 @@
+#pragma once
+// What a file of learned tables holds, in numbers and pictures.
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "common/scene/scene.h"
+#include "common/tables/subspace_tables.h"
+
+namespace lightloom::client {
+
+struct TableFile {
+    SubspaceTables tables;
+    Digest digest;
+    uint64_t size_bytes = 0;
+};
+
+/// Reads an entry of a table cache, or bare tables, and checks that they fit the scene.
+Result<TableFile> read_tables(const std::string& path, const Scene& scene);
+/// Sizes, labels that occur, quantiles of Q, entropy of Gamma's columns in bits, windows, digest.
+nlohmann::ordered_json describe(const TableFile& file);
+void print(const TableFile& file);
+/// PREFIX-kappa-eye.png and PREFIX-kappa-light.png: the subspaces of what the camera sees first, in false colours (a light sub-path that
+/// ends there is taken to come along the normal). PREFIX-gamma.png: a column per eye subspace, a row per light subspace, brightness by
+/// the logarithm of Gamma over uniform. PREFIX-q.png: a bar per light subspace, height by the logarithm of Q; cells of emitters in
+/// another colour.
+Status draw(const TableFile& file, const Scene& scene, const std::string& prefix);
+
+}  // namespace lightloom::client

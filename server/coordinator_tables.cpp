@@ -1,0 +1,373 @@
+// Tables: the part of a job's life in which workers trace its training set and the coordinator learns from it. Training units are
+// leased, renewed, given back and merged exactly once as units of the image are; their order of arrival does not matter, because
+// the data are joined in the order of their numbers.
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "common/transport/catalog.h"
+#include "common/transport/parameters.h"
+#include "server/job_record.h"
+#include "server/training_budget.h"
+
+namespace lightloom {
+namespace {
+
+constexpr const char* kTrainingPaths = "training-paths";
+constexpr auto kPoll = std::chrono::milliseconds(100);
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+Status over() { return {StatusCode::kCancelled, "the job ended while its tables were made"}; }
+
+/// The spec with another size of the training set, in canonical text.
+JobSpec with_training_samples(const JobSpec& spec, uint64_t samples) {
+    JobSpec out = spec;
+    out.parameters[kTrainingPaths] = std::to_string(samples);
+    const auto algorithm = find_algorithm(out.algorithm);
+    const auto parameters = parse_parameters(**algorithm, out.parameters);
+    out.parameters = complete_parameters(**algorithm, *parameters);
+    return out;
+}
+
+uint64_t training_samples(const JobSpec& spec) {
+    const auto algorithm = find_algorithm(spec.algorithm);
+    return uint64_t(parameter_value(**algorithm, *parse_parameters(**algorithm, spec.parameters), kTrainingPaths));
+}
+
+/// Above any data that the unit can have: a few paths per sample, each of the greatest length, and a sum per block of the frame.
+uint64_t largest_training_payload(const JobSpec& spec, const TrainingWork& work) {
+    const FrameLayout& frame = spec.frame;
+    const uint64_t blocks = std::min(uint64_t(frame.crop.area()), work.total_samples + uint64_t(frame.crop.width() + frame.crop.height() + 1));
+    const uint64_t path = sizeof(TrainingPath) + uint64_t(spec.max_depth + 3) * sizeof(TrainingVertex);
+    return 256 + blocks * sizeof(double) + work.sample_count * 4 * path;
+}
+
+}  // namespace
+
+UnitTable* Coordinator::open_table(JobRecord& job) {
+    if (job.state == JobState::kRunning) return &*job.units;
+    return job.state == JobState::kPreparing && job.training ? &*job.training : nullptr;
+}
+
+UnitTable* Coordinator::table_for(JobRecord& job, UnitKind kind) {
+    UnitTable* const table = open_table(job);
+    const UnitKind open = job.state == JobState::kRunning ? UnitKind::kRender : job.training_kind;
+    return kind == open ? table : nullptr;
+}
+
+void Coordinator::discard_training(JobRecord& job) {
+    discarded_.push_back(std::make_shared<std::vector<std::optional<TrainingData>>>(std::move(job.training_parts)));
+    discarded_.push_back(std::make_shared<SceneFacts>(std::move(job.facts)));
+    job.training_parts.clear();
+    job.facts = {};
+    job.training.reset();
+}
+
+void Coordinator::open_training(JobRecord& job, UnitKind kind, uint64_t samples) {
+    job.training.reset();
+    job.training.emplace(Plan::training(samples, kind), samples, UINT32_MAX, options_.shuffle_seed);
+    job.training_kind = kind;
+    job.training_samples = samples;
+    job.training_parts.clear();
+    job.training_parts.resize(job.training->group_total());
+    job.training_bytes = 0;
+    job.traced_seconds = 0;
+    job.phase = kind == UnitKind::kProbe ? PreparePhase::kProbing : PreparePhase::kTracing;
+    changed(job);
+    work_changed_.notify_all();
+}
+
+void Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts) {
+    if (adopt_cached_tables(job, spec, facts)) return;
+    const std::lock_guard lock(mutex_);
+    if (job.state != JobState::kPreparing) return;
+    // Who chose the training set knows what it costs.
+    const bool open_size = spec.time_limit_seconds > 0 && !job.submitted.parameters.contains(kTrainingPaths);
+    const uint64_t samples = training_samples(spec);
+    job.spec = std::move(spec);
+    job.facts = std::move(facts);
+    if (open_size && samples > kMinTrainingSamples) return open_training(job, UnitKind::kProbe, std::min(kProbeSamples, samples));
+    open_training(job, UnitKind::kTraining, samples);
+}
+
+bool Coordinator::adopt_cached_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts) {
+    const Digest key = table_key(options_.identity, spec);
+    auto entry = table_cache_.find(key);
+    if (!entry) return false;
+    spdlog::info("{}: tables {} of an earlier job are used again", job.id, entry->info.asset.digest.hex().substr(0, 12));
+    entry->info.capped_by_time_limit = job.capped_by_time_limit;
+    if (const Status s = adopt_tables(job, spec, facts, entry->bytes, std::move(entry->info)); !s.ok()) {
+        const std::lock_guard lock(mutex_);
+        fail_job(job, s);
+    }
+    return true;
+}
+
+Status Coordinator::adopt_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts, std::string_view bytes,
+                                 TablesInfo tables) {
+    const Digest digest = sha256(bytes);
+    tables.asset = {digest, bytes.size()};
+    if (assets_.contains(digest) && !assets_.read(digest).ok()) assets_.remove(digest);
+    Status stored = assets_.put(digest, bytes);
+    // An equal job stores the same bytes at this moment.
+    for (int i = 0; i < 100 && stored.code() == StatusCode::kAborted; ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        stored = assets_.put(digest, bytes);
+    }
+    LL_RETURN_IF_ERROR(stored);
+    plan_units(job, spec, facts, std::move(tables));
+    return {};
+}
+
+void Coordinator::make_tables(JobRecord& job, std::stop_token stop) {
+    const Status status = learn(job, stop);
+    const std::lock_guard lock(mutex_);
+    if (!status.ok() && !closing_) fail_job(job, status);
+    --job.running_tasks;
+}
+
+Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
+    std::function<Result<std::shared_ptr<const Scene>>()> build_scene;
+    {
+        const std::lock_guard lock(mutex_);
+        if (job.state != JobState::kPreparing) return over();
+        build_scene = job.facts.build_scene;
+    }
+    if (!build_scene) return internal_error("this coordinator cannot build the scene that tables are learned for");
+    const auto scene = build_scene();
+    if (!scene.ok()) return scene.status();
+    const EmitterSet& emitters = (*scene)->emitters();
+
+    bool probe = true;
+    while (probe) {
+        const auto data = collect_training(job, emitters.all().size(), stop);
+        if (!data.ok()) return data.status();
+        JobSpec spec;
+        SceneFacts facts;
+        TablesInfo info;
+        {
+            const std::lock_guard lock(mutex_);
+            if (job.state != JobState::kPreparing) return over();
+            probe = job.training_kind == UnitKind::kProbe;
+            spec = job.spec;
+            if (!probe) {
+                facts = std::move(job.facts);
+                info.trace_seconds = seconds_between(job.training_begin, options_.clock());
+                info.capped_by_time_limit = job.capped_by_time_limit;
+                job.phase = PreparePhase::kLearning;
+                changed(job);
+            }
+        }
+        if (probe) {
+            LL_RETURN_IF_ERROR(choose_training_samples(job, *data, **scene, stop));
+            const std::lock_guard lock(mutex_);
+            if (job.state != JobState::kPreparing) return {};  // it found tables in the cache, or was cancelled
+            continue;
+        }
+        const auto parameters = TransportParameters::read(render_settings(spec));
+        if (!parameters.ok()) return parameters.status();
+        TrainingReport report;
+        const auto tables = train_tables(*data, emitters, parameters->training, stop, &report);
+        if (!tables.ok()) return tables.status();
+        info.light_subspaces = tables->light_count;
+        info.eye_subspaces = tables->eye_count;
+        info.training_samples = data->samples;
+        info.classifier_seconds = report.classifier_seconds;
+        info.energy_seconds = report.energy_seconds;
+        info.gamma_seconds = report.gamma_seconds;
+        info.uniform_loss = report.gamma.uniform_loss;
+        info.loss = report.gamma.loss;
+        info.prior_strength = report.gamma.prior_strength;
+        info.note = report.note;
+        info.cache_key = table_key(options_.identity, spec);
+        const std::string bytes = serialize(*tables);
+        table_cache_.store(info.cache_key, bytes, info);
+        spdlog::info("{}: tables of {} x {} subspaces from {} samples; {:.2f} s traced, {:.2f} s learned{}{}", job.id,
+                     info.light_subspaces, info.eye_subspaces, info.training_samples, info.trace_seconds,
+                     info.classifier_seconds + info.energy_seconds + info.gamma_seconds, info.note.empty() ? "" : "; ", info.note);
+        LL_RETURN_IF_ERROR(adopt_tables(job, spec, facts, bytes, std::move(info)));
+    }
+    return {};
+}
+
+Result<TrainingData> Coordinator::collect_training(JobRecord& job, size_t emitter_count, std::stop_token stop) {
+    std::unique_lock lock(mutex_);
+    for (;;) {
+        const auto alive = [&] { return job.state == JobState::kPreparing && !stop.stop_requested(); };
+        const auto complete = [&] { return job.training->done_count() == job.training->group_total(); };
+        work_changed_.wait_for(lock, kPoll, [&] { return !alive() || complete(); });
+        if (!alive()) return over();
+        if (!complete()) continue;
+        auto parts = std::move(job.training_parts);
+        const UnitKind kind = job.training_kind;
+        lock.unlock();
+        // Digest and size were right; a worker whose data are nonsense all the same loses its unit.
+        std::vector<std::pair<uint32_t, Status>> bad;
+        for (uint32_t i = 0; i < parts.size(); ++i)
+            if (Status s = parts[i]->validate(emitter_count); !s.ok()) bad.emplace_back(i, std::move(s));
+        if (bad.empty()) {
+            TrainingData all;
+            for (auto& part : parts) {
+                if (const Status s = all.append(*part); !s.ok()) return s;
+                part.reset();
+            }
+            return all;
+        }
+        lock.lock();
+        for (const auto& [unit, why] : bad) {
+            if (!alive()) return over();
+            parts[unit].reset();
+            ++job.rejected;
+            const UnitKey key{unit, 0, kind};
+            unit_failed(job, key, job.training->reopen(key), why);
+        }
+        if (!alive()) return over();
+        job.training_parts = std::move(parts);
+    }
+}
+
+Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& probe, const Scene& scene, std::stop_token stop) {
+    JobSpec spec;
+    SceneFacts facts;
+    double traced = 0;
+    size_t crew = 0;
+    {
+        const std::lock_guard lock(mutex_);
+        if (job.state != JobState::kPreparing) return over();
+        spec = job.spec;
+        facts = job.facts;
+        traced = job.traced_seconds;
+        for (const auto& w : workers_) crew += !w->left && seconds_between(w->last_heard, options_.clock()) <= options_.lease_seconds;
+    }
+    const auto parameters = TransportParameters::read(render_settings(spec));
+    if (!parameters.ok()) return parameters.status();
+    const auto begin = Clock::now();
+    TrainingReport report;
+    const auto tables = train_tables(probe, scene.emitters(), parameters->training, stop, &report);
+    if (!tables.ok()) return tables.status();
+    const double learned = seconds_since(begin), samples = double(std::max<uint64_t>(1, probe.samples));
+    const double budget = kTrainingShare * spec.time_limit_seconds - traced - learned;
+    const uint64_t wanted = training_samples(spec);
+    const uint64_t chosen = affordable_training_samples({traced / samples / double(std::max<size_t>(1, crew)), learned / samples}, budget, wanted);
+    spec = with_training_samples(spec, chosen);
+    spdlog::info("{}: the time limit has room for {} of {} training samples", job.id, chosen, wanted);
+    {
+        const std::lock_guard lock(mutex_);
+        if (job.state != JobState::kPreparing) return over();
+        job.capped_by_time_limit = chosen < wanted;
+    }
+    if (chosen < wanted && adopt_cached_tables(job, spec, facts)) return {};
+    const std::lock_guard lock(mutex_);
+    if (job.state != JobState::kPreparing) return over();
+    job.spec = std::move(spec);
+    job.training_begin = options_.clock();
+    open_training(job, UnitKind::kTraining, chosen);
+    return {};
+}
+
+Result<uint64_t> Coordinator::expected_training_bytes(const UnitReference& reference) const {
+    const std::lock_guard lock(mutex_);
+    const auto job = find_job(reference.job_id);
+    UnitTable* const units = job ? table_for(*job, reference.key.kind) : nullptr;
+    if (!units || reference.key.kind == UnitKind::kRender)
+        return not_found("job " + reference.job_id + " takes no such training data (any more)");
+    const auto unit = units->find(reference.key);
+    if (!unit) return invalid_argument("job " + reference.job_id + " has leased no such unit");
+    return largest_training_payload(job->spec, unit->training);
+}
+
+Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, const UnitReference& reference, const Digest& digest,
+                                               std::string_view payload, double trace_seconds) {
+    const auto limit = expected_training_bytes(reference);
+    if (!limit.ok()) {
+        const bool stale = limit.status().code() == StatusCode::kNotFound;
+        return SubmitAck{stale ? SubmitOutcome::kStale : SubmitOutcome::kRejected, limit.status().message()};
+    }
+    Result<TrainingData> data = data_loss("the training data differ from their digest");
+    if (payload.size() > *limit) {
+        data = invalid_argument("more training data than the unit can have");
+    } else if (sha256(payload) == digest) {
+        data = parse_training_data(payload);
+    }
+    if (!(trace_seconds >= 0 && trace_seconds < 1e9)) trace_seconds = 0;
+
+    const std::lock_guard lock(mutex_);
+    WorkerRecord* worker = find_worker(worker_id);
+    if (!worker) return no_worker(worker_id);
+    worker->last_heard = options_.clock();
+    worker->held.erase(reference);
+    const auto job = find_job(reference.job_id);
+    UnitTable* const units = job ? table_for(*job, reference.key.kind) : nullptr;
+    if (!units) return SubmitAck{SubmitOutcome::kStale, "job " + reference.job_id + " has its training data already"};
+    const auto unit = units->find(reference.key);
+    if (!unit) return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};
+    Status problem = data.status();
+    if (problem.ok() && data->samples != unit->training.sample_count)
+        problem = data_loss("the training data are those of another unit");
+    // What needs the scene's lights to be checked waits for the task that has built it.
+    if (problem.ok()) problem = data->validate(SIZE_MAX);
+    if (!problem.ok()) {
+        ++job->rejected;
+        unit_failed(*job, reference.key, units->fail(reference.key, worker->index), problem);
+        return SubmitAck{SubmitOutcome::kRejected, problem.message()};
+    }
+    switch (units->complete(reference.key, worker->index, digest)) {
+        case UnitTable::Completion::kUnknown: return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};
+        case UnitTable::Completion::kDuplicateSame:
+            ++job->duplicates_same;
+            changed(*job);
+            return SubmitAck{SubmitOutcome::kDuplicateSame, {}};
+        case UnitTable::Completion::kDuplicateDifferent:
+            ++job->duplicates_different;
+            changed(*job);
+            spdlog::error("{}: training unit {} from {} differs from the data taken in before; one of two workers computes wrongly: "
+                          "compare their hosts and builds", job->id, reference.key.group, worker_id);
+            return SubmitAck{SubmitOutcome::kDuplicateDifferent, "the unit was taken in before with other bytes"};
+        case UnitTable::Completion::kFirst: break;
+    }
+    job->training_bytes += payload.size();
+    if (job->training_bytes > options_.training_bytes) {
+        fail_job(*job, {StatusCode::kResourceExhausted, "the training data need more than the " + std::to_string(options_.training_bytes >> 20) +
+                                                            " MiB that a job may have; choose fewer training-paths"});
+        return SubmitAck{SubmitOutcome::kRejected, job->message};
+    }
+    job->training_parts[reference.key.group] = *std::move(data);
+    job->traced_seconds += trace_seconds;
+    changed(*job);
+    work_changed_.notify_all();
+    return SubmitAck{SubmitOutcome::kAccepted, {}};
+}
+
+bool Coordinator::repair_tables(const std::string& job_id) {
+    std::shared_ptr<JobRecord> job;
+    TablesInfo tables;
+    {
+        const std::lock_guard lock(mutex_);
+        job = find_job(job_id);
+        if (!job || job->state != JobState::kRunning) return false;
+        tables = job->tables;
+    }
+    const Digest& digest = tables.asset.digest;
+    if (tables.asset.size_bytes == 0) return false;
+    const std::lock_guard only_one(repair_mutex_);
+    if (assets_.read(digest).ok()) return false;  // the worker's own trouble, or repaired meanwhile
+    assets_.remove(digest);
+    const auto entry = table_cache_.find(tables.cache_key);
+    const bool same = entry && entry->info.asset.digest == digest;
+    const Status stored = same ? assets_.put(digest, entry->bytes) : data_loss("no other copy is left; submit the job again");
+    if (stored.ok() || stored.code() == StatusCode::kAborted) {
+        spdlog::warn("{}: tables {} were damaged on disk and are restored from the cache", job_id, digest.hex().substr(0, 12));
+        return true;
+    }
+    const std::lock_guard lock(mutex_);
+    fail_job(*job, data_loss("the tables are damaged on the coordinator's disk: " + stored.message()));
+    return false;
+}
+
+}  // namespace lightloom

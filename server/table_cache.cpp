@@ -1,0 +1,173 @@
+#include "server/table_cache.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "common/film/atomic_file.h"
+#include "common/tables/subspace_tables.h"
+
+namespace lightloom {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr std::string_view kMagic = "lightloom-table-cache 1 ";
+constexpr const char* kExtension = ".tables";
+
+/// Length-prefixed, so that no two sets of values can have the same text.
+void put(std::string& out, std::string_view name, std::string_view value) {
+    out += name;
+    out += ' ' + std::to_string(value.size()) + ' ';
+    out += value;
+    out += '\n';
+}
+
+Json to_json(const TablesInfo& info) {
+    return {{"light_subspaces", info.light_subspaces},
+            {"eye_subspaces", info.eye_subspaces},
+            {"training_samples", info.training_samples},
+            {"capped_by_time_limit", info.capped_by_time_limit},
+            {"trace_seconds", info.trace_seconds},
+            {"classifier_seconds", info.classifier_seconds},
+            {"energy_seconds", info.energy_seconds},
+            {"gamma_seconds", info.gamma_seconds},
+            {"uniform_loss", info.uniform_loss},
+            {"loss", info.loss},
+            {"prior_strength", info.prior_strength},
+            {"note", info.note}};
+}
+
+/// Only of text whose digest was right, so that every field is there.
+TablesInfo info_from(const Json& json) {
+    TablesInfo info;
+    info.light_subspaces = json.value("light_subspaces", 0u);
+    info.eye_subspaces = json.value("eye_subspaces", 0u);
+    info.training_samples = json.value("training_samples", uint64_t(0));
+    info.capped_by_time_limit = json.value("capped_by_time_limit", false);
+    info.trace_seconds = json.value("trace_seconds", 0.0);
+    info.classifier_seconds = json.value("classifier_seconds", 0.0);
+    info.energy_seconds = json.value("energy_seconds", 0.0);
+    info.gamma_seconds = json.value("gamma_seconds", 0.0);
+    info.uniform_loss = json.value("uniform_loss", 0.0);
+    info.loss = json.value("loss", 0.0);
+    info.prior_strength = json.value("prior_strength", 0.0);
+    info.note = json.value("note", std::string());
+    info.from_cache = true;
+    return info;
+}
+
+struct Parts {
+    std::string_view key_line, info_line, tables;
+};
+
+/// Magic and digest of the rest, then a line with the key, one with the report, and the tables.
+Result<Parts> split(std::string_view bytes) {
+    const Status damaged = data_loss("the entry is damaged");
+    const size_t digest_end = kMagic.size() + 64;
+    if (!bytes.starts_with(kMagic) || bytes.size() <= digest_end || bytes[digest_end] != '\n') return damaged;
+    const std::string_view rest = bytes.substr(digest_end + 1);
+    if (sha256(rest).hex() != bytes.substr(kMagic.size(), 64)) return damaged;
+    const size_t first = rest.find('\n');
+    const size_t second = first == std::string_view::npos ? first : rest.find('\n', first + 1);
+    if (second == std::string_view::npos) return damaged;
+    return Parts{rest.substr(0, first), rest.substr(first + 1, second - first - 1), rest.substr(second + 1)};
+}
+
+}  // namespace
+
+Digest table_key(const BuildIdentity& identity, const JobSpec& spec) {
+    std::string text = "lightloom-tables-key 1\n";
+    put(text, "build", identity.build_id);
+    put(text, "profile", identity.math_profile);
+    put(text, "algorithm", spec.algorithm);
+    for (const auto& [name, value] : spec.parameters) put(text, "set " + name, value);
+    put(text, "seed", std::to_string(spec.seed));
+    put(text, "max_depth", std::to_string(spec.max_depth));
+    put(text, "scene_root", spec.scene_root.hex());
+    const Rect& crop = spec.frame.crop;
+    for (const int32_t n : {spec.frame.width, spec.frame.height, crop.x0, crop.y0, crop.x1, crop.y1})
+        put(text, "frame", std::to_string(n));
+    return sha256(text);
+}
+
+Result<std::string> tables_of_file(std::string bytes) {
+    if (!bytes.starts_with(kMagic)) return bytes;
+    const auto parts = split(bytes);
+    if (!parts.ok()) return parts.status();
+    return std::string(parts->tables);
+}
+
+TableCache::TableCache(fs::path directory, uint64_t max_bytes) : directory_(std::move(directory)), max_bytes_(max_bytes) {
+    std::error_code ignored;  // a directory that cannot be made shows as an error of the first entry
+    if (!directory_.empty()) fs::create_directories(directory_, ignored);
+}
+
+fs::path TableCache::path_of(const Digest& key) const { return directory_ / (key.hex() + kExtension); }
+
+std::optional<TableCache::Entry> TableCache::find(const Digest& key) const {
+    if (directory_.empty()) return std::nullopt;
+    const fs::path path = path_of(key);
+    auto bytes = read_file(path.string());
+    if (!bytes.ok()) return std::nullopt;
+    const auto parts = split(*bytes);
+    Status status = parts.status();
+    if (parts.ok() && parts->key_line != key.hex()) status = data_loss("the entry is that of another job");
+    if (status.ok()) status = parse_tables(parts->tables).status();
+    std::error_code ignored;
+    if (!status.ok()) {
+        spdlog::warn("cached tables {} cannot be used and are made again: {}", path.string(), status.message());
+        fs::remove(path, ignored);
+        return std::nullopt;
+    }
+    fs::last_write_time(path, fs::file_time_type::clock::now(), ignored);
+    Entry entry{std::string(parts->tables), info_from(Json::parse(parts->info_line, nullptr, false))};
+    entry.info.cache_key = key;
+    entry.info.asset = {sha256(entry.bytes), entry.bytes.size()};
+    return entry;
+}
+
+void TableCache::store(const Digest& key, std::string_view bytes, const TablesInfo& info) const {
+    if (directory_.empty()) return;
+    // A note may quote bytes that are not UTF-8; the default of dump() is to throw.
+    std::string rest = key.hex() + "\n" + to_json(info).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+    rest += bytes;
+    std::string file = std::string(kMagic) + sha256(rest).hex() + "\n" + rest;
+    if (file.size() > max_bytes_) return;
+    if (const Status s = write_file_atomically(path_of(key).string(), file); !s.ok()) {
+        spdlog::warn("the tables could not be cached: {}", s.message());
+        return;
+    }
+    trim(key);
+}
+
+void TableCache::trim(const Digest& newest) const {
+    struct File {
+        fs::file_time_type used;
+        fs::path path;
+        uint64_t size;
+    };
+    std::vector<File> files;
+    uint64_t total = 0;
+    std::error_code error;  // another process may remove a file under our eyes
+    for (const auto& item : fs::directory_iterator(directory_, error)) {
+        if (item.path().extension() != kExtension) continue;
+        File file{item.last_write_time(error), item.path(), 0};
+        if (error) continue;
+        file.size = item.file_size(error);
+        if (error) continue;
+        total += file.size;
+        if (item.path() != path_of(newest)) files.push_back(std::move(file));
+    }
+    std::sort(files.begin(), files.end(), [](const File& a, const File& b) { return a.used < b.used; });
+    for (const File& file : files) {
+        if (total <= max_bytes_) break;
+        fs::remove(file.path, error);
+        total -= file.size;
+    }
+}
+
+}  // namespace lightloom

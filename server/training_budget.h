@@ -1,0 +1,25 @@
+#pragma once
+// How much training a time-limited job can afford. The answer comes from a clock, so it is written into the job's spec before any
+// unit that depends on it is leased; whoever renders that spec again gets the same bytes.
+
+#include <cstdint>
+
+namespace lightloom {
+
+/// Share of a time limit that preparation may take unless the user chose the training set.
+inline constexpr double kTrainingShare = 0.1;
+/// Samples of the unit that measures; thrown away afterwards.
+inline constexpr uint64_t kProbeSamples = 2048;
+/// Below this, tables are worth less than what they cost to learn.
+inline constexpr uint64_t kMinTrainingSamples = 1024;
+
+struct TrainingRate {
+    double trace_seconds_per_sample = 0;  ///< With all workers at once.
+    double learn_seconds_per_sample = 0;  ///< Of the coordinator.
+};
+
+/// The largest power of two whose training fits into `seconds`, between kMinTrainingSamples and `wanted` (which is also what comes of
+/// a budget that has room for it). Powers of two, so that jobs with similar limits can share their tables.
+uint64_t affordable_training_samples(const TrainingRate& rate, double seconds, uint64_t wanted);
+
+}  // namespace lightloom
