@@ -35,8 +35,10 @@ std::string line_of(const JobInfo& job, int percent) {
 /// "tracing training paths 65536/200000  ETA 12 s"
 std::string phase_line(const JobInfo& job) {
     std::string line(to_string(job.phase));
-    if (job.phase == PreparePhase::kTracing)
-        line += " " + std::to_string(job.phase_done) + "/" + std::to_string(job.phase_total);
+    if (job.phase == PreparePhase::kTracing) {
+        line += ' ';
+        line += std::to_string(job.phase_done) + "/" + std::to_string(job.phase_total);
+    }
     if (job.phase_done == 0 && job.unit_leased == 0 && job.phase_total > 0) line += "  waiting for a worker";
     if (job.eta_seconds >= 0) line += "  ETA " + duration_text(job.eta_seconds);
     return line;
