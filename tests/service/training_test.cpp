@@ -1,0 +1,227 @@
+// Training through the service: units taken in exactly once, whoever traces them, and the cache of what was learned.
+
+#include "tests/service/table_service.h"
+
+namespace lightloom {
+namespace {
+
+using namespace lightloom::testing;
+
+TEST(Tables, TrainingUnitsCountOnceInAnyOrderAndMakeTheTablesOfASingleMachine) {
+    for (const bool turned : {false, true}) {
+        TableService service({}, turned ? std::optional<uint64_t>(5) : std::nullopt);
+        const std::string id = service.submit_training(service.table_spec());
+        JobInfo info = *service.coordinator->get_job(id);
+        EXPECT_EQ(info.state, JobState::kPreparing);
+        EXPECT_EQ(info.phase, PreparePhase::kTracing);
+        EXPECT_EQ(info.phase_total, kSamples);
+        auto held = lease_all(service);
+        ASSERT_EQ(held.size(), 3u);
+        if (turned) std::reverse(held.begin(), held.end());
+        for (size_t i = 0; i + 1 < held.size(); ++i) {
+            const auto& [worker, lease] = held[i];
+            EXPECT_EQ(lease.unit.key.kind, UnitKind::kTraining);
+            EXPECT_EQ(lease.tables.size_bytes, 0u);
+            EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
+            EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kDuplicateSame);
+        }
+        EXPECT_GT(service.coordinator->get_job(id)->phase_done, 0u);
+        EXPECT_EQ(service.give(held[2].first, held[2].second, traced(held[2].second)).outcome, SubmitOutcome::kAccepted);
+        info = service.wait(id, [](const JobInfo& j) { return j.state == JobState::kRunning; });
+        EXPECT_EQ(info.tables.asset.digest, tables_alone(info.spec));
+        EXPECT_EQ(info.tables.training_samples, kSamples);
+        EXPECT_FALSE(info.tables.from_cache);
+        EXPECT_EQ(info.duplicates_same, 2u);
+        EXPECT_EQ(service.give(held[0].first, held[0].second, traced(held[0].second)).outcome, SubmitOutcome::kStale);
+        const auto render = service.lease(service.add_worker());
+        ASSERT_EQ(render.size(), 1u);
+        EXPECT_EQ(render[0].unit.key.kind, UnitKind::kRender);
+        EXPECT_EQ(render[0].tables.digest, info.tables.asset.digest);
+        EXPECT_TRUE(service.coordinator->assets().read(info.tables.asset.digest).ok());
+    }
+}
+
+TEST(Tables, TrainingUnitsOfSilentWorkersGoToOthers) {
+    TableService service;
+    const std::string id = service.submit_training(service.table_spec());
+    const auto lost = lease_all(service);
+    ASSERT_EQ(lost.size(), 3u);
+    EXPECT_TRUE(service.lease(service.add_worker()).empty());
+    ASSERT_TRUE(service.coordinator->heartbeat(lost[0].first, {{lost[0].second.reference(), true}}).ok());
+    service.now_ms += 11000;
+    service.wait(id, [](const JobInfo& j) { return j.unit_leased == 0; });
+    ASSERT_TRUE(service.coordinator->goodbye(lost[1].first).ok());
+    for (const auto& [worker, lease] : lease_all(service)) EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
+    const JobInfo info = service.wait(id, [](const JobInfo& j) { return j.state == JobState::kRunning; });
+    EXPECT_EQ(info.tables.asset.digest, tables_alone(info.spec));
+    EXPECT_EQ(info.render_seconds, 0) << "tracing is no rendering: the time limit has not begun";
+}
+
+TEST(Tables, DamagedTrainingDataAreRefusedAndTheUnitIsLeasedAgain) {
+    TableService service;
+    const std::string id = service.submit_training(service.table_spec());
+    auto held = lease_all(service);
+    ASSERT_EQ(held.size(), 3u);
+    const auto& [worker, lease] = held[0];
+    std::string damaged = traced(lease);
+    damaged[damaged.size() / 2] ^= 1;
+    EXPECT_EQ(service.give(worker, lease, damaged, sha256(traced(lease))).outcome, SubmitOutcome::kRejected);
+    EXPECT_EQ(service.give(worker, held[1].second, traced(held[2].second)).outcome, SubmitOutcome::kRejected) << "of another size";
+    EXPECT_EQ(service.give(worker, lease, "nonsense").outcome, SubmitOutcome::kRejected);
+    // A light that the scene does not have shows once the scene is built.
+    TrainingData data = *parse_training_data(traced(lease));
+    data.vertices[data.paths[0].first_vertex].emitter = 1000000;
+    EXPECT_EQ(service.give(worker, lease, serialize(data)).outcome, SubmitOutcome::kAccepted);
+    for (size_t i = 1; i < 3; ++i) EXPECT_EQ(service.give(held[i].first, held[i].second, traced(held[i].second)).outcome, SubmitOutcome::kAccepted);
+    std::vector<UnitLease> again;
+    for (int i = 0; i < 500 && again.empty(); ++i) {
+        again = service.lease(service.add_worker());
+        if (again.empty()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    ASSERT_EQ(again.size(), 1u);
+    EXPECT_EQ(again[0].unit.key, lease.unit.key);
+    EXPECT_EQ(service.give(worker, again[0], traced(again[0])).outcome, SubmitOutcome::kAccepted);
+    const JobInfo info = service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
+    EXPECT_EQ(info.state, JobState::kRunning) << info.message;
+    EXPECT_EQ(info.tables.asset.digest, tables_alone(info.spec));
+}
+
+TEST(Tables, TrainingDataHaveABound) {
+    TableService service([](CoordinatorOptions& o) { o.training_bytes = 1 << 20; });
+    const std::string id = service.submit_training(service.table_spec());
+    const auto held = lease_all(service);
+    ASSERT_FALSE(held.empty());
+    const auto limit = service.coordinator->expected_training_bytes(held[0].second.reference());
+    ASSERT_TRUE(limit.ok());
+    EXPECT_GE(*limit, traced(held[0].second).size());
+    EXPECT_EQ(service.give(held[0].first, held[0].second, traced(held[0].second)).outcome, SubmitOutcome::kRejected);
+    EXPECT_NE(service.wait_end(id).message.find("training-paths"), std::string::npos);
+}
+
+TEST(Tables, JobsCanBeCancelledInEveryPhase) {
+    std::atomic<bool> reading{false}, go{false};
+    TableService service([&](CoordinatorOptions& o) {
+        o.read_scene = [&](const AssetStore&, const JobSpec&, std::stop_token stop) -> Result<SceneFacts> {
+            reading = true;
+            while (!go && !stop.stop_requested()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+            return golden_facts();
+        };
+    });
+    const auto cancel = [&](const std::string& id) {
+        EXPECT_EQ(service.coordinator->cancel_job(id)->state, JobState::kCancelled);
+        EXPECT_TRUE(service.lease(service.add_worker()).empty());
+    };
+    const std::string first = service.submit_now(service.table_spec());
+    while (!reading) std::this_thread::yield();
+    cancel(first);
+    go = true;
+    cancel(service.submit_training(service.table_spec()));
+    JobSpec timed = service.table_spec(0);
+    timed.time_limit_seconds = 100;
+    timed.parameters.erase("training-paths");
+    const std::string probing = service.submit_training(timed);
+    EXPECT_EQ(service.coordinator->get_job(probing)->phase, PreparePhase::kProbing);
+    const auto probe = lease_all(service);
+    ASSERT_EQ(probe.size(), 1u);
+    EXPECT_EQ(probe[0].second.unit.key.kind, UnitKind::kProbe);
+    cancel(probing);
+    EXPECT_EQ(service.coordinator->heartbeat(probe[0].first, {{probe[0].second.reference(), true}})->size(), 1u);
+    EXPECT_EQ(service.give(probe[0].first, probe[0].second, traced(probe[0].second)).outcome, SubmitOutcome::kStale);
+    const std::string learning = service.submit_training(service.table_spec());
+    for (const auto& [worker, lease] : lease_all(service)) service.give(worker, lease, traced(lease));
+    cancel(learning);
+    cancel(train_by_hand(service, service.table_spec()));
+    const std::string last = train_by_hand(service, service.table_spec());
+    EXPECT_EQ(service.coordinator->get_job(last)->state, JobState::kRunning) << "the service goes on";
+}
+
+TEST(TableCache, ASecondJobStartsAtOnceAndAChangedOneDoesNot) {
+    TempDirectory cache;
+    const auto with_cache = [&](CoordinatorOptions& o) { o.table_cache = cache.path; };
+    TableService first(with_cache);
+    const JobInfo made = *first.coordinator->get_job(train_by_hand(first, first.table_spec()));
+    ASSERT_EQ(made.state, JobState::kRunning);
+    TableService second(with_cache);
+    const JobInfo info = *second.coordinator->get_job(second.submit(second.table_spec(7)));
+    EXPECT_EQ(info.state, JobState::kRunning);
+    EXPECT_TRUE(info.tables.from_cache);
+    EXPECT_EQ(info.tables.asset.digest, made.tables.asset.digest);
+    EXPECT_EQ(info.tables.training_samples, kSamples);
+    EXPECT_EQ(info.tables.loss, made.tables.loss);
+    EXPECT_EQ(second.lease(second.add_worker()).at(0).tables.digest, made.tables.asset.digest);
+    JobSpec other = second.table_spec();
+    other.seed = 1;
+    EXPECT_EQ(second.coordinator->get_job(second.submit_training(other))->phase, PreparePhase::kTracing);
+}
+
+TEST(TableCache, EachPartOfTheKeyMatters) {
+    BuildIdentity identity{"build", "profile", sha256("golden")};
+    JobSpec spec;
+    spec.algorithm = "spcbpt";
+    spec.parameters = complete_parameters(**find_algorithm("spcbpt"), *parse_parameters(**find_algorithm("spcbpt"), {}));
+    spec.max_depth = 5;
+    spec.scene_root = sha256("scene");
+    spec.frame = kFrame;
+    const Digest reference = table_key(identity, spec);
+    std::set<Digest> keys{reference};
+    const auto changed = [&](const auto& change) {
+        BuildIdentity i = identity;
+        JobSpec s = spec;
+        change(i, s);
+        EXPECT_TRUE(keys.insert(table_key(i, s)).second);
+    };
+    changed([](BuildIdentity& i, JobSpec&) { i.build_id += "x"; });
+    changed([](BuildIdentity& i, JobSpec&) { i.math_profile += "x"; });
+    changed([](BuildIdentity&, JobSpec& s) { s.algorithm = "lvcbpt"; });
+    changed([](BuildIdentity&, JobSpec& s) { s.seed = 1; });
+    changed([](BuildIdentity&, JobSpec& s) { s.max_depth = 6; });
+    changed([](BuildIdentity&, JobSpec& s) { s.scene_root = sha256("other"); });
+    changed([](BuildIdentity&, JobSpec& s) { ++s.frame.width; });
+    changed([](BuildIdentity&, JobSpec& s) { ++s.frame.height; });
+    changed([](BuildIdentity&, JobSpec& s) { ++s.frame.crop.x0; });
+    changed([](BuildIdentity&, JobSpec& s) { ++s.frame.crop.y0; });
+    changed([](BuildIdentity&, JobSpec& s) { --s.frame.crop.x1; });
+    changed([](BuildIdentity&, JobSpec& s) { --s.frame.crop.y1; });
+    for (const auto& [name, value] : spec.parameters)
+        changed([&](BuildIdentity&, JobSpec& s) { s.parameters[name] = value + "1"; });
+    // What decides only how long the rendering takes does not.
+    spec.samples_per_pixel = 9;
+    EXPECT_EQ(table_key(identity, spec), reference);
+}
+
+TEST(TableCache, DamagedEntriesAreRemovedAndTheDirectoryStaysBounded) {
+    const TempDirectory directory;
+    const std::string bytes = serialize(trivial_tables(golden()->emitters()));
+    const TableCache cache(directory.path, 5 * bytes.size() / 2 + 4096);
+    const Digest key = sha256("a");
+    EXPECT_FALSE(cache.find(key));
+    cache.store(key, bytes, {.training_samples = 7, .loss = 0.25, .note = "a note"});
+    const auto entry = cache.find(key);
+    ASSERT_TRUE(entry);
+    EXPECT_EQ(entry->bytes, bytes);
+    EXPECT_EQ(entry->info.training_samples, 7u);
+    EXPECT_EQ(entry->info.loss, 0.25);
+    EXPECT_EQ(entry->info.note, "a note");
+    EXPECT_EQ(*tables_of_file(*read_file(cache.path_of(key).string())), bytes);
+    EXPECT_EQ(*tables_of_file(bytes), bytes);
+    const std::string file = *read_file(cache.path_of(key).string());
+    for (const size_t at : {size_t(3), size_t(40), size_t(150), file.size() / 2, file.size() - 1}) {
+        std::string damaged = file;
+        damaged[at] ^= 4;
+        ASSERT_TRUE(write_file_atomically(cache.path_of(key).string(), damaged).ok());
+        EXPECT_FALSE(cache.find(key)) << at;
+        EXPECT_FALSE(std::filesystem::exists(cache.path_of(key))) << at;
+    }
+    // Another key's entry under this name is no entry of this key.
+    ASSERT_TRUE(write_file_atomically(cache.path_of(sha256("b")).string(), file).ok());
+    EXPECT_FALSE(cache.find(sha256("b")));
+    for (int i = 0; i < 40; ++i) cache.store(sha256(std::to_string(i)), bytes, {});
+    uint64_t total = 0;
+    for (const auto& item : std::filesystem::directory_iterator(directory.path)) total += item.file_size();
+    EXPECT_LE(total, 5 * bytes.size() / 2 + 4096);
+    EXPECT_TRUE(cache.find(sha256("39"))) << "the newest entry stays";
+    EXPECT_FALSE(TableCache({}, 1000).find(key));
+}
+
+}  // namespace
+}  // namespace lightloom
