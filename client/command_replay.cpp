@@ -25,17 +25,26 @@ struct ReplayOptions {
     JobOptions job;
     uint64_t iteration = 0;
     std::string pixel, unit;
+    uint64_t spp = 0;
 };
+
+/// A job's last group may be cut short, and what a unit traces depends on how long its group is.
+Group group_of_job(const Plan& plan, uint32_t index, uint64_t spp) {
+    Group group = plan.group(index);
+    if (spp > group.first_iteration)
+        group.iteration_count = uint32_t(std::min<uint64_t>(group.iteration_count, spp - group.first_iteration));
+    return group;
+}
 
 Result<WorkUnit> find_unit(const ReplayOptions& options, const Plan& plan, uint64_t iteration, int x, int y) {
     if (!options.unit.empty()) {
         unsigned group = 0, tile = 0;
         if (std::sscanf(options.unit.c_str(), "%u,%u", &group, &tile) != 2 || tile >= plan.tile_count())
             return invalid_argument("--unit takes GROUP,TILE with a tile below " + std::to_string(plan.tile_count()));
-        return plan.units(plan.group(group))[tile];
+        return plan.units(group_of_job(plan, group, options.spp))[tile];
     }
     for (uint32_t g = 0;; ++g) {
-        const Group group = plan.group(g);
+        const Group group = group_of_job(plan, g, options.spp);
         if (iteration >= group.first_iteration + group.iteration_count) continue;
         for (const WorkUnit& unit : plan.units(group)) {
             if (unit.tile.contains(x, y)) return unit;
@@ -76,8 +85,12 @@ int replay(const ReplayOptions& options) {
         work.first_iteration = options.iteration;
         work.iteration_count = 1;
         work.tile = {x, y, x + 1, y + 1};
-        work.first_light_path = unit->first_light_path + place;
-        work.light_path_count = unit->light_path_count > 0 ? 1 : 0;
+        if ((*algorithm)->needs_tables) {
+            work.owner_tile = unit->tile;  // the sample looks at the whole unit's cache
+        } else {
+            work.first_light_path = unit->first_light_path + place;
+            work.light_path_count = unit->light_path_count > 0 ? 1 : 0;
+        }
     }
     const auto partial = (*renderer)->render(work, {});
     if (!partial.ok()) return report_error(partial.status());
@@ -85,7 +98,8 @@ int replay(const ReplayOptions& options) {
     for (size_t i = 0; i < partial->camera.size(); ++i) sum[i % 3] += partial->camera[i];
     std::printf("unit %u,%u  camera %.9g %.9g %.9g\n", unit->key.group, unit->key.tile, sum[0], sum[1], sum[2]);
     const int width = scene->frame().crop.width();
-    if (options.unit.empty()) {
+    // With a cache, the splats are the unit's, not this sample's.
+    if (options.unit.empty() && !(*algorithm)->needs_tables) {
         for (const SplatSum& splat : partial->splats) {
             std::printf("splat at %d,%d  %.9g %.9g %.9g\n", scene->frame().crop.x0 + int(splat.pixel) % width,
                         scene->frame().crop.y0 + int(splat.pixel) / width, splat.rgb[0], splat.rgb[1], splat.rgb[2]);
@@ -110,6 +124,7 @@ void add_replay_command(CLI::App& app, int* exit_code) {
     auto* iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, from 0");
     auto* pixel = command->add_option("--pixel", options->pixel, "X,Y in full-frame pixels, 0,0 at the top left");
     auto* unit = command->add_option("--unit", options->unit, "GROUP,TILE: the whole unit instead of one sample");
+    command->add_option("--spp", options->spp, "Samples per pixel of the job, if it was bounded by them");
     iteration->needs(pixel);
     pixel->excludes(unit);
     command->add_flag("--strict", options->job.strict, "Exit with 3 if samples were dropped");

@@ -53,6 +53,7 @@ std::string replay_command(const JobSpec& spec, const std::string& scene, const 
     for (const auto& [key, value] : spec.parameters) command += " --set " + shell_word(key + "=" + value);
     command += " --seed " + std::to_string(spec.seed) + " --max-depth " + std::to_string(spec.max_depth);
     if (spec.width > 0) command += " --resolution " + std::to_string(spec.width) + "x" + std::to_string(spec.height);
+    if (spec.samples_per_pixel > 0) command += " --spp " + std::to_string(spec.samples_per_pixel);
     if (sample.splat)
         return command + " --unit " + std::to_string(dropped.unit.group) + "," + std::to_string(dropped.unit.tile);
     return command + " --iteration " + std::to_string(sample.iteration) + " --pixel " + std::to_string(x) + "," +

@@ -99,6 +99,31 @@ TEST(Determinism, SeedsAndIterationsMakeDifferentSamples) {
     }
 }
 
+/// What `replay` does: one pixel and iteration of a unit, with the whole unit's cache.
+TEST(Tiles, ASampleOfACachedUnitCanBeRenderedAlone) {
+    const auto scene = testing::diffuse_box();
+    const Rect crop = scene->frame().crop;
+    const Rect tile{3, 4, 8, 9};
+    for (const char* algorithm : {"lvcbpt", "spcbpt"}) {
+        // Fewer counted paths than the cache holds, so that both kinds of keys matter.
+        const UnitWork unit{2, 2, 2, tile, 17, 20};
+        const Partial whole = render(scene, algorithm, unit);
+        UnitWork sample = unit;
+        sample.owner_tile = tile;
+        sample.tile = {5, 6, 6, 7};
+        sample.iteration_count = 1;
+        double sum[3] = {};
+        for (const uint64_t iteration : {2, 3}) {
+            sample.first_iteration = iteration;
+            const Partial alone = render(scene, algorithm, sample);
+            for (size_t c = 0; c < 3; ++c) sum[c] += alone.camera[c];
+        }
+        for (size_t c = 0; c < 3; ++c)
+            EXPECT_EQ(sum[c], whole.camera[3 * size_t((6 - 4) * tile.width() + (5 - 3)) + c]) << algorithm;
+        EXPECT_TRUE(crop.contains(5, 6));
+    }
+}
+
 /// A camera sample is keyed by its pixel, not by its tile; with rows as tiles and one iteration, so
 /// is its light sub-path.
 TEST(Tiles, HoldExactlyTheSamplesOfTheFrame) {
