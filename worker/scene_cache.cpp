@@ -96,6 +96,9 @@ Result<std::string> SceneFetcher::tables(const AssetReference& tables, std::stop
             if (bytes.ok()) return bytes;
             status = bytes.status();
             store_.remove(tables.digest);
+        } else if (status.code() == StatusCode::kInvalidArgument || status.code() == StatusCode::kOutOfRange) {
+            // More or fewer bytes than announced: the file was cut short there, or what is left of an earlier attempt here.
+            status = data_loss("the tables have the wrong size: " + status.message());
         } else if (status.code() != StatusCode::kDataLoss) {
             return status;
         }

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <new>
 #include <random>
 #include <thread>
 
@@ -147,7 +148,12 @@ bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
         unit_stop = item->second.stop.get_token();
     }
     const bool training = reference.key.kind != UnitKind::kRender;
-    const Status made = training ? trace_unit(lease, unit_stop, stop) : render_unit(lease, unit_stop, stop);
+    Status made;
+    try {
+        made = training ? trace_unit(lease, unit_stop, stop) : render_unit(lease, unit_stop, stop);
+    } catch (const std::bad_alloc&) {
+        made = {StatusCode::kResourceExhausted, "this worker has too little memory for the unit"};
+    }
     const bool able = made.ok() || made.code() == StatusCode::kCancelled;
     if (!able) spdlog::error("{}: {}", name_of(reference), made.message());
     // A heartbeat that still named a unit which is given back would take it again, and nobody would render it until that lease ran out.

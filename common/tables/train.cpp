@@ -12,6 +12,8 @@ namespace {
 
 constexpr size_t kClassifierEnds = 60000;  ///< Enough for 1000 centroids and their borders.
 
+constexpr uint64_t kMaxGammaCells = uint64_t(1) << 24;  ///< 64 MB in single precision.
+
 class Stopwatch {
   public:
     double lap() {
@@ -177,6 +179,10 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
     const std::vector<double> brightness = block_brightness(data);
     train_classifiers(data, brightness, emitters, options, &tables);
     report->classifier_seconds = watch.lap();
+    if (uint64_t(tables.light_count) * tables.eye_count > kMaxGammaCells)
+        return invalid_argument("Gamma would have " + std::to_string(tables.light_count) + " x " + std::to_string(tables.eye_count) +
+                                " entries and goes to every worker; ask for fewer light-subspaces or eye-subspaces (at most " +
+                                std::to_string(kMaxGammaCells) + " entries)");
     if (stop.stop_requested()) return cancelled;
     measure_energy(data, emitters, options, &tables);
     report->energy_seconds = watch.lap();

@@ -118,7 +118,7 @@ struct SpcbptAlgorithm {
         const auto each = [&](auto&& visit) {
             for (uint64_t m = 0; m < state.cache.path_count(); ++m) {
                 for_each_candidate(state.cache, m, scope.max_edges, [&](const LightCandidate& c, const PathVertex& v) {
-                    if (m < window * tables.window[v.label] && scalar_of(v.alpha) > 0) visit(c, v);
+                    if (m < window * tables.window[v.label] && scalar_of(v.alpha) > 0 && scalar_of(v.alpha) < HUGE_VALF) visit(c, v);
                 });
             }
         };
