@@ -70,16 +70,36 @@ struct RatioSum {
 
 }  // namespace detail
 
+/// Whether no Dirac vertex stands next to the connection between x_{s-1} and x_s.
+inline bool can_connect(const PathView& view, int s) {
+    return !(s > 0 && view.delta[s - 1]) && !(s > 0 && s < view.k && view.delta[s]);
+}
+
+/// Calls visit(s, chain) with chain = C(s) A(s) / (C(base) A(base)) for every s != base from s_min to s_max that it is not zero for,
+/// walking outward from `base`, a technique that can produce the path.
+template <class Visit>
+void for_each_split(const PathView& view, int base, int s_min, int s_max, Visit&& visit) {
+    WideProduct chain;
+    for (int s = base; s < s_max; ++s) {
+        chain.multiply(view.fwd[s] / view.rev[s]);  // rev > 0: the own technique traced x_s from the camera
+        if (chain.mantissa == 0) break;
+        visit(s + 1, chain);
+    }
+    chain = WideProduct{};
+    for (int s = base; s > s_min; --s) {
+        chain.multiply(view.rev[s - 1] / view.fwd[s - 1]);  // fwd > 0: traced from the light (or next event, same support)
+        if (chain.mantissa == 0) break;
+        visit(s - 1, chain);
+    }
+}
+
 /// w of technique `own` for the path in `view`, in [0, 1]; zero when the selection has switched it off. `own` must be able to
 /// produce the path.
 template <class Selection>
 double mis_weight(const PathView& view, Technique own, const Selection& selection, Heuristic heuristic = Heuristic::kBalance) {
     const int k = view.k, s_min = selection.s_min(k), s_max = selection.s_max(k);
     const auto connect = [&](int s) -> double {
-        if (s < s_min || s > s_max) return 0;
-        if (s > 0 && view.delta[s - 1]) return 0;
-        if (s > 0 && s < k && view.delta[s]) return 0;
-        return selection.connect_factor(view, s);
+        return s < s_min || s > s_max || !can_connect(view, s) ? 0 : selection.connect_factor(view, s);
     };
     // sigma of the own technique, relative to C(base) A(base) of the connection with the same split.
     const int base = own.s;
@@ -103,26 +123,14 @@ double mis_weight(const PathView& view, Technique own, const Selection& selectio
         }
     };
 
-    // Sweep order for ties: connect 0, connect 1, merge 1, connect 2, merge 2, ...
+    // Order for ties: connect 0, connect 1, merge 1, connect 2, merge 2, ...
     if (own.kind == TechniqueKind::kMerge)
         if (const double f = connect(base); f > 0) ratios.add(f * inv_own, true);
-    WideProduct chain;  // C(s) A(s) / (C(base) A(base))
-    merge(base, chain, false);
-    for (int s = base; s < k; ++s) {
-        if (!Selection::kMerges && s >= s_max) break;
-        chain.multiply(view.fwd[s] / view.rev[s]);  // rev > 0: the own technique traced x_s from the camera
-        if (chain.mantissa == 0) break;
-        if (const double f = connect(s + 1); f > 0) ratios.add(chain.value(f * inv_own), false);
-        merge(s + 1, chain, false);
-    }
-    chain = WideProduct{};
-    for (int s = base; s > 0; --s) {
-        if (!Selection::kMerges && s <= s_min) break;
-        chain.multiply(view.rev[s - 1] / view.fwd[s - 1]);  // fwd > 0: traced from the light (or next event, same support)
-        if (chain.mantissa == 0) break;
-        merge(s - 1, chain, true);
-        if (const double f = connect(s - 1); f > 0) ratios.add(chain.value(f * inv_own), true);
-    }
+    merge(base, WideProduct{}, false);
+    for_each_split(view, base, Selection::kMerges ? 0 : s_min, Selection::kMerges ? k : s_max, [&](int s, const WideProduct& chain) {
+        if (const double f = connect(s); f > 0) ratios.add(chain.value(f * inv_own), s < base);
+        merge(s, chain, s < base);
+    });
     return ratios.weight();
 }
 

@@ -73,6 +73,8 @@ class EmitterSet {
     int32_t environment_index() const { return environment_index_; }
     const Environment& environment() const { return environment_; }
     float scene_radius() const { return scene_radius_; }
+    /// A point outside of the scene, on a ray that has left it.
+    Vec3 outside(const Vec3& origin, const Vec3& direction) const { return origin + direction * (2 * scene_radius_); }
 
     /// Scalar power of an emitter, W.
     double power(const Emitter& e) const;

@@ -12,6 +12,7 @@
 
 #include "common/path/camera_walk.h"
 #include "common/path/mis.h"
+#include "common/transport/contribution.h"
 #include "common/transport/unit_loop.h"
 
 namespace lightloom {
@@ -28,17 +29,6 @@ struct BdptSelection {
     }
 };
 
-/// One way in which a camera sample and its light sub-path met: technique s, t with y[0 .. s-1] (s >= 2) and z[0 .. t-1]. x_0 is
-/// apart because for s <= 1 it is on neither array. `view` is filled in.
-struct BdptContribution {
-    Rgb value;  ///< Unweighted, f / p.
-    int s = 0, t = 0;
-    const PathVertex *y = nullptr, *z = nullptr;
-    Vec3 position, normal;  ///< Of x_0; for an infinite light a point outside of the scene and the direction of travel.
-    uint32_t emitter = 0;
-    Vec2 film;              ///< Connections to the lens only (t = 1, s >= 2).
-};
-
 /// Traces one camera sample and one light sub-path and calls contribute(contribution, view) for everything that they give.
 /// light_done(y, n) is called once the light sub-path is complete.
 template <ViewDetail detail, class LightDone, class Contribute>
@@ -50,7 +40,7 @@ void trace_bdpt_sample(SampleContext& context, LightDone&& light_done, Contribut
     const int n = trace_light_path(scene, rng, context.max_edges, context.roulette, y, &context.counters);
     light_done(y, n);
     const auto from_light = [&](const Rgb& value, int s, int t, Vec2 film) {
-        contribute(BdptContribution{value, s, t, y, z, y[0].p, y[0].ng, uint32_t(y[0].emitter), film}, view);
+        contribute(PathContribution{value, 1, s, t, y, z, y[0].p, y[0].ng, uint32_t(y[0].emitter), film}, view);
     };
     for (int s = 2; s <= n; ++s) {
         if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
@@ -65,13 +55,14 @@ void trace_bdpt_sample(SampleContext& context, LightDone&& light_done, Contribut
         const PathVertex& v = z[t - 1];
         if (v.emitter != kNone)
             if (const Rgb c = emitter_hit<detail>(scene, z, t, &view); !c.is_black())
-                contribute(BdptContribution{c, 0, t, y, z, v.p, v.ng, uint32_t(v.emitter), {}}, view);
+                contribute(PathContribution{c, 1, 0, t, y, z, v.p, v.ng, uint32_t(v.emitter), {}}, view);
         if (t > context.max_edges || !v.bsdf.has_smooth_lobe()) return;
         NextEventSample light;
         const double pick = sampler.rng().uniform_double();
         if (scene.emitters().sample_next_event(v.p, pick, sampler.next_event(t), &light))
             if (const Rgb c = next_event<detail>(scene, z, t, light, &view, &context.counters); !c.is_black())
-                contribute(BdptContribution{c, 1, t, y, z, light.position, light.normal, light.emitter, {}}, view);
+                contribute(PathContribution{c, float(view.fwd[0] / view.next_event), 1, t, y, z, light.position, light.normal,
+                                            light.emitter, {}}, view);
         for (int s = 2; s <= n && s + t - 1 <= context.max_edges; ++s) {
             if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
             if (const Rgb c = connect<detail>(scene, y, s, z, t, &view, &context.counters); !c.is_black()) from_light(c, s, t, {});
@@ -82,7 +73,7 @@ void trace_bdpt_sample(SampleContext& context, LightDone&& light_done, Contribut
         const Rgb c = environment_hit<detail>(scene, z, t, ray, &view);
         if (c.is_black()) return;
         const EmitterSet& emitters = scene.emitters();
-        contribute(BdptContribution{c, 0, t, y, z, ray.origin + ray.direction * (2 * emitters.scene_radius()), -ray.direction,
+        contribute(PathContribution{c, 1, 0, t, y, z, emitters.outside(ray.origin, ray.direction), -ray.direction,
                                     uint32_t(emitters.environment_index()), {}}, view);
     };
     trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters, visit,
@@ -99,9 +90,9 @@ struct BdptAlgorithm {
         Rgb sum;
         trace_bdpt_sample<ViewDetail::kFull>(
             context, [](const PathVertex*, int) {},
-            [&](const BdptContribution& c, const PathView& view) {
+            [&](const PathContribution& c, const PathView& view) {
                 const Rgb weighted = c.value * float(mis_weight(view, {TechniqueKind::kConnect, c.s}, selection, heuristic));
-                if (c.t == 1 && c.s > 0)  // not the sky behind the first camera ray
+                if (c.to_lens())
                     context.splat(c.film, weighted);
                 else
                     sum += weighted;

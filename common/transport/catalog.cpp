@@ -37,6 +37,8 @@ constexpr ParameterInfo kSubspaces[] = {
     {"source-share", 0.2, 0, 1, false, "share of N_L that divides the lights themselves [Su et al. 2022, section 5.1]"},
     {"training-paths", 500000, 1, 1e8, true,
      "D and M': camera samples and light sub-paths of the training set [Su et al. 2022: 1e6 and 2e6]"},
+    {"pilot", 0.2, 0, 1, false,
+     "share of the training set that is traced first, to guide the tracing of the rest; 0: no second round"},
     {"direction-weight", 0.05, 0, 10, false, "k_d: weight of directions in the distance of sub-paths"},
     {"mix", 0.1, 0.001, 1, false, "share of Gamma that is not learned: half uniform, half in proportion to Q"},
     {"trainer", 0, 0, 2, true,

@@ -36,8 +36,8 @@ struct LightCandidate {
     uint32_t s = 0;
 };
 
-/// Traces `path_count` paths. `finish(y, n)` is called once a path is complete (labels), `splat(y, s, lens_sample, chunk)` for
-/// every vertex of a counted path that can be connected to the lens.
+/// Traces `path_count` paths. `finish(y, n)` is called once a path is complete (labels), `splat(y, s, lens_sample, m, chunk)` for
+/// every vertex of a counted path m that can be connected to the lens.
 template <class Finish, class SplatVertex>
 LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPreparation* preparation, Finish&& finish,
                              SplatVertex&& splat) {
@@ -65,7 +65,7 @@ LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPr
                 chunk.lengths.push_back(uint32_t(n));
                 chunk.vertices.insert(chunk.vertices.end(), y.begin(), y.begin() + n);
                 for (int s = 2; counted && s <= n; ++s)
-                    if (y[size_t(s - 1)].bsdf.has_smooth_lobe()) splat(y.data(), s, rng.uniform2(), chunk);
+                    if (y[size_t(s - 1)].bsdf.has_smooth_lobe()) splat(y.data(), s, rng.uniform2(), m, chunk);
             }
         }
     });

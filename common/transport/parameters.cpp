@@ -1,10 +1,21 @@
 #include "common/transport/parameters.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/path/path_view.h"
 
 namespace lightloom {
+namespace {
+
+/// Whole units, so that both rounds are planned alike; none when the set is too small for two rounds.
+uint64_t pilot_of(uint64_t samples, double share) {
+    const uint64_t units = samples / kTrainingUnitSamples;
+    if (share <= 0 || units < 2) return 0;
+    return kTrainingUnitSamples * std::clamp(uint64_t(std::llround(share * double(units))), uint64_t(1), units - 1);
+}
+
+}  // namespace
 
 Result<TransportParameters> TransportParameters::read(const RenderSettings& settings) {
     const Result<const AlgorithmInfo*> info = find_algorithm(settings.algorithm);
@@ -42,6 +53,7 @@ Result<TransportParameters> TransportParameters::read(const RenderSettings& sett
     t.direction_weight = value("direction-weight");
     t.mix = value("mix");
     t.trainer = GammaTrainer(int(value("trainer")));
+    p.pilot_samples = pilot_of(p.training_samples, value("pilot"));
     t.reuse_windows = int(value("windows"));
     t.reuse_target = value("reuse-target");
     return p;

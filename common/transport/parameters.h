@@ -9,6 +9,9 @@
 
 namespace lightloom {
 
+/// Camera samples of a training unit; the last one may have fewer.
+inline constexpr uint64_t kTrainingUnitSamples = uint64_t(1) << 14;
+
 struct TransportParameters {
     RouletteRule roulette;
     Heuristic heuristic = Heuristic::kBalance;
@@ -19,6 +22,7 @@ struct TransportParameters {
     uint64_t minimum_paths = 1;   ///< Of a unit's cache.
     bool ris_aware = false;
     uint64_t training_samples = 0;
+    uint64_t pilot_samples = 0;   ///< The first of them, traced without a guide; 0: all.
     TrainingOptions training;
 
     /// Unknown algorithm or parameter, value or depth out of range: a clear error.

@@ -48,14 +48,9 @@ Result<std::unique_ptr<Renderer>> Renderer::create(std::shared_ptr<const Scene> 
     if (settings.algorithm == "light") return make(LightAlgorithm{});
     if (settings.algorithm == "bdpt") return make(BdptAlgorithm<>{{light_paths_per_iteration}, p.heuristic});
     if (settings.algorithm == "lvcbpt")
-        return make(LvcbptAlgorithm<>{{light_paths_per_iteration, double(p.connections) / tables->vertices_per_path},
-                                    p.heuristic, p.connections, p.minimum_paths});
-    SubspaceSelection selection;
-    selection.prepared = std::make_shared<const PreparedTables>(*tables);
-    selection.light_paths_per_iteration = light_paths_per_iteration;
-    selection.connections = p.connections;
-    selection.cache_paths = p.ris_aware ? double(p.minimum_paths) : 0;
-    return make(SpcbptAlgorithm<>{std::move(selection), p.heuristic, p.connections, p.minimum_paths});
+        return make(LvcbptAlgorithm<>{
+            {{light_paths_per_iteration, double(p.connections) / tables->vertices_per_path}, p.connections}, p.heuristic, p.minimum_paths});
+    return make(make_spcbpt(p, std::make_shared<const PreparedTables>(*tables), light_paths_per_iteration));
 }
 
 }  // namespace lightloom

@@ -19,9 +19,9 @@
 #include <span>
 #include <utility>
 
-#include "common/path/mis.h"
 #include "common/scene/sampling.h"
-#include "common/transport/light_cache.h"
+#include "common/transport/cached.h"
+#include "common/transport/parameters.h"
 #include "common/transport/subspace_view.h"
 
 namespace lightloom {
@@ -65,11 +65,11 @@ struct SubspaceSelection {
 
 /// A selection with fewer techniques (connect_factor 0) makes an algorithm of those that remain.
 template <class Selection = SubspaceSelection>
-struct SpcbptAlgorithm {
+struct SubspaceConnections {
     Selection selection;
-    Heuristic heuristic = Heuristic::kBalance;
-    int connections = 3;         ///< N
-    uint64_t minimum_paths = 1;  ///< Of a unit's cache.
+    int connections = 3;  ///< N
+
+    static constexpr ViewDetail kDetail = ViewDetail::kSubspace;
 
     /// A prefix and its part of the alias table of its subspace, drawn in proportion to r.
     struct Candidate {
@@ -81,87 +81,76 @@ struct SpcbptAlgorithm {
         uint32_t begin = 0, count = 0;  ///< Of its candidates.
         float scale = 0;                ///< R_i / (M_i N)
     };
-    /// The cache, sorted by light subspace.
-    struct State {
-        LightCache cache;
+    /// The cache's candidates, sorted by light subspace.
+    struct Index {
         std::vector<Subspace> subspaces;
         std::vector<Candidate, HugePageAllocator<Candidate>> candidates;
     };
 
-    float weight(const PathView& view, int s) const {
-        return float(mis_weight(view, {TechniqueKind::kConnect, s}, selection, heuristic));
-    }
+    uint64_t windows() const { return uint64_t(selection.prepared->windows); }
     SubspaceLabeller labeller(const Scene& scene) const { return {selection.prepared->tables, scene.emitters()}; }
+    void label_light_path(const Scene& scene, PathVertex* y, int n) const { labeller(scene).label_light_path(y, n); }
+    void label_camera_vertex(const Scene& scene, PathVertex* v) const { labeller(scene).label_camera_vertex(v); }
+    void complete(const Scene& scene, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
+        labeller(scene).complete(y, s, z, t, towards, view);
+    }
+    float inverse_density(const LightPick& pick) const { return pick.scale / scalar_of(pick.y[pick.s - 1].alpha); }
 
-    State prepare(const UnitScope& scope, UnitPreparation* preparation) const {
-        State state;
+    Index index(const UnitScope& scope, const LightCache& cache, uint64_t paths) const {
         const SubspaceTables& tables = selection.prepared->tables;
-        const SubspaceLabeller label = labeller(scope.scene);
-        const uint64_t window = std::max(minimum_paths, scope.work.light_path_count);
-        const auto splat = [&](const PathVertex* y, int s, Vec2 lens_sample, auto& chunk) {
-            PathView view;
-            Vec2 film;
-            PathVertex z0;
-            z0.p = scope.scene.camera().sample_lens(lens_sample);
-            const Rgb c = connect_to_camera(scope.scene, y, s, z0.p, &film, &view, &chunk.counters);
-            if (c.is_black()) return;
-            label.complete(y, s, &z0, 1, normalize(y[s - 1].p - z0.p), &view);
-            const uint32_t pixel = uint32_t(scope.scene.frame().crop.index(int(film.x), int(film.y)));
-            chunk.splats.push_back({pixel, scope.work.first_iteration, c * weight(view, s)});
-        };
-        state.cache = trace_light_cache(scope, window * uint64_t(selection.prepared->windows), preparation,
-                                        [&](PathVertex* y, int n) { label.label_light_path(y, n); }, splat);
-        if (scope.stop.stop_requested()) return state;
-
+        Index index;
         // Counting sort by subspace; path order within one.
-        state.subspaces.assign(tables.light_count, {});
+        index.subspaces.assign(tables.light_count, {});
         const auto each = [&](auto&& visit) {
-            for (uint64_t m = 0; m < state.cache.path_count(); ++m) {
-                for_each_candidate(state.cache, m, scope.max_edges, [&](const LightCandidate& c, const PathVertex& v) {
-                    if (m < window * tables.window[v.label] && scalar_of(v.alpha) > 0 && scalar_of(v.alpha) < HUGE_VALF) visit(c, v);
+            for (uint64_t m = 0; m < cache.path_count(); ++m) {
+                for_each_candidate(cache, m, scope.max_edges, [&](const LightCandidate& c, const PathVertex& v) {
+                    if (m < paths * tables.window[v.label] && scalar_of(v.alpha) > 0 && scalar_of(v.alpha) < HUGE_VALF)
+                        visit(c, v);
                 });
             }
         };
         uint32_t total = 0;
-        each([&](const LightCandidate&, const PathVertex& v) { ++state.subspaces[v.label].count, ++total; });
+        each([&](const LightCandidate&, const PathVertex& v) { ++index.subspaces[v.label].count, ++total; });
         uint32_t begin = 0;
-        for (Subspace& i : state.subspaces) i.begin = std::exchange(begin, begin + i.count);
-        state.candidates.resize(total);
+        for (Subspace& i : index.subspaces) i.begin = std::exchange(begin, begin + i.count);
+        index.candidates.resize(total);
         std::vector<double> r(total);
         std::vector<uint32_t> filled(tables.light_count, 0);
         each([&](const LightCandidate& c, const PathVertex& v) {
-            const size_t at = state.subspaces[v.label].begin + filled[v.label]++;
-            state.candidates[at].prefix = c;
+            const size_t at = index.subspaces[v.label].begin + filled[v.label]++;
+            index.candidates[at].prefix = c;
             r[at] = double(scalar_of(v.alpha));
         });
         fork_join(tables.light_count, [&](size_t first, size_t last) {
             std::vector<AliasEntry> entries;
             for (size_t i = first; i < last; ++i) {
-                Subspace& subspace = state.subspaces[i];
+                Subspace& subspace = index.subspaces[i];
                 const std::span<const double> part(r.data() + subspace.begin, subspace.count);
                 entries.assign(part.size(), {});
                 make_alias(part, entries.data());
                 double sum = 0;
                 for (uint32_t c = 0; c < subspace.count; ++c) {
                     sum += part[c];
-                    state.candidates[subspace.begin + c].keep = entries[c].keep;
-                    state.candidates[subspace.begin + c].alias = entries[c].alias;
+                    index.candidates[subspace.begin + c].keep = entries[c].keep;
+                    index.candidates[subspace.begin + c].alias = entries[c].alias;
                 }
-                subspace.scale = float(sum / (double(window) * tables.window[i] * connections));
+                subspace.scale = float(sum / (double(paths) * tables.window[i] * connections));
             }
         });
-        return state;
+        return index;
     }
 
-    /// N draws for a vertex of eye subspace `eye`, stage by stage, so that the memory of all of them is fetched at once. The
+    /// N draws for a labelled camera vertex, stage by stage, so that the memory of all of them is fetched at once. The
     /// first stage is stratified over the draws. Returns how many of them found a prefix.
-    int draw(const State& state, uint32_t eye, Vec2 u, Rng& rng, int longest_prefix, LightPick* picks) const {
+    template <class Stratified>
+    int draw(const LightCache& cache, const Index& index, const PathVertex& v, Stratified&& stratified, Rng& rng, int longest_prefix,
+             LightPick* picks) const {
         const PreparedTables& prepared = *selection.prepared;
         const uint32_t light_count = prepared.tables.light_count;
-        const AliasEntry* column = &prepared.draws[size_t(eye) * light_count];
+        const AliasEntry* column = &prepared.draws[size_t(v.label) * light_count];
         // u has 24 bits, a subspace of a large cache more candidates than that can tell apart: their rare ones would be drawn too
         // often. The bits below come from the stream.
-        const Vec2 below = rng.uniform2();
+        const Vec2 u = stratified(), below = rng.uniform2();
         const double ux = double(u.x) + double(below.x) * 0x1p-24, uy = double(u.y) + double(below.y) * 0x1p-24;
         const auto first = [&](int n) { return (ux + n) / connections; };
         for (int n = 0; n < connections; ++n) __builtin_prefetch(&column[alias_part(light_count, first(n))]);
@@ -175,11 +164,11 @@ struct SpcbptAlgorithm {
         for (int n = 0; n < connections; ++n) {
             const uint32_t part = alias_part(light_count, first(n));
             const uint32_t i = draw_alias(column[part], light_count, part, first(n));
-            const Subspace& subspace = state.subspaces[i];
+            const Subspace& subspace = index.subspaces[i];
             const double second = n == 0 ? uy : rng.uniform_double();
             if (subspace.count == 0) continue;  // nothing there: its share of the estimate is zero
             Draw& d = draws[found++];
-            d = {&state.candidates[subspace.begin], subspace.count, alias_part(subspace.count, second), second,
+            d = {&index.candidates[subspace.begin], subspace.count, alias_part(subspace.count, second), second,
                  subspace.scale / column[i].pmf};
             __builtin_prefetch(&d.candidates[d.part]);
         }
@@ -190,52 +179,23 @@ struct SpcbptAlgorithm {
             const bool own = d.second * double(d.count) - double(d.part) < double(part.keep);
             const LightCandidate& prefix = (own ? part : d.candidates[part.alias]).prefix;
             if (int(prefix.s) > longest_prefix) continue;
-            const PathVertex* y = &state.cache.vertices[prefix.first_vertex];
+            const PathVertex* y = &cache.vertices[prefix.first_vertex];
             prefetch(&y[prefix.s - 1]);
             picks[count++] = {y, int(prefix.s), d.scale};
         }
         return count;
     }
-
-    Rgb sample(SampleContext& context, const State& state) const {
-        const Scene& scene = context.scene;
-        const SubspaceLabeller label = labeller(scene);
-        PathVertex* z = context.camera_path;
-        PathView view;
-        Rgb sum;
-        CameraSampler sampler(context.seed, context.iteration, context.pixel);
-        const auto hit_weight = [&](int t, const Vec3& towards) {
-            if (view.k >= 2) label.complete(nullptr, 0, z, t, towards, &view);
-            return weight(view, 0);
-        };
-        const auto visit = [&](int t) {
-            PathVertex& v = z[t - 1];
-            if (v.emitter != kNone)
-                if (const Rgb c = emitter_hit<ViewDetail::kSubspace>(scene, z, t, &view); !c.is_black()) sum += c * hit_weight(t, {});
-            if (t > context.max_edges || !v.bsdf.has_smooth_lobe()) return;
-            label.label_camera_vertex(&v);
-            LightPick picks[kMaxConnections];
-            // Low-discrepancy at the first vertex, over the iterations of the pixel.
-            const int pick_count = draw(state, v.label, sampler.next_event(t), sampler.rng(), context.max_edges + 1 - t, picks);
-            for (int n = 0; n < pick_count; ++n) {
-                const LightPick& p = picks[n];
-                const Rgb c = connect_candidate<ViewDetail::kSubspace>(scene, p.y, p.s, z, t, &view, &context.counters);
-                if (c.is_black()) continue;
-                const PathVertex& end = p.y[p.s - 1];
-                const bool direction = p.s == 1 && scene.emitters()[uint32_t(end.emitter)].is_infinite();
-                label.complete(p.y, p.s, z, t, direction ? -end.ng : normalize(end.p - v.p), &view);
-                sum += c * (weight(view, p.s) * p.scale / scalar_of(end.alpha));
-            }
-        };
-        const auto escape = [&](int t, const WalkRay& ray) {
-            if (t > context.max_edges) return;
-            if (const Rgb c = environment_hit<ViewDetail::kSubspace>(scene, z, t, ray, &view); !c.is_black())
-                sum += c * hit_weight(t, ray.direction);
-        };
-        trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
-                          visit, escape);
-        return sum;
-    }
 };
+
+template <class Selection = SubspaceSelection>
+using SpcbptAlgorithm = CachedAlgorithm<SubspaceConnections<Selection>>;
+
+/// `light_paths_per_iteration`: N1 |crop|.
+inline SpcbptAlgorithm<> make_spcbpt(const TransportParameters& p, std::shared_ptr<const PreparedTables> prepared,
+                                     double light_paths_per_iteration) {
+    SubspaceSelection selection{std::move(prepared), light_paths_per_iteration, double(p.connections),
+                                p.ris_aware ? double(p.minimum_paths) : 0};
+    return {{std::move(selection), p.connections}, p.heuristic, p.minimum_paths};
+}
 
 }  // namespace lightloom

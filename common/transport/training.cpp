@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
 
 #include "common/core/fork_join.h"
 #include "common/path/throughput.h"
 #include "common/transport/bdpt.h"
 #include "common/transport/parameters.h"
+#include "common/transport/spcbpt.h"
 
 namespace lightloom {
 namespace {
@@ -15,35 +19,12 @@ constexpr uint64_t kTrainingSeed = 0x7472'6169'6e69'6e67ull;
 constexpr uint64_t kChunk = 512;
 constexpr double kSamplesPerBlock = 200;
 
-/// Calls visit(s, ratio) with C(s) A(s) / (C(base) A(base)) for every s that can be connected, base included.
-template <class Visit>
-void for_each_density(const PathView& view, int base, Visit&& visit) {
-    const int k = view.k;
-    const auto connectible = [&](int s) { return !(s > 0 && view.delta[s - 1]) && !(s > 0 && s < k && view.delta[s]); };
-    visit(base, 1.0);
-    WideProduct chain;
-    for (int s = base; s < k; ++s) {
-        chain.multiply(view.fwd[s] / view.rev[s]);
-        if (chain.mantissa == 0) break;
-        if (connectible(s + 1)) visit(s + 1, chain.value(1));
-    }
-    chain = WideProduct{};
-    for (int s = base; s > 0; --s) {
-        chain.multiply(view.rev[s - 1] / view.fwd[s - 1]);
-        if (chain.mantissa == 0) break;
-        if (connectible(s - 1)) visit(s - 1, chain.value(1));
-    }
-}
-
 /// Keeps one of the contributions of a sub-path, in proportion to their estimates.
 class Reservoir {
   public:
-    void clear() { path_ = {}, sum_ = 0, vertices_.clear(); }
-
-    /// Returns the estimate.
-    double offer(const BdptContribution& c, PathView& view, double scale, uint32_t block, const BdptSelection& generator,
+    /// `weight`, of the generator's techniques; `scale` of what it found; N1 |crop| of the render to come. Returns the estimate.
+    double offer(const PathContribution& c, PathView& view, double weight, double scale, uint32_t block,
                  double light_paths_per_iteration, Rng& rng) {
-        const double weight = mis_weight(view, {TechniqueKind::kConnect, c.s}, generator);
         const double contribution = double(scalar_of(c.value)) * scale, estimate = weight * contribution;
         if (!(estimate > 0) || !std::isfinite(estimate)) return 0;
         const int k = view.k;
@@ -61,23 +42,32 @@ class Reservoir {
         }
         vertices_[size_t(k)] = {c.z[0].p, {}, 0, 0};
         view_throughput(c.y, c.s, c.z, &view);
-        const double inv_own = 1 / generator.connect_factor(view, c.s);
-        for_each_density(view, c.s, [&](int s, double ratio) {
-            const double density = ratio * inv_own * (s == 0 ? 1 : s == k ? light_paths_per_iteration : view.light_throughput[s]);
-            if (std::isfinite(density)) vertices_[s == k ? 0 : size_t(s)].density += float(density);
-        });
+        const double inverse_own = double(c.inverse_density) * scale;
+        const auto keep = [&](int s, double ratio) {
+            if (!can_connect(view, s)) return;
+            const double density = ratio * inverse_own * (s == 0 ? 1 : s == k ? light_paths_per_iteration : view.light_throughput[s]);
+            if (density < std::numeric_limits<float>::max()) vertices_[s == k ? 0 : size_t(s)].density += float(density);
+        };
+        keep(c.s, 1);
+        for_each_split(view, c.s, 0, k, [&](int s, const WideProduct& chain) { keep(s, chain.value(1)); });
         return estimate;
     }
+    /// Adds what was kept to `data`, and is empty again.
     void move_to(TrainingData* data) {
-        if (!(sum_ > 0)) return;
+        const double square = contribution_ * sum_;  // c^2 w / ((c w) / sum)
+        if (sum_ > 0 && square < std::numeric_limits<float>::max()) keep(square, data);
+        path_ = {}, sum_ = 0, contribution_ = 0;
+    }
+
+  private:
+    void keep(double square, TrainingData* data) {
         path_.first_vertex = uint32_t(data->vertices.size());
         path_.estimate = float(sum_);
-        path_.square = float(contribution_ * sum_);  // c^2 w / ((c w) / sum)
+        path_.square = float(square);
         data->paths.push_back(path_);
         data->vertices.insert(data->vertices.end(), vertices_.begin(), vertices_.end());
     }
 
-  private:
     TrainingPath path_;
     double sum_ = 0, contribution_ = 0;
     std::vector<TrainingVertex> vertices_;
@@ -111,65 +101,157 @@ struct Blocks {
 
 }  // namespace
 
+Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const RenderSettings& settings, const SubspaceTables* guide) {
+    Result<TransportParameters> parameters = TransportParameters::read(settings);
+    if (!parameters.ok()) return parameters.status();
+    TrainingGenerator generator(scene);
+    if (guide) {
+        LL_RETURN_IF_ERROR(guide->validate(scene.emitters()));
+        generator.guide_ = std::make_shared<const PreparedTables>(*guide);
+    }
+    generator.parameters_ = *std::move(parameters);
+    generator.seed_ = settings.seed ^ kTrainingSeed;
+    generator.max_depth_ = settings.max_depth;
+    return generator;
+}
+
+/// What both generators share: where samples lie, and the loop over them in chunks whose data are joined in order.
+class TrainingGenerator::Unit {
+  public:
+    Unit(const TrainingGenerator& generator, const TrainingWork& work, std::stop_token stop)
+        : generator_(generator), work_(work), stop_(std::move(stop)), blocks_(crop(), work.total_samples) {}
+
+    Rect crop() const { return generator_.scene_->frame().crop; }
+    double pixels() const { return double(crop().area()); }
+    const Blocks& blocks() const { return blocks_; }
+    double render_light_paths() const { return generator_.parameters_.light_paths * pixels(); }
+    TrainingData empty() const {
+        TrainingData data;
+        data.blocks_x = blocks_.columns(), data.blocks_y = blocks_.rows();
+        data.block_sum.assign(size_t(data.blocks_x) * size_t(data.blocks_y), 0.0);
+        return data;
+    }
+    UnitWork light_work() const {
+        UnitWork work;
+        work.tile = crop();
+        work.first_light_path = work_.first_sample, work.light_path_count = work_.sample_count;
+        return work;
+    }
+    UnitScope scope(const UnitWork& work) const {
+        return {*generator_.scene_, generator_.seed_, generator_.max_depth_ + 1, generator_.parameters_.roulette, work, stop_};
+    }
+
+    /// Calls sample(context, block, data, rng) for every sample.
+    template <class Sample>
+    Result<TrainingData> trace(TrainingData all, Sample&& sample) const {
+        std::vector<TrainingData> chunks(size_t((work_.sample_count + kChunk - 1) / kChunk));
+        fork_join(chunks.size(), [&](size_t first_chunk, size_t last_chunk) {
+            std::vector<PathVertex> camera_path(size_t(generator_.max_depth_) + 3), light_path(size_t(generator_.max_depth_) + 2);
+            std::vector<Splat> no_splats;
+            for (size_t c = first_chunk; c != last_chunk && !stop_.stop_requested(); ++c) {
+                TrainingData& data = chunks[c] = empty();
+                const uint64_t begin = work_.first_sample + c * kChunk;
+                const uint64_t end = work_.first_sample + std::min(work_.sample_count, (c + 1) * kChunk);
+                data.samples = end - begin;
+                for (uint64_t n = begin; n < end; ++n) {
+                    SampleContext context{.scene = *generator_.scene_,
+                                          .seed = generator_.seed_,
+                                          .max_edges = generator_.max_depth_ + 1,
+                                          .roulette = generator_.parameters_.roulette,
+                                          .camera_path = camera_path.data(),
+                                          .light_path_vertices = light_path.data(),
+                                          .splats = &no_splats,
+                                          .counters = {}};
+                    const Vec2 place = low_discrepancy_point(uint32_t(n), generator_.seed_);
+                    context.px = crop().x0 + std::min(crop().width() - 1, int(place.x * float(crop().width())));
+                    context.py = crop().y0 + std::min(crop().height() - 1, int(place.y * float(crop().height())));
+                    context.pixel = uint32_t(crop().index(context.px, context.py));
+                    context.iteration = n;
+                    context.light_path = n;
+                    Rng rng({generator_.seed_, Stage::kTraining, 0, n});
+                    sample(context, blocks_.at(context.px, context.py), data, rng);
+                }
+            }
+        });
+        if (stop_.stop_requested()) return Status(StatusCode::kCancelled, "training was cancelled");
+        for (const TrainingData& data : chunks) LL_RETURN_IF_ERROR(all.append(data));
+        return all;
+    }
+
+  private:
+    const TrainingGenerator& generator_;
+    const TrainingWork& work_;
+    std::stop_token stop_;
+    Blocks blocks_;
+};
+
+Result<TrainingData> TrainingGenerator::trace(const TrainingWork& work, std::stop_token stop) const {
+    const Unit unit(*this, work, std::move(stop));
+    return guide_ ? trace_guided(unit) : trace_pairs(unit);
+}
+
+Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
+    const BdptSelection generator{unit.pixels()};
+    return unit.trace(unit.empty(), [&](SampleContext& context, uint32_t camera_block, TrainingData& data, Rng& rng) {
+        Reservoir from_camera, from_light;
+        trace_bdpt_sample<ViewDetail::kSubspace>(
+            context, [&](const PathVertex* y, int count) { keep_light_path(y, count, context.max_edges, &data); },
+            [&](const PathContribution& found, PathView& view) {
+                // A light path may land in any pixel, a camera sample in one: the scale of algorithms.md 0, N1.
+                const bool splat = found.to_lens();
+                const uint32_t block = splat ? unit.blocks().at(int(found.film.x), int(found.film.y)) : camera_block;
+                const double weight = mis_weight(view, {TechniqueKind::kConnect, found.s}, generator);
+                data.block_sum[block] += (splat ? from_light : from_camera)
+                                             .offer(found, view, weight, splat ? 1 / unit.pixels() : 1, block,
+                                                    unit.render_light_paths(), rng);
+            });
+        from_camera.move_to(&data);
+        from_light.move_to(&data);
+    });
+}
+
+Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
+    const auto generator = make_spcbpt(parameters_, guide_, unit.pixels());
+    const UnitWork work = unit.light_work();
+    // Light sub-paths are traced in parallel; what they bring is joined in their order.
+    struct FromLight {
+        Reservoir reservoir;
+        std::vector<std::pair<uint32_t, double>> estimates;  ///< By block.
+    };
+    std::vector<FromLight> from_light(work.light_path_count);
+    UnitPreparation preparation;
+    const auto state = generator.prepare(
+        unit.scope(work), &preparation, [&](const PathContribution& found, PathView& view, uint64_t m, auto&) {
+            Rng rng({seed_, Stage::kTraining, 1 + uint64_t(found.s), work.first_light_path + m});
+            const uint32_t block = unit.blocks().at(int(found.film.x), int(found.film.y));
+            const double estimate = from_light[m].reservoir.offer(found, view, generator.weight(view, found.s), 1 / unit.pixels(), block,
+                                                                  unit.render_light_paths(), rng);
+            from_light[m].estimates.push_back({block, estimate});
+        });
+    TrainingData data = unit.empty();
+    if (!unit.scope(work).stop.stop_requested()) {
+        for (uint64_t m = 0; m < work.light_path_count; ++m) {
+            const uint32_t first = state.cache.first_vertex[m];
+            keep_light_path(&state.cache.vertices[first], int(state.cache.first_vertex[m + 1] - first), max_depth_ + 1, &data);
+            for (const auto& [block, estimate] : from_light[m].estimates) data.block_sum[block] += estimate;
+            from_light[m].reservoir.move_to(&data);
+        }
+    }
+    return unit.trace(std::move(data), [&](SampleContext& context, uint32_t block, TrainingData& chunk, Rng& rng) {
+        Reservoir from_camera;
+        generator.trace(context, state, [&](const PathContribution& found, PathView& view) {
+            chunk.block_sum[block] +=
+                from_camera.offer(found, view, generator.weight(view, found.s), 1, block, unit.render_light_paths(), rng);
+        });
+        from_camera.move_to(&chunk);
+    });
+}
+
 Result<TrainingData> trace_training(const Scene& scene, const RenderSettings& settings, const TrainingWork& work,
                                     std::stop_token stop) {
-    const Result<TransportParameters> parameters = TransportParameters::read(settings);
-    if (!parameters.ok()) return parameters.status();
-    const Rect crop = scene.frame().crop;
-    const Blocks blocks(crop, work.total_samples);
-    const BdptSelection generator{double(crop.area())};
-    const double render_light_paths = parameters->light_paths * double(crop.area());
-    const uint64_t seed = settings.seed ^ kTrainingSeed;
-    std::vector<TrainingData> chunks(size_t((work.sample_count + kChunk - 1) / kChunk));
-    fork_join(chunks.size(), [&](size_t first_chunk, size_t last_chunk) {
-        std::vector<PathVertex> camera_path(size_t(settings.max_depth) + 3), light_path(size_t(settings.max_depth) + 2);
-        std::vector<Splat> no_splats;
-        Reservoir from_camera, from_light;
-        for (size_t c = first_chunk; c != last_chunk && !stop.stop_requested(); ++c) {
-            TrainingData& data = chunks[c];
-            data.blocks_x = blocks.columns(), data.blocks_y = blocks.rows();
-            data.block_sum.assign(size_t(data.blocks_x) * size_t(data.blocks_y), 0.0);
-            const uint64_t begin = work.first_sample + c * kChunk;
-            const uint64_t end = work.first_sample + std::min(work.sample_count, (c + 1) * kChunk);
-            data.samples = end - begin;
-            for (uint64_t n = begin; n < end; ++n) {
-                SampleContext context{.scene = scene,
-                                      .seed = seed,
-                                      .max_edges = settings.max_depth + 1,
-                                      .roulette = parameters->roulette,
-                                      .camera_path = camera_path.data(),
-                                      .light_path_vertices = light_path.data(),
-                                      .splats = &no_splats,
-                                      .counters = {}};
-                const Vec2 place = low_discrepancy_point(uint32_t(n), seed);
-                context.px = crop.x0 + std::min(crop.width() - 1, int(place.x * float(crop.width())));
-                context.py = crop.y0 + std::min(crop.height() - 1, int(place.y * float(crop.height())));
-                context.pixel = uint32_t(crop.index(context.px, context.py));
-                context.iteration = n;
-                context.light_path = n;
-                const uint32_t camera_block = blocks.at(context.px, context.py);
-                Rng rng({seed, Stage::kTraining, 0, n});
-                from_camera.clear(), from_light.clear();
-                trace_bdpt_sample<ViewDetail::kSubspace>(
-                    context, [&](const PathVertex* y, int count) { keep_light_path(y, count, context.max_edges, &data); },
-                    [&](const BdptContribution& found, PathView& view) {
-                        // A light path may land in any pixel, a camera sample in one: the scale of algorithms.md 0, N1.
-                        const bool splat = found.t == 1 && found.s > 0;
-                        const double scale = splat ? 1 / double(crop.area()) : 1;
-                        const uint32_t block = splat ? blocks.at(int(found.film.x), int(found.film.y)) : camera_block;
-                        Reservoir& reservoir = splat ? from_light : from_camera;
-                        data.block_sum[block] +=
-                            reservoir.offer(found, view, scale, block, generator, render_light_paths, rng);
-                    });
-                from_camera.move_to(&data);
-                from_light.move_to(&data);
-            }
-        }
-    });
-    if (stop.stop_requested()) return Status(StatusCode::kCancelled, "training was cancelled");
-    TrainingData all;
-    for (const TrainingData& data : chunks) LL_RETURN_IF_ERROR(all.append(data));
-    return all;
+    const Result<TrainingGenerator> generator = TrainingGenerator::create(scene, settings);
+    if (!generator.ok()) return generator.status();
+    return generator->trace(work, std::move(stop));
 }
 
 Result<SubspaceTables> make_tables(const Scene& scene, const RenderSettings& settings, std::stop_token stop,
@@ -177,14 +259,23 @@ Result<SubspaceTables> make_tables(const Scene& scene, const RenderSettings& set
     const Result<TransportParameters> parameters = TransportParameters::read(settings);
     if (!parameters.ok()) return parameters.status();
     const uint64_t samples = parameters->training_samples;
-    TrainingData data;
-    for (uint64_t first = 0; first < samples; first += kTrainingUnitSamples) {
-        const Result<TrainingData> unit =
-            trace_training(scene, settings, {first, std::min(kTrainingUnitSamples, samples - first), samples}, stop);
-        if (!unit.ok()) return unit.status();
-        LL_RETURN_IF_ERROR(data.append(*unit));
+    std::optional<SubspaceTables> tables;
+    uint64_t first = 0;
+    for (const uint64_t end : {parameters->pilot_samples, samples}) {
+        if (first == end) continue;  // no pilot
+        const Result<TrainingGenerator> generator = TrainingGenerator::create(scene, settings, tables ? &*tables : nullptr);
+        if (!generator.ok()) return generator.status();
+        TrainingData data;
+        for (; first < end; first += std::min(kTrainingUnitSamples, end - first)) {
+            const Result<TrainingData> unit = generator->trace({first, std::min(kTrainingUnitSamples, end - first), samples}, stop);
+            if (!unit.ok()) return unit.status();
+            LL_RETURN_IF_ERROR(data.append(*unit));
+        }
+        Result<SubspaceTables> trained = train_tables(data, scene.emitters(), parameters->training, stop, report);
+        if (!trained.ok()) return trained.status();
+        tables = *std::move(trained);
     }
-    return train_tables(data, scene.emitters(), parameters->training, stop, report);
+    return *std::move(tables);
 }
 
 Result<std::unique_ptr<Renderer>> create_with_tables(std::shared_ptr<const Scene> scene, const RenderSettings& settings,

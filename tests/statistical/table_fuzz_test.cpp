@@ -130,8 +130,8 @@ TEST(TableFuzz, TinyCachesKeepTheMean) {
                 };
             };
             frames += 2;
-            const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> subspaces{spc, Heuristic::kBalance, 3, paths};
-            const LvcbptAlgorithm<MaskedCacheSelection<UniformSelection>> uniform{lvc, Heuristic::kBalance, 3, paths};
+            const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> subspaces{{spc, 3}, Heuristic::kBalance, paths};
+            const LvcbptAlgorithm<MaskedCacheSelection<UniformSelection>> uniform{{lvc, 3}, Heuristic::kBalance, paths};
             tested += compare(c, expected, means(scene, in_rows(subspaces), 5000), "spcbpt, " + what, &family);
             tested += compare(c, expected, means(scene, in_rows(uniform), 7000), "lvcbpt, " + what, &family);
         }
@@ -159,8 +159,7 @@ TEST(TableFuzz, WindowsKeepTheMean) {
             MaskedCacheSelection<SubspaceSelection> selection{testing::subspace_selection(*scene, tables, options)};
             // Fifty light paths in a replication splat too little for a test.
             selection.light_tracing = c.reference == std::string("bdpt");
-            const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> algorithm{selection, Heuristic::kBalance,
-                                                                                     options.connections, options.paths};
+            const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> algorithm{{selection, options.connections}, Heuristic::kBalance, options.paths};
             ++frames;
             tested += compare(
                 c, expected,
@@ -194,8 +193,8 @@ TEST(TableFuzz, EachTechniqueAloneHasTheSameMean) {
                 MaskedCacheSelection<UniformSelection> lvc{{double(scene->frame().crop.area()), 1.7}};
                 spc.only_s = lvc.only_s = s;
                 spc.min_k = spc.max_k = lvc.min_k = lvc.max_k = k;
-                const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> subspaces{spc, Heuristic::kBalance, 3, options.paths};
-                const LvcbptAlgorithm<MaskedCacheSelection<UniformSelection>> uniform{lvc, Heuristic::kBalance, 3, options.paths};
+                const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> subspaces{{spc, 3}, Heuristic::kBalance, options.paths};
+                const LvcbptAlgorithm<MaskedCacheSelection<UniformSelection>> uniform{{lvc, 3}, Heuristic::kBalance, options.paths};
                 const std::string what = std::string(name) + ", k = " + std::to_string(k) + ", s = " + std::to_string(s);
                 pairs += 2;
                 tested += testing::compare(expected, means(scene, testing::cache_image(scene, subspaces, k - 1, 8, 1), 11000),
@@ -224,8 +223,7 @@ TEST(TableFuzz, FewerTechniquesHaveTheSameMean) {
                 testing::subspace_selection(*scene, testing::random_tables(scene->emitters(), 600, random), options)};
             selection.min_k = min_k;
             change(selection);
-            const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> algorithm{selection, Heuristic::kBalance,
-                                                                                     options.connections, options.paths};
+            const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> algorithm{{selection, options.connections}, Heuristic::kBalance, options.paths};
             return testing::cache_image(scene, algorithm, max_depth, kSamplesPerPixel, 1);
         };
         testing::MaskedSelection all{testing::bdpt_selection(*scene)};
@@ -288,8 +286,7 @@ TEST(TableFuzz, CountedEnergyIsTheExpectedOne) {
         }
         CacheOptions options;
         options.paths = 200;
-        const SpcbptAlgorithm<> algorithm{testing::subspace_selection(*scene, tables, options), Heuristic::kBalance,
-                                          options.connections, options.paths};
+        const SpcbptAlgorithm<> algorithm{{testing::subspace_selection(*scene, tables, options), options.connections}, Heuristic::kBalance, options.paths};
         for (int seed = 0; seed < kSeeds; ++seed) {
             const UnitWork work = testing::frame_with_paths(*scene, 1, 0);
             UnitPreparation preparation;

@@ -64,15 +64,14 @@ ImageOfSeed cache_image(std::shared_ptr<const Scene> scene, const A& algorithm, 
 
 inline ImageOfSeed spcbpt_image(const std::shared_ptr<const Scene>& scene, SubspaceTables tables, const CacheOptions& o,
                                 int max_depth, uint32_t samples_per_pixel) {
-    const SpcbptAlgorithm<> algorithm{subspace_selection(*scene, std::move(tables), o), Heuristic::kBalance, o.connections,
-                                      o.paths};
+    const SpcbptAlgorithm<> algorithm{{subspace_selection(*scene, std::move(tables), o), o.connections}, Heuristic::kBalance, o.paths};
     return cache_image(scene, algorithm, max_depth, samples_per_pixel, o.light_paths);
 }
 
 inline ImageOfSeed lvcbpt_image(const std::shared_ptr<const Scene>& scene, double vertices_per_path, const CacheOptions& o,
                                 int max_depth, uint32_t samples_per_pixel) {
     const UniformSelection selection{o.light_paths * double(scene->frame().crop.area()), o.connections / vertices_per_path};
-    const LvcbptAlgorithm<> algorithm{selection, Heuristic::kBalance, o.connections, o.paths};
+    const LvcbptAlgorithm<> algorithm{{selection, o.connections}, Heuristic::kBalance, o.paths};
     return cache_image(scene, algorithm, max_depth, samples_per_pixel, o.light_paths);
 }
 
@@ -101,12 +100,11 @@ inline std::vector<RegionMeans> lengths_with_tables(const std::shared_ptr<const 
         for (int k = 1; k <= max_length; ++k) {
             if (name == "lvcbpt")
                 render(uniform, [&](const auto& s) {
-                    return LvcbptAlgorithm<MaskedCacheSelection<UniformSelection>>{s, p->heuristic, p->connections, p->minimum_paths};
+                    return LvcbptAlgorithm<MaskedCacheSelection<UniformSelection>>{{s, p->connections}, p->heuristic, p->minimum_paths};
                 }, k);
             else if (name == "spcbpt")
                 render(subspaces, [&](const auto& s) {
-                    return SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>>{s, p->heuristic, p->connections,
-                                                                                   p->minimum_paths};
+                    return SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>>{{s, p->connections}, p->heuristic, p->minimum_paths};
                 }, k);
             else
                 throw std::runtime_error("no masked selection for '" + name + "' yet: add it here");
