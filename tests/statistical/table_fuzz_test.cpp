@@ -159,7 +159,8 @@ TEST(TableFuzz, WindowsKeepTheMean) {
             MaskedCacheSelection<SubspaceSelection> selection{testing::subspace_selection(*scene, tables, options)};
             // Fifty light paths in a replication splat too little for a test.
             selection.light_tracing = c.reference == std::string("bdpt");
-            const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> algorithm{{selection, options.connections}, Heuristic::kBalance, options.paths};
+            const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> algorithm{
+                {selection, options.connections}, Heuristic::kBalance, options.paths};
             ++frames;
             tested += compare(
                 c, expected,
@@ -223,7 +224,8 @@ TEST(TableFuzz, FewerTechniquesHaveTheSameMean) {
                 testing::subspace_selection(*scene, testing::random_tables(scene->emitters(), 600, random), options)};
             selection.min_k = min_k;
             change(selection);
-            const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> algorithm{{selection, options.connections}, Heuristic::kBalance, options.paths};
+            const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> algorithm{
+                {selection, options.connections}, Heuristic::kBalance, options.paths};
             return testing::cache_image(scene, algorithm, max_depth, kSamplesPerPixel, 1);
         };
         testing::MaskedSelection all{testing::bdpt_selection(*scene)};
@@ -286,16 +288,17 @@ TEST(TableFuzz, CountedEnergyIsTheExpectedOne) {
         }
         CacheOptions options;
         options.paths = 200;
-        const SpcbptAlgorithm<> algorithm{{testing::subspace_selection(*scene, tables, options), options.connections}, Heuristic::kBalance, options.paths};
+        const SpcbptAlgorithm<> algorithm{
+            {testing::subspace_selection(*scene, tables, options), options.connections}, Heuristic::kBalance, options.paths};
         for (int seed = 0; seed < kSeeds; ++seed) {
             const UnitWork work = testing::frame_with_paths(*scene, 1, 0);
             UnitPreparation preparation;
             const auto state =
                 algorithm.prepare({*scene, uint64_t(31000 + seed), kMaxDepth + 1, {}, work, {}}, &preparation);
-            ASSERT_EQ(state.subspaces.size(), n);
+            ASSERT_EQ(state.index.subspaces.size(), n);
             double total = 0;
             for (uint32_t i = 0; i < n; ++i) {
-                counted[i].push_back(double(state.subspaces[i].scale) * options.connections);
+                counted[i].push_back(double(state.index.subspaces[i].scale) * options.connections);
                 total += counted[i].back();
             }
             counted[n].push_back(total);

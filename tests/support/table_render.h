@@ -64,7 +64,8 @@ ImageOfSeed cache_image(std::shared_ptr<const Scene> scene, const A& algorithm, 
 
 inline ImageOfSeed spcbpt_image(const std::shared_ptr<const Scene>& scene, SubspaceTables tables, const CacheOptions& o,
                                 int max_depth, uint32_t samples_per_pixel) {
-    const SpcbptAlgorithm<> algorithm{{subspace_selection(*scene, std::move(tables), o), o.connections}, Heuristic::kBalance, o.paths};
+    const SpcbptAlgorithm<> algorithm{
+        {subspace_selection(*scene, std::move(tables), o), o.connections}, Heuristic::kBalance, o.paths};
     return cache_image(scene, algorithm, max_depth, samples_per_pixel, o.light_paths);
 }
 

@@ -1,0 +1,121 @@
+// Training sets, whoever made them, are estimates of the same things: the image, the light of every path length, the loss of any
+// Gamma, and Q. A guide, good or bad, changes their noise alone.
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+
+#include "common/transport/training.h"
+#include "tests/support/random_tables.h"
+#include "tests/support/statistics.h"
+#include "tests/support/test_scenes.h"
+
+namespace lightloom {
+namespace {
+
+using testing::Sample;
+
+constexpr int kReplications = 24;
+constexpr uint64_t kSamples = 2000;
+constexpr int kMaxDepth = 5;
+
+RenderSettings settings_of(uint64_t seed) {
+    return {"spcbpt",
+            {{"training-paths", "40000"}, {"light-subspaces", "60"}, {"eye-subspaces", "40"}, {"cache", "500"}},
+            seed,
+            kMaxDepth};
+}
+
+/// What a unit estimates, by name.
+std::vector<std::pair<std::string, double>> estimates(const TrainingData& data) {
+    std::vector<std::pair<std::string, double>> out{{"image", 0}, {"energy", 0}, {"loss", 0}};
+    for (int k = 2; k <= kMaxDepth + 1; ++k) out.emplace_back("length " + std::to_string(k), 0.0);
+    const double n = double(data.samples);
+    for (const double b : data.block_sum) out[0].second += b / n;
+    for (const TrainingPath& p : data.light_paths)
+        for (uint32_t i = 0; i < p.vertex_count; ++i) out[1].second += double(data.vertices[p.first_vertex + i].density) / n;
+    for (const TrainingPath& p : data.paths) {
+        out[p.vertex_count].second += double(p.estimate) / n;  // k = vertex_count - 1 stands at 3 + k - 2
+        double density = 0;  // of a renderer with N Gamma / Q = 1
+        for (uint32_t i = 0; i < p.vertex_count; ++i) density += double(data.vertices[p.first_vertex + i].density);
+        if (density > 0) out[2].second += double(p.square) / density / n;
+    }
+    return out;
+}
+
+std::vector<std::vector<double>> replicate(const Scene& scene, const SubspaceTables* guide, uint64_t first_seed) {
+    std::vector<std::vector<double>> values;
+    for (uint64_t r = 0; r < kReplications; ++r) {
+        const auto generator = TrainingGenerator::create(scene, settings_of(first_seed + r), guide);
+        if (!generator.ok()) throw std::runtime_error(generator.status().message());
+        const Result<TrainingData> data = generator->trace({r * kSamples, kSamples, kReplications * kSamples}, {});
+        if (!data.ok()) throw std::runtime_error(data.status().message());
+        const Status valid = data->validate(scene.emitters().all().size());
+        EXPECT_TRUE(valid.ok()) << valid.message();
+        const auto numbers = estimates(*data);
+        values.resize(numbers.size());
+        for (size_t i = 0; i < numbers.size(); ++i) values[i].push_back(numbers[i].second);
+    }
+    return values;
+}
+
+TEST(GuidedTraining, EstimatesWhatThePilotEstimates) {
+    testing::TestFamily family;
+    for (const testing::NamedScene& named : testing::kScenes) {
+        const auto scene = named.make();
+        const auto names = estimates(*trace_training(*scene, settings_of(1), {0, 100, 100}, {}));
+        const auto pilot = replicate(*scene, nullptr, 100);
+        testing::RandomTableOptions random;
+        random.spread = 2, random.max_window = 3;
+        TrainingReport report;
+        RenderSettings small = settings_of(7);
+        small.parameters["training-paths"] = "3000";
+        const Result<SubspaceTables> learned = make_tables(*scene, small, {}, &report);
+        ASSERT_TRUE(learned.ok());
+        const SubspaceTables wrong = testing::random_tables(scene->emitters(), 3, random);
+        for (const auto& [what, guide] : {std::pair{"learned", &*learned}, std::pair{"random", &wrong}}) {
+            const auto guided = replicate(*scene, guide, 1000);
+            for (size_t i = 0; i < names.size(); ++i) {
+                const Sample a(pilot[i]), b(guided[i]);
+                if (a.mean == 0 && b.mean == 0) continue;
+                if (std::max(a.relative_error(), b.relative_error()) > 0.1) continue;  // would find nothing
+                family.add(testing::welch_p_value(a, b), std::string(named.name) + ", " + what + " guide, " + names[i].first + ": " +
+                                                             std::to_string(a.mean) + " and " + std::to_string(b.mean));
+            }
+        }
+    }
+    EXPECT_GE(family.size(), 80);
+    family.check();
+}
+
+TEST(GuidedTraining, DoesNotDependOnThreads) {
+    const auto scene = testing::glossy();
+    const SubspaceTables guide = testing::random_tables(scene->emitters(), 5);
+    const auto generator = TrainingGenerator::create(*scene, settings_of(2), &guide);
+    ASSERT_TRUE(generator.ok());
+    std::string one, two;
+    for (const auto& [threads, bytes] : {std::pair{1, &one}, std::pair{2, &two}}) {
+        tbb::global_control allowance(tbb::global_control::max_allowed_parallelism, 2);
+        tbb::task_arena(threads).execute([&, out = bytes] { *out = serialize(*generator->trace({0, 3000, 3000}, {})); });
+    }
+    EXPECT_EQ(one, two);
+}
+
+TEST(GuidedTraining, TwoRoundsAreMadeOfWholeUnits) {
+    RenderSettings settings = settings_of(1);
+    const auto pilot = [&](const char* samples, const char* share) {
+        settings.parameters["training-paths"] = samples;
+        settings.parameters["pilot"] = share;
+        return TransportParameters::read(settings)->pilot_samples;
+    };
+    EXPECT_EQ(pilot("500000", "0"), 0u);
+    EXPECT_EQ(pilot("500000", "0.2"), 6 * kTrainingUnitSamples);
+    EXPECT_EQ(pilot("500000", "1"), 29 * kTrainingUnitSamples);  // something is left for the second round
+    EXPECT_EQ(pilot("40000", "0.001"), kTrainingUnitSamples);
+    EXPECT_EQ(pilot("20000", "0.2"), 0u);  // too small for two
+}
+
+}  // namespace
+}  // namespace lightloom
