@@ -307,8 +307,7 @@ void Coordinator::fail_job(JobRecord& job, const Status& why) {
 }
 
 void Coordinator::unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Failures failures, const Status& why) {
-    const std::string unit = key.kind == UnitKind::kRender ? std::to_string(key.group) + "/" + std::to_string(key.tile)
-                                                           : "of training " + std::to_string(key.group);
+    const std::string unit = unit_name(key);
     spdlog::warn("{}: unit {} failed ({}): {}", job.id, unit, failures.total, why.message());
     // Units are pure functions: what is wrong with the request is wrong on every worker.
     if (failures.workers >= kMaxFailedWorkers || failures.total >= kMaxUnitFailures || why.code() == StatusCode::kInvalidArgument)

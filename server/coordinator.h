@@ -136,6 +136,9 @@ class Coordinator {
     void write_results(JobRecord& job);
     void forget_old_jobs();
     void finish_if_complete(JobRecord& job);
+    /// Enters a result into its table: nothing for the first one, which the caller merges; otherwise the answer.
+    std::optional<SubmitAck> repeated_result(JobRecord& job, UnitTable& units, const UnitKey& key, const WorkerRecord& worker,
+                                             const Digest& digest);
     void unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Failures failures, const Status& why);
     void tick(std::stop_token stop);
     std::optional<UnitLease> next_unit(WorkerRecord& worker);

@@ -317,20 +317,7 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
         unit_failed(*job, reference.key, units->fail(reference.key, worker->index), problem);
         return SubmitAck{SubmitOutcome::kRejected, problem.message()};
     }
-    switch (units->complete(reference.key, worker->index, digest)) {
-        case UnitTable::Completion::kUnknown: return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};
-        case UnitTable::Completion::kDuplicateSame:
-            ++job->duplicates_same;
-            changed(*job);
-            return SubmitAck{SubmitOutcome::kDuplicateSame, {}};
-        case UnitTable::Completion::kDuplicateDifferent:
-            ++job->duplicates_different;
-            changed(*job);
-            spdlog::error("{}: training unit {} from {} differs from the data taken in before; one of two workers computes wrongly: "
-                          "compare their hosts and builds", job->id, reference.key.group, worker_id);
-            return SubmitAck{SubmitOutcome::kDuplicateDifferent, "the unit was taken in before with other bytes"};
-        case UnitTable::Completion::kFirst: break;
-    }
+    if (auto answer = repeated_result(*job, *units, reference.key, *worker, digest)) return *std::move(answer);
     job->training_bytes += payload.size();
     // Units differ little in size: a set that is far too large shows before hours were spent on it.
     const double projected = double(job->training_bytes) * units->group_total() / double(units->done_count());

@@ -69,6 +69,12 @@ struct Coordinator::JobRecord {
     int running_tasks = 0;  ///< Of these. A job is forgotten only without any, so that nobody waits for one under the mutex.
 };
 
+/// Behind the word "unit", for people.
+inline std::string unit_name(const UnitKey& key) {
+    return key.kind == UnitKind::kRender ? std::to_string(key.group) + "/" + std::to_string(key.tile)
+                                         : "of training " + std::to_string(key.group);
+}
+
 inline Status no_worker(const std::string& id) { return not_found("unknown worker " + id + "; register again"); }
 
 inline constexpr size_t kMaxDroppedPerJob = 64;
