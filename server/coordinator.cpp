@@ -315,6 +315,28 @@ void Coordinator::unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Fai
     work_changed_.notify_all();
 }
 
+void Coordinator::leases_expired(JobRecord& job, UnitTable& units, const std::vector<UnitTable::Expired>& expired) {
+    job.expired_leases += expired.size();
+    spdlog::warn("{}: {} lease(s) ran out; the units go to other workers", job.id, expired.size());
+    work_changed_.notify_all();
+    for (const UnitTable::Expired& lease : expired) {
+        // A worker that is heard of has lost a lease on the way, not its life. Of those that a silent one held, the oldest was in
+        // work and bears the blame; the others waited behind it.
+        WorkerRecord& worker = *workers_[lease.worker];
+        if (worker.left || worker.blamed == worker.last_heard ||
+            seconds_between(worker.last_heard, options_.clock()) < 0.5 * options_.lease_seconds)
+            continue;
+        worker.blamed = worker.last_heard;
+        const std::set<uint32_t> lost = units.lose(lease.unit, lease.worker);
+        if (lost.size() < kMaxLostWorkers) continue;
+        std::string names;
+        for (const uint32_t index : lost) names += (names.empty() ? "" : ", ") + workers_[index]->id;
+        return fail_job(job, {StatusCode::kAborted, "unit " + unit_name(lease.unit) + ": " + std::to_string(lost.size()) +
+                                                        " workers fell silent over it (" + names +
+                                                        "); it may crash them or exhaust their memory, see their logs"});
+    }
+}
+
 void Coordinator::forget_old_jobs() {
     size_t ended = 0;
     for (const auto& job : jobs_) ended += is_terminal(job->state);
@@ -338,11 +360,9 @@ void Coordinator::tick(std::stop_token stop) {
         for (const auto& job : jobs_) {
             UnitTable* const units = open_table(*job);
             if (!units) continue;
-            const size_t expired = units->expire(now);
-            if (expired > 0) {
-                job->expired_leases += expired;
-                spdlog::warn("{}: {} lease(s) ran out; the units go to other workers", job->id, expired);
-                work_changed_.notify_all();
+            if (const auto expired = units->expire(now); !expired.empty()) {
+                leases_expired(*job, *units, expired);
+                if (is_terminal(job->state)) continue;
             }
             const double limit = job->spec.time_limit_seconds;
             if (limit > 0 && job->rendering && !job->closed && seconds_between(job->first_render, now) >= limit) {

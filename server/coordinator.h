@@ -140,6 +140,7 @@ class Coordinator {
     std::optional<SubmitAck> repeated_result(JobRecord& job, UnitTable& units, const UnitKey& key, const WorkerRecord& worker,
                                              const Digest& digest);
     void unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Failures failures, const Status& why);
+    void leases_expired(JobRecord& job, UnitTable& units, const std::vector<UnitTable::Expired>& expired);
     void tick(std::stop_token stop);
     std::optional<UnitLease> next_unit(WorkerRecord& worker);
 

@@ -13,6 +13,7 @@ struct Coordinator::WorkerRecord {
     uint32_t index = 0;  ///< In workers_.
     WorkerHello hello;
     TimePoint last_heard;
+    std::optional<TimePoint> blamed;  ///< The last_heard for which a unit bears the blame already.
     bool left = false;
     uint32_t waiting = 0;  ///< lease_units calls that wait now.
     uint64_t merged = 0;
@@ -82,5 +83,8 @@ inline constexpr size_t kMaxDroppedPerJob = 64;
 inline constexpr int kMaxFailedWorkers = 3;
 /// The same for a unit that failed this often where there are fewer workers.
 inline constexpr int kMaxUnitFailures = 10;
+/// A unit over which this many workers went silent fails its job: it seems to crash them. More than for failures, because hosts
+/// also go down for reasons of their own.
+inline constexpr size_t kMaxLostWorkers = 5;
 
 }  // namespace lightloom
