@@ -62,7 +62,7 @@ UnitTable* Coordinator::table_for(JobRecord& job, UnitKind kind) {
 }
 
 void Coordinator::discard_training(JobRecord& job) {
-    discarded_.push_back(std::make_shared<std::vector<std::optional<TrainingData>>>(std::move(job.training_parts)));
+    discarded_.push_back(std::make_shared<std::vector<JobRecord::TrainingPart>>(std::move(job.training_parts)));
     discarded_.push_back(std::make_shared<SceneFacts>(std::move(job.facts)));
     job.training_parts.clear();
     job.facts = {};
@@ -210,19 +210,22 @@ Result<TrainingData> Coordinator::collect_training(JobRecord& job, size_t emitte
         // Digest and size were right; a worker whose data are nonsense all the same loses its unit.
         std::vector<std::pair<uint32_t, Status>> bad;
         for (uint32_t i = 0; i < parts.size(); ++i)
-            if (Status s = parts[i]->validate(emitter_count); !s.ok()) bad.emplace_back(i, std::move(s));
+            if (Status s = parts[i].data->validate(emitter_count); !s.ok()) bad.emplace_back(i, std::move(s));
         if (bad.empty()) {
             TrainingData all;
             for (auto& part : parts) {
-                if (const Status s = all.append(*part); !s.ok()) return s;
-                part.reset();
+                if (stop.stop_requested()) return over();
+                if (const Status s = all.append(*part.data); !s.ok()) return s;
+                part.data.reset();
             }
             return all;
         }
         lock.lock();
         for (const auto& [unit, why] : bad) {
             if (!alive()) return over();
-            parts[unit].reset();
+            job.training_bytes -= parts[unit].bytes;
+            job.traced_seconds -= parts[unit].seconds;
+            parts[unit] = {};
             ++job.rejected;
             const UnitKey key{unit, 0, kind};
             unit_failed(job, key, job.training->reopen(key), why);
@@ -326,7 +329,7 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
                                                             " MiB that a job may have; choose fewer training-paths"});
         return SubmitAck{SubmitOutcome::kRejected, job->message};
     }
-    job->training_parts[reference.key.group] = *std::move(data);
+    job->training_parts[reference.key.group] = {*std::move(data), payload.size(), trace_seconds};
     job->traced_seconds += trace_seconds;
     changed(*job);
     work_changed_.notify_all();

@@ -59,7 +59,12 @@ struct Coordinator::JobRecord {
     std::optional<UnitTable> training;  ///< Units of kind `training_kind`, in kPreparing.
     UnitKind training_kind = UnitKind::kTraining;
     uint64_t training_samples = 0;
-    std::vector<std::optional<TrainingData>> training_parts;  ///< By unit.
+    struct TrainingPart {
+        std::optional<TrainingData> data;
+        uint64_t bytes = 0;   ///< As it came.
+        double seconds = 0;   ///< That the worker took.
+    };
+    std::vector<TrainingPart> training_parts;  ///< By unit.
     uint64_t training_bytes = 0;        ///< Of these.
     double traced_seconds = 0;          ///< Of the workers, over these.
     bool capped_by_time_limit = false;
