@@ -34,7 +34,7 @@ std::string line_of(const JobInfo& job, int percent) {
 
 /// "tracing training paths 65536/200000  ETA 12 s"
 std::string phase_line(const JobInfo& job) {
-    std::string line(to_string(job.phase));
+    std::string line = phase_text(job);
     if (job.phase == PreparePhase::kTracing) {
         line += ' ';
         line += std::to_string(job.phase_done) + "/" + std::to_string(job.phase_total);

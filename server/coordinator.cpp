@@ -273,6 +273,7 @@ JobInfo Coordinator::snapshot(const JobRecord& job) const {
     info.duplicates_different = job.duplicates_different;
     info.tables = job.tables;
     info.phase = job.phase;
+    if (job.maker) info.waits_for = job.maker->id;
     if (job.training) {
         info.unit_leased = job.training->leased_count();
         info.phase_total = job.training_samples;
@@ -293,6 +294,7 @@ void Coordinator::end_job(JobRecord& job, JobState state) {
         job.units.reset();
     }
     discard_training(job);
+    job.maker.reset();
     if (job.reducer) discarded_.push_back(std::move(job.reducer));
     discarded_.push_back(std::make_shared<std::vector<ImageLayer>>(std::move(job.layers)));
     job.reducer.reset();
@@ -358,6 +360,7 @@ void Coordinator::tick(std::stop_token stop) {
         work_changed_.wait_for(lock, kTick);
         const TimePoint now = options_.clock();
         for (const auto& job : jobs_) {
+            if (job->maker) resume_waiting(job);
             UnitTable* const units = open_table(*job);
             if (!units) continue;
             if (const auto expired = units->expire(now); !expired.empty()) {

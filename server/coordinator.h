@@ -117,7 +117,10 @@ class Coordinator {
     void end_job(JobRecord& job, JobState state);
     void prepare(JobRecord& job, std::stop_token stop);
     void plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables);
-    void prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts);
+    void prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait = true);
+    std::shared_ptr<JobRecord> find_maker(const JobRecord& job) const;
+    void resume_waiting(const std::shared_ptr<JobRecord>& job);
+    void take_over_tables(JobRecord& job);
     void open_training(JobRecord& job, UnitKind kind, uint64_t samples);
     void make_tables(JobRecord& job, std::stop_token stop);
     Status learn(JobRecord& job, std::stop_token stop);

@@ -83,17 +83,69 @@ void Coordinator::open_training(JobRecord& job, UnitKind kind, uint64_t samples)
     work_changed_.notify_all();
 }
 
-void Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts) {
+void Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait) {
     if (adopt_cached_tables(job, spec, facts)) return;
     const std::lock_guard lock(mutex_);
     if (job.state != JobState::kPreparing) return;
     // Who chose the training set knows what it costs.
     const bool open_size = spec.time_limit_seconds > 0 && !job.submitted.parameters.contains(kTrainingPaths);
     const uint64_t samples = training_samples(spec);
+    job.table_key = table_key(options_.identity, spec);
     job.spec = std::move(spec);
     job.facts = std::move(facts);
+    if (may_wait && (job.maker = find_maker(job))) {
+        job.phase = PreparePhase::kWaitingForTables;
+        spdlog::info("{}: waits for the tables of {}", job.id, job.maker->id);
+        return changed(job);
+    }
+    job.makes_tables = true;
     if (open_size && samples > kMinTrainingSamples) return open_training(job, UnitKind::kProbe, std::min(kProbeSamples, samples));
     open_training(job, UnitKind::kTraining, samples);
+}
+
+std::shared_ptr<Coordinator::JobRecord> Coordinator::find_maker(const JobRecord& job) const {
+    for (const auto& other : jobs_) {
+        if (other.get() != &job && other->makes_tables && !is_terminal(other->state) && other->table_key == job.table_key) return other;
+    }
+    return nullptr;
+}
+
+void Coordinator::resume_waiting(const std::shared_ptr<JobRecord>& job) {
+    // A time-limited maker may settle for a smaller training set, which makes other tables.
+    const JobRecord& maker = *job->maker;
+    const bool making = maker.state == JobState::kPreparing && maker.table_key == job->table_key;
+    if (making || closing_ || job->running_tasks > 0) return;
+    ++job->running_tasks;
+    JobRecord& record = *job;
+    job->prepare_task = std::jthread([this, &record] {
+        take_over_tables(record);
+        const std::lock_guard lock(mutex_);
+        --record.running_tasks;
+    });
+}
+
+void Coordinator::take_over_tables(JobRecord& job) {
+    JobSpec spec;
+    SceneFacts facts;
+    TablesInfo tables;
+    {
+        const std::lock_guard lock(mutex_);
+        if (job.state != JobState::kPreparing) return;
+        const std::shared_ptr<JobRecord> maker = std::move(job.maker);
+        if (maker->tables.cache_key == job.table_key) tables = maker->tables;
+        spec = job.spec;
+        facts = std::move(job.facts);
+        job.phase = PreparePhase::kReadingScene;
+    }
+    if (tables.asset.size_bytes == 0) return prepare_tables(job, std::move(spec), std::move(facts));
+    const auto bytes = assets_.read(tables.asset.digest);
+    if (!bytes.ok()) return prepare_tables(job, std::move(spec), std::move(facts), false);
+    tables.from_cache = true;
+    tables.capped_by_time_limit = false;
+    if (const Status s = adopt_tables(job, spec, facts, *bytes, std::move(tables)); !s.ok()) {
+        const std::lock_guard lock(mutex_);
+        fail_job(job, s);
+    }
 }
 
 bool Coordinator::adopt_cached_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts) {
@@ -264,6 +316,7 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
         const std::lock_guard lock(mutex_);
         if (job.state != JobState::kPreparing) return over();
         job.capped_by_time_limit = chosen < wanted;
+        job.table_key = table_key(options_.identity, spec);
     }
     if (chosen < wanted && adopt_cached_tables(job, spec, facts)) return {};
     const std::lock_guard lock(mutex_);

@@ -68,6 +68,9 @@ struct Coordinator::JobRecord {
     uint64_t training_bytes = 0;        ///< Of these.
     double traced_seconds = 0;          ///< Of the workers, over these.
     bool capped_by_time_limit = false;
+    Digest table_key;                   ///< Of the tables that the job needs; set before `makes_tables` or `maker`.
+    bool makes_tables = false;          ///< It probes, traces and learns itself.
+    std::shared_ptr<JobRecord> maker;   ///< Makes the same tables; this job waits for them.
     TimePoint training_begin;           ///< The first training unit was leased; unset before.
     TablesInfo tables;
 

@@ -29,7 +29,7 @@ std::string status_json(const Coordinator& coordinator) {
                         {"state", to_string(j.state)},
                         {"message", j.message},
                         {"algorithm", j.spec.algorithm},
-                        {"phase", j.state == JobState::kPreparing ? Json(to_string(j.phase)) : Json(nullptr)},
+                        {"phase", j.state == JobState::kPreparing ? Json(phase_text(j)) : Json(nullptr)},
                         {"phase_done", j.phase_done},
                         {"phase_total", j.phase_total},
                         {"units_done", j.unit_done},

@@ -142,6 +142,69 @@ TEST(Tables, JobsCanBeCancelledInEveryPhase) {
     EXPECT_EQ(service.coordinator->get_job(last)->state, JobState::kRunning) << "the service goes on";
 }
 
+JobInfo wait_waiting(TableService& service, const std::string& id) {
+    return service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kWaitingForTables; });
+}
+
+TEST(Tables, AnEqualJobWaitsForThemInsteadOfTrainingToo) {
+    TableService service;
+    const std::string first = service.submit_training(service.table_spec(2)), second = service.submit_now(service.table_spec(7));
+    const JobInfo waiting = wait_waiting(service, second);
+    EXPECT_EQ(waiting.waits_for, first);
+    EXPECT_EQ(phase_text(waiting), "waiting for the tables of " + first);
+    const auto held = lease_all(service);
+    EXPECT_EQ(held.size(), 3u) << "of the first only";
+    for (const auto& [worker, lease] : held) {
+        EXPECT_EQ(lease.job_id, first);
+        EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
+    }
+    const auto running = [](const JobInfo& j) { return j.state == JobState::kRunning; };
+    const JobInfo made = service.wait(first, running), taken = service.wait(second, running);
+    EXPECT_FALSE(made.tables.from_cache);
+    EXPECT_TRUE(taken.tables.from_cache);
+    EXPECT_EQ(taken.waits_for, "");
+    EXPECT_EQ(taken.tables.asset.digest, made.tables.asset.digest);
+    EXPECT_EQ(taken.spec.samples_per_pixel, 7u);
+    JobSpec other = service.table_spec(2);
+    other.seed = 9;
+    EXPECT_EQ(service.coordinator->get_job(service.submit_training(other))->phase, PreparePhase::kTracing);
+}
+
+TEST(Tables, AJobThatWaitedMakesThemItselfWhenTheOtherEnds) {
+    for (const bool fails : {false, true}) {
+        TableService service;
+        const std::string first = service.submit_training(service.table_spec(2));
+        const std::string second = service.submit_now(service.table_spec(2));
+        const std::string third = service.submit_now(service.table_spec(2));
+        wait_waiting(service, second);
+        wait_waiting(service, third);
+        if (fails) {
+            const std::string worker = service.add_worker();
+            const UnitLease lease = service.lease(worker).at(0);
+            ASSERT_TRUE(service.coordinator->release_unit(worker, lease.reference(), invalid_argument("boom")).ok());
+            EXPECT_EQ(service.coordinator->get_job(first)->state, JobState::kFailed);
+        } else {
+            ASSERT_TRUE(service.coordinator->cancel_job(first).ok());
+        }
+        // Of the two that waited, one goes on and the other waits for it.
+        std::string maker;
+        for (int i = 0; i < 1000 && maker.empty(); ++i) {
+            for (const std::string& id : {second, third})
+                if (service.coordinator->get_job(id)->phase == PreparePhase::kTracing) maker = id;
+            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        }
+        ASSERT_FALSE(maker.empty());
+        const std::string other = maker == second ? third : second;
+        service.wait(other, [&](const JobInfo& j) { return j.waits_for == maker; });
+        for (const auto& [worker, lease] : lease_all(service)) {
+            EXPECT_EQ(lease.job_id, maker);
+            EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
+        }
+        const auto running = [](const JobInfo& j) { return j.state == JobState::kRunning; };
+        EXPECT_EQ(service.wait(maker, running).tables.asset.digest, service.wait(other, running).tables.asset.digest);
+    }
+}
+
 TEST(TableCache, ASecondJobStartsAtOnceAndAChangedOneDoesNot) {
     TempDirectory cache;
     const auto with_cache = [&](CoordinatorOptions& o) { o.table_cache = cache.path; };
