@@ -140,9 +140,11 @@ void add_render_command(CLI::App& app, int* exit_code) {
     command->add_option("--workers", options->workers, "Embedded workers; the bytes do not depend on it")
         ->check(CLI::Range(1, 256))->capture_default_str();
     command->add_option("--table-cache", options->cache.directory,
-                        "Directory in which learned tables are kept for the next render, or off")
+                        "Directory in which learned tables are kept for the next render, or off; nothing else is in it, and scene "
+                        "files and images never are")
         ->envname("LIGHTLOOM_TABLE_CACHE")->capture_default_str();
-    command->add_option("--table-cache-size", options->cache.megabytes, "MB that it may hold; the tables used least recently go first")
+    command->add_option("--table-cache-size", options->cache.megabytes,
+                        "MB that it may hold; the tables used least recently go first")
         ->check(CLI::Range(uint64_t(1), uint64_t(1) << 30))->capture_default_str();
     command->callback([options, exit_code] {
         uint32_t threads = options->threads;

@@ -52,7 +52,11 @@ Status no_job(const std::string& id) {
 Coordinator::Coordinator(CoordinatorOptions options)
     : options_(std::move(options)), assets_(options_.directory / "assets"),
       table_cache_(options_.table_cache, options_.table_cache_bytes),
-      ticker_([this](std::stop_token stop) { tick(stop); }) {}
+      ticker_([this](std::stop_token stop) { tick(stop); }) {
+    // Jobs do not outlive the coordinator, so nobody names the tables that it finds.
+    if (const size_t count = assets_.remove_all_that_begin_with(kTablesPrefix); count > 0)
+        spdlog::info("removed the tables of {} earlier job(s)", count);
+}
 
 Coordinator::~Coordinator() {
     {
@@ -295,6 +299,7 @@ void Coordinator::end_job(JobRecord& job, JobState state) {
     }
     discard_training(job);
     job.maker.reset();
+    drop_tables(job);
     if (job.reducer) discarded_.push_back(std::move(job.reducer));
     discarded_.push_back(std::make_shared<std::vector<ImageLayer>>(std::move(job.layers)));
     job.reducer.reset();

@@ -130,6 +130,8 @@ class Coordinator {
     Status adopt_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts, std::string_view bytes, TablesInfo tables);
     bool repair_tables(const std::string& job_id);
     void discard_training(JobRecord& job);
+    /// Removes the asset of an ended job's tables unless another job needs it.
+    void drop_tables(const JobRecord& job);
     /// The open units of a kind, or null.
     static UnitTable* table_for(JobRecord& job, UnitKind kind);
     /// The units that can be leased now, or null.

@@ -132,7 +132,10 @@ void Coordinator::take_over_tables(JobRecord& job) {
         const std::lock_guard lock(mutex_);
         if (job.state != JobState::kPreparing) return;
         const std::shared_ptr<JobRecord> maker = std::move(job.maker);
-        if (maker->tables.cache_key == job.table_key) tables = maker->tables;
+        if (maker->tables.cache_key == job.table_key) {
+            tables = maker->tables;
+            job.tables_asset = maker->tables_asset;
+        }
         spec = job.spec;
         facts = std::move(job.facts);
         job.phase = PreparePhase::kReadingScene;
@@ -165,6 +168,11 @@ Status Coordinator::adopt_tables(JobRecord& job, const JobSpec& spec, const Scen
                                  TablesInfo tables) {
     const Digest digest = sha256(bytes);
     tables.asset = {digest, bytes.size()};
+    {
+        const std::lock_guard lock(mutex_);
+        if (is_terminal(job.state)) return {};
+        job.tables_asset = digest;  // before the bytes are there, so that no job that ends takes them away
+    }
     if (assets_.contains(digest) && !assets_.read(digest).ok()) assets_.remove(digest);
     Status stored = assets_.put(digest, bytes);
     // An equal job stores the same bytes at this moment.
@@ -174,7 +182,19 @@ Status Coordinator::adopt_tables(JobRecord& job, const JobSpec& spec, const Scen
     }
     LL_RETURN_IF_ERROR(stored);
     plan_units(job, spec, facts, std::move(tables));
+    const std::lock_guard lock(mutex_);
+    if (is_terminal(job.state)) drop_tables(job);  // it ended while they were stored
     return {};
+}
+
+void Coordinator::drop_tables(const JobRecord& job) {
+    const Digest& digest = job.tables_asset;
+    if (digest == Digest()) return;
+    for (const auto& other : jobs_) {
+        const bool waits = other->maker && other->maker->tables_asset == digest;
+        if (waits || (!is_terminal(other->state) && other->tables_asset == digest)) return;
+    }
+    assets_.remove(digest);
 }
 
 void Coordinator::make_tables(JobRecord& job, std::stop_token stop) {

@@ -73,6 +73,7 @@ struct Coordinator::JobRecord {
     std::shared_ptr<JobRecord> maker;   ///< Makes the same tables; this job waits for them.
     TimePoint training_begin;           ///< The first training unit was leased; unset before.
     TablesInfo tables;
+    Digest tables_asset;                ///< Of the tables that the job names, or is about to; zero before.
 
     std::jthread prepare_task, train_task, finish_task;
     int running_tasks = 0;  ///< Of these. A job is forgotten only without any, so that nobody waits for one under the mutex.

@@ -205,6 +205,29 @@ TEST(Tables, AJobThatWaitedMakesThemItselfWhenTheOtherEnds) {
     }
 }
 
+TEST(Tables, TheirBytesGoWithTheLastJobThatNamesThem) {
+    TableService service;
+    const std::string first = service.submit_training(service.table_spec(2)), second = service.submit_now(service.table_spec(3));
+    wait_waiting(service, second);
+    for (const auto& [worker, lease] : lease_all(service)) service.give(worker, lease, traced(lease));
+    const auto running = [](const JobInfo& j) { return j.state == JobState::kRunning; };
+    const Digest digest = service.wait(first, running).tables.asset.digest;
+    ASSERT_TRUE(service.coordinator->cancel_job(first).ok());
+    service.wait(second, running);
+    EXPECT_TRUE(service.coordinator->assets().contains(digest));
+    ASSERT_TRUE(service.coordinator->cancel_job(second).ok());
+    EXPECT_FALSE(service.coordinator->assets().contains(digest));
+    // What a coordinator that was killed left behind goes when the next one starts; files of scenes stay.
+    const Digest left = sha256(serialize(trivial_tables(golden()->emitters())));
+    ASSERT_TRUE(service.coordinator->assets().put(left, serialize(trivial_tables(golden()->emitters()))).ok());
+    CoordinatorOptions options;
+    options.directory = service.directory.path;
+    service.coordinator.reset();
+    Coordinator next(options);
+    EXPECT_FALSE(next.assets().contains(left));
+    EXPECT_TRUE(next.assets().contains(service.root));
+}
+
 TEST(TableCache, ASecondJobStartsAtOnceAndAChangedOneDoesNot) {
     TempDirectory cache;
     const auto with_cache = [&](CoordinatorOptions& o) { o.table_cache = cache.path; };
