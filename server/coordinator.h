@@ -115,14 +115,16 @@ class Coordinator {
     Status check_assets(const JobSpec& spec) const;
     void fail_job(JobRecord& job, const Status& why);
     void end_job(JobRecord& job, JobState state);
-    void prepare(JobRecord& job, std::stop_token stop);
+    /// The body of a job's thread: its error, or too little memory for it, fails the job and nothing else. `purpose` completes "the
+    /// coordinator has too little memory ...".
+    void run_task(JobRecord& job, const char* purpose, const std::function<Status()>& task);
+    Status prepare(JobRecord& job, std::stop_token stop);
     void plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables);
-    void prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait = true);
+    Status prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait);
     std::shared_ptr<JobRecord> find_maker(const JobRecord& job) const;
     void resume_waiting(const std::shared_ptr<JobRecord>& job);
-    void take_over_tables(JobRecord& job);
+    Status take_over_tables(JobRecord& job);
     void open_training(JobRecord& job, UnitKind kind, uint64_t samples);
-    void make_tables(JobRecord& job, std::stop_token stop);
     Status learn(JobRecord& job, std::stop_token stop);
     Result<TrainingData> collect_training(JobRecord& job, size_t emitter_count, std::stop_token stop);
     Status choose_training_samples(JobRecord& job, const TrainingData& probe, const Scene& scene, std::stop_token stop);
@@ -137,8 +139,7 @@ class Coordinator {
     /// The units that can be leased now, or null.
     static UnitTable* open_table(JobRecord& job);
     void size_window(JobRecord& job) const;
-    void finish(JobRecord& job);
-    void write_results(JobRecord& job);
+    Status write_results(JobRecord& job);
     void forget_old_jobs();
     void finish_if_complete(JobRecord& job);
     /// Enters a result into its table: nothing for the first one, which the caller merges; otherwise the answer.

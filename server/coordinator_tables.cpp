@@ -83,10 +83,10 @@ void Coordinator::open_training(JobRecord& job, UnitKind kind, uint64_t samples)
     work_changed_.notify_all();
 }
 
-void Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait) {
-    if (adopt_cached_tables(job, spec, facts)) return;
+Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait) {
+    if (adopt_cached_tables(job, spec, facts)) return {};
     const std::lock_guard lock(mutex_);
-    if (job.state != JobState::kPreparing) return;
+    if (job.state != JobState::kPreparing) return {};
     // Who chose the training set knows what it costs.
     const bool open_size = spec.time_limit_seconds > 0 && !job.submitted.parameters.contains(kTrainingPaths);
     const uint64_t samples = training_samples(spec);
@@ -96,11 +96,13 @@ void Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts,
     if (may_wait && (job.maker = find_maker(job))) {
         job.phase = PreparePhase::kWaitingForTables;
         spdlog::info("{}: waits for the tables of {}", job.id, job.maker->id);
-        return changed(job);
+        changed(job);
+        return {};
     }
     job.makes_tables = true;
-    if (open_size && samples > kMinTrainingSamples) return open_training(job, UnitKind::kProbe, std::min(kProbeSamples, samples));
-    open_training(job, UnitKind::kTraining, samples);
+    const bool probe = open_size && samples > kMinTrainingSamples;
+    open_training(job, probe ? UnitKind::kProbe : UnitKind::kTraining, probe ? std::min(kProbeSamples, samples) : samples);
+    return {};
 }
 
 std::shared_ptr<Coordinator::JobRecord> Coordinator::find_maker(const JobRecord& job) const {
@@ -118,19 +120,17 @@ void Coordinator::resume_waiting(const std::shared_ptr<JobRecord>& job) {
     ++job->running_tasks;
     JobRecord& record = *job;
     job->prepare_task = std::jthread([this, &record] {
-        take_over_tables(record);
-        const std::lock_guard lock(mutex_);
-        --record.running_tasks;
+        run_task(record, "to prepare this job: its frame or tables are too large", [&] { return take_over_tables(record); });
     });
 }
 
-void Coordinator::take_over_tables(JobRecord& job) {
+Status Coordinator::take_over_tables(JobRecord& job) {
     JobSpec spec;
     SceneFacts facts;
     TablesInfo tables;
     {
         const std::lock_guard lock(mutex_);
-        if (job.state != JobState::kPreparing) return;
+        if (job.state != JobState::kPreparing) return {};
         const std::shared_ptr<JobRecord> maker = std::move(job.maker);
         if (maker->tables.cache_key == job.table_key) {
             tables = maker->tables;
@@ -140,15 +140,12 @@ void Coordinator::take_over_tables(JobRecord& job) {
         facts = std::move(job.facts);
         job.phase = PreparePhase::kReadingScene;
     }
-    if (tables.asset.size_bytes == 0) return prepare_tables(job, std::move(spec), std::move(facts));
+    if (tables.asset.size_bytes == 0) return prepare_tables(job, std::move(spec), std::move(facts), true);
     const auto bytes = assets_.read(tables.asset.digest);
     if (!bytes.ok()) return prepare_tables(job, std::move(spec), std::move(facts), false);
     tables.from_cache = true;
     tables.capped_by_time_limit = false;
-    if (const Status s = adopt_tables(job, spec, facts, *bytes, std::move(tables)); !s.ok()) {
-        const std::lock_guard lock(mutex_);
-        fail_job(job, s);
-    }
+    return adopt_tables(job, spec, facts, *bytes, std::move(tables));
 }
 
 bool Coordinator::adopt_cached_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts) {
@@ -197,13 +194,6 @@ void Coordinator::drop_tables(const JobRecord& job) {
     assets_.remove(digest);
 }
 
-void Coordinator::make_tables(JobRecord& job, std::stop_token stop) {
-    const Status status = learn(job, stop);
-    const std::lock_guard lock(mutex_);
-    if (!status.ok() && !closing_) fail_job(job, status);
-    --job.running_tasks;
-}
-
 Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
     std::function<Result<std::shared_ptr<const Scene>>()> build_scene;
     {
@@ -215,6 +205,11 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
     const auto scene = build_scene();
     if (!scene.ok()) return scene.status();
     const EmitterSet& emitters = (*scene)->emitters();
+    build_scene = {};  // it may hold what the scene was built from
+    {
+        const std::lock_guard lock(mutex_);
+        job.facts.build_scene = {};
+    }
 
     bool probe = true;
     while (probe) {

@@ -316,5 +316,62 @@ TEST(TableCache, DamagedEntriesAreRemovedAndTheDirectoryStaysBounded) {
     EXPECT_FALSE(TableCache({}, 1000).find(key));
 }
 
+TEST(TableCache, AMalformedReportIsADamagedEntry) {
+    const TempDirectory directory;
+    const std::string bytes = serialize(trivial_tables(golden()->emitters()));
+    const TableCache cache(directory.path, 1 << 20);
+    const Digest key = sha256("a");
+    cache.store(key, bytes, {.loss = std::numeric_limits<double>::infinity()});
+    EXPECT_TRUE(cache.find(key)) << "no report that we write ourselves is damaged";
+    const std::string file = *read_file(cache.path_of(key).string());
+    const size_t head = file.find('\n') + 1, begin = file.find('\n', head) + 1, end = file.find('\n', begin);
+    const std::string good = file.substr(begin, end - begin);
+    const auto find_with = [&](const std::string& report) {
+        const std::string rest = file.substr(head, begin - head) + report + file.substr(end);
+        const std::string whole = file.substr(0, head - 65) + sha256(rest).hex() + "\n" + rest;
+        EXPECT_TRUE(write_file_atomically(cache.path_of(key).string(), whole).ok());
+        return cache.find(key).has_value();
+    };
+    EXPECT_TRUE(find_with(good));
+    const auto with = [&](const std::string& field, const std::string& value) {
+        const size_t at = good.find("\"" + field + "\":") + field.size() + 3;
+        return good.substr(0, at) + value + good.substr(good.find_first_of(",}", at));
+    };
+    EXPECT_TRUE(find_with(with("loss", "1.5")));
+    for (const std::string& report : {std::string("null"), std::string("[]"), std::string("{}"), std::string("7"), std::string(),
+                                      std::string("{\"loss\":"), with("loss", "null"), with("loss", "\"1\""), with("note", "null"),
+                                      with("note", "5"), with("training_samples", "-1"), with("light_subspaces", "4294967296"),
+                                      with("eye_subspaces", "1.5"), with("capped_by_time_limit", "0")}) {
+        EXPECT_FALSE(find_with(report)) << report;
+        EXPECT_FALSE(std::filesystem::exists(cache.path_of(key))) << report;
+    }
+}
+
+TEST(Tables, TooLittleMemoryFailsTheJobAndNothingElse) {
+    TableService service([](CoordinatorOptions& o) {
+        o.read_scene = [](const AssetStore&, const JobSpec& spec, std::stop_token) -> Result<SceneFacts> {
+            if (spec.seed == 1) throw std::bad_alloc();
+            SceneFacts facts = golden_facts();
+            facts.build_scene = [seed = spec.seed, build = facts.build_scene] {
+                if (seed == 2) throw std::length_error("vector");
+                if (seed == 3) throw std::bad_alloc();
+                return build();
+            };
+            return facts;
+        };
+    });
+    for (const uint64_t seed : {1, 2, 3}) {
+        JobSpec spec = service.table_spec();
+        spec.seed = seed;
+        const std::string id = service.submit_training(spec);
+        lease_all(service);
+        const JobInfo info = service.wait_end(id);
+        EXPECT_EQ(info.state, JobState::kFailed);
+        EXPECT_NE(info.message.find("the coordinator has too little memory to " + std::string(seed == 1 ? "prepare" : "learn")),
+                  std::string::npos) << info.message;
+    }
+    EXPECT_EQ(service.coordinator->get_job(train_by_hand(service, service.table_spec()))->state, JobState::kRunning);
+}
+
 }  // namespace
 }  // namespace lightloom
