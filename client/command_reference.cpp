@@ -142,8 +142,8 @@ int reference(ReferenceOptions& options) {
     if (checker_choice.name.empty()) return kSuccess;
     if (progressive->groups() < kLeastGroups) {
         return report_error(failed_precondition(
-            output.string() + " consists of " + std::to_string(progressive->groups()) + " groups of iterations; a cross-check needs " +
-            std::to_string(kLeastGroups) + " to know its error: render longer"));
+            output.string() + " consists of " + std::to_string(progressive->groups()) +
+            " groups of iterations; a cross-check needs " + std::to_string(kLeastGroups) + " to know its error: render longer"));
     }
 
     const RenderSettings checker{checker_choice.name, checker_choice.parameters, spec->seed + 1, spec->max_depth};

@@ -116,7 +116,8 @@ void Progress::show(const JobInfo& job) {
         std::fprintf(stderr, "\r\033[K[%s] %s", bar.c_str(), text.c_str());
         std::fflush(stderr);
         open_ = true;
-    } else if (job.state == JobState::kPreparing && (new_phase || (job.phase == PreparePhase::kTracing && waited >= kPlainInterval))) {
+    } else if (job.state == JobState::kPreparing &&
+               (new_phase || (job.phase == PreparePhase::kTracing && waited >= kPlainInterval))) {
         last_ = now;
         std::fprintf(stderr, "%s\n", phase_line(job).c_str());
     } else if (new_state && job.state == JobState::kRunning && job.tables.asset.size_bytes > 0) {

@@ -146,7 +146,8 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     if (auto answer = repeated()) return *answer;
     const auto unended = std::count_if(jobs_.begin(), jobs_.end(), [](const auto& j) { return !is_terminal(j->state); });
     if (size_t(unended) >= options_.max_jobs)
-        return Status(StatusCode::kResourceExhausted, "the coordinator holds as many jobs as it may; submit again when some ended");
+        return Status(StatusCode::kResourceExhausted,
+                      "the coordinator holds as many jobs as it may; submit again when some ended");
     auto record = std::make_shared<JobRecord>();
     JobRecord& job = *record;
     job.id = new_id("job");
@@ -285,7 +286,8 @@ JobInfo Coordinator::snapshot(const JobRecord& job) const {
         info.phase_total = job.training_samples;
         info.phase_done = std::min(info.phase_total, job.training->done_count() * kTrainingUnitSamples);
         if (job.phase == PreparePhase::kTracing && info.phase_done > 0)
-            info.eta_seconds = seconds_between(job.training_begin, now) * double(info.phase_total - info.phase_done) / double(info.phase_done);
+            info.eta_seconds = seconds_between(job.training_begin, now) * double(info.phase_total - info.phase_done) /
+                               double(info.phase_done);
     }
     return info;
 }

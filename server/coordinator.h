@@ -1,7 +1,7 @@
 #pragma once
-// Coordinator: accepts jobs, leases their units to workers, merges what comes back exactly once, and writes the image. Before that
-// it has workers trace the training set of algorithms that need tables, and learns these. It knows neither gRPC nor light
-// transport; time comes from an injected clock. Safe for any number of threads.
+// Coordinator: accepts jobs, leases their units to workers, merges what comes back exactly once, and writes the image.
+// Before that it has workers trace the training set of algorithms that need tables, and learns these. It knows neither
+// gRPC nor light transport; time comes from an injected clock. Safe for any number of threads.
 
 #include <condition_variable>
 #include <filesystem>
@@ -115,8 +115,8 @@ class Coordinator {
     Status check_assets(const JobSpec& spec) const;
     void fail_job(JobRecord& job, const Status& why);
     void end_job(JobRecord& job, JobState state);
-    /// The body of a job's thread: its error, or too little memory for it, fails the job and nothing else. `purpose` completes "the
-    /// coordinator has too little memory ...".
+    /// The body of a job's thread: its error, or too little memory for it, fails the job and nothing else. `purpose`
+    /// completes "the coordinator has too little memory ...".
     void run_task(JobRecord& job, const char* purpose, const std::function<Status()>& task);
     Status prepare(JobRecord& job, std::stop_token stop);
     void plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables);

@@ -120,7 +120,9 @@ void Coordinator::finish_if_complete(JobRecord& job) {
     job.units->close();
     changed(job);
     ++job.running_tasks;
-    job.finish_task = std::jthread([this, &job] { run_task(job, "to write the image of this job", [&] { return write_results(job); }); });
+    job.finish_task = std::jthread([this, &job] {
+        run_task(job, "to write the image of this job", [&] { return write_results(job); });
+    });
 }
 
 Status Coordinator::write_results(JobRecord& job) {

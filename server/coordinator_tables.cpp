@@ -43,7 +43,8 @@ uint64_t training_samples(const JobSpec& spec) {
 /// Above any data that the unit can have: a few paths per sample, each of the greatest length, and a sum per block of the frame.
 uint64_t largest_training_payload(const JobSpec& spec, const TrainingWork& work) {
     const FrameLayout& frame = spec.frame;
-    const uint64_t blocks = std::min(uint64_t(frame.crop.area()), work.total_samples + uint64_t(frame.crop.width() + frame.crop.height() + 1));
+    const uint64_t most_blocks = work.total_samples + uint64_t(frame.crop.width() + frame.crop.height() + 1);
+    const uint64_t blocks = std::min(uint64_t(frame.crop.area()), most_blocks);
     const uint64_t path = sizeof(TrainingPath) + uint64_t(spec.max_depth + 3) * sizeof(TrainingVertex);
     return 256 + blocks * sizeof(double) + work.sample_count * 4 * path;
 }
@@ -107,7 +108,8 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
 
 std::shared_ptr<Coordinator::JobRecord> Coordinator::find_maker(const JobRecord& job) const {
     for (const auto& other : jobs_) {
-        if (other.get() != &job && other->makes_tables && !is_terminal(other->state) && other->table_key == job.table_key) return other;
+        const bool makes = other->makes_tables && !is_terminal(other->state);
+        if (other.get() != &job && makes && other->table_key == job.table_key) return other;
     }
     return nullptr;
 }
@@ -257,7 +259,8 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
         table_cache_.store(info.cache_key, bytes, info);
         spdlog::info("{}: tables of {} x {} subspaces from {} samples; {:.2f} s traced, {:.2f} s learned{}{}", job.id,
                      info.light_subspaces, info.eye_subspaces, info.training_samples, info.trace_seconds,
-                     info.classifier_seconds + info.energy_seconds + info.gamma_seconds, info.note.empty() ? "" : "; ", info.note);
+                     info.classifier_seconds + info.energy_seconds + info.gamma_seconds,
+                     info.note.empty() ? "" : "; ", info.note);
         LL_RETURN_IF_ERROR(adopt_tables(job, spec, facts, bytes, std::move(info)));
     }
     return {};
@@ -313,7 +316,8 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
         spec = job.spec;
         facts = job.facts;
         traced = job.traced_seconds;
-        for (const auto& w : workers_) crew += !w->left && seconds_between(w->last_heard, options_.clock()) <= options_.lease_seconds;
+        const TimePoint now = options_.clock();
+        for (const auto& w : workers_) crew += !w->left && seconds_between(w->last_heard, now) <= options_.lease_seconds;
     }
     const auto parameters = TransportParameters::read(render_settings(spec));
     if (!parameters.ok()) return parameters.status();
@@ -324,7 +328,8 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
     const double learned = seconds_since(begin), samples = double(std::max<uint64_t>(1, probe.samples));
     const double budget = kTrainingShare * spec.time_limit_seconds - traced - learned;
     const uint64_t wanted = training_samples(spec);
-    const uint64_t chosen = affordable_training_samples({traced / samples / double(std::max<size_t>(1, crew)), learned / samples}, budget, wanted);
+    const TrainingRate rate{traced / samples / double(std::max<size_t>(1, crew)), learned / samples};
+    const uint64_t chosen = affordable_training_samples(rate, budget, wanted);
     spec = with_training_samples(spec, chosen);
     spdlog::info("{}: the time limit has room for {} of {} training samples", job.id, chosen, wanted);
     {
@@ -393,8 +398,9 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
     // Units differ little in size: a set that is far too large shows before hours were spent on it.
     const double projected = double(job->training_bytes) * units->group_total() / double(units->done_count());
     if (job->training_bytes > options_.training_bytes || projected > 1.25 * double(options_.training_bytes)) {
-        fail_job(*job, {StatusCode::kResourceExhausted, "the training data need more than the " + std::to_string(options_.training_bytes >> 20) +
-                                                            " MiB that a job may have; choose fewer training-paths"});
+        fail_job(*job, {StatusCode::kResourceExhausted,
+                        "the training data need more than the " + std::to_string(options_.training_bytes >> 20) +
+                            " MiB that a job may have; choose fewer training-paths"});
         return SubmitAck{SubmitOutcome::kRejected, job->message};
     }
     job->training_parts[reference.key.group] = {*std::move(data), payload.size(), trace_seconds};

@@ -54,7 +54,8 @@ std::string status_json(const Coordinator& coordinator) {
                            {"lost", w.lost}});
     }
     // Messages may quote bytes that are not UTF-8 (file names, cut texts); the default of dump() is to throw.
-    return Json{{"jobs", std::move(jobs)}, {"workers", std::move(workers)}}.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+    const Json status{{"jobs", std::move(jobs)}, {"workers", std::move(workers)}};
+    return status.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 http::response<http::string_body> respond(const Coordinator& coordinator, const http::request<http::empty_body>& request) {

@@ -70,8 +70,9 @@ Result<TablesInfo> info_from(std::string_view text) {
     const Json json = Json::parse(text, nullptr, false);
     TablesInfo info;
     const bool complete =
-        json.is_object() && take(json, "light_subspaces", &info.light_subspaces) && take(json, "eye_subspaces", &info.eye_subspaces) &&
-        take(json, "training_samples", &info.training_samples) && take(json, "capped_by_time_limit", &info.capped_by_time_limit) &&
+        json.is_object() && take(json, "light_subspaces", &info.light_subspaces) &&
+        take(json, "eye_subspaces", &info.eye_subspaces) && take(json, "training_samples", &info.training_samples) &&
+        take(json, "capped_by_time_limit", &info.capped_by_time_limit) &&
         take(json, "trace_seconds", &info.trace_seconds) && take(json, "classifier_seconds", &info.classifier_seconds) &&
         take(json, "energy_seconds", &info.energy_seconds) && take(json, "gamma_seconds", &info.gamma_seconds) &&
         take(json, "uniform_loss", &info.uniform_loss) && take(json, "loss", &info.loss) &&
