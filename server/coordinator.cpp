@@ -302,6 +302,7 @@ void Coordinator::end_job(JobRecord& job, JobState state) {
         job.units.reset();
     }
     discard_training(job);
+    if (job.maker) discarded_.push_back(std::move(job.maker));
     job.maker.reset();
     drop_tables(job);
     if (job.reducer) discarded_.push_back(std::move(job.reducer));

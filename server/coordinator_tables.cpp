@@ -141,6 +141,7 @@ Status Coordinator::take_over_tables(JobRecord& job) {
         spec = job.spec;
         facts = std::move(job.facts);
         job.phase = PreparePhase::kReadingScene;
+        changed(job);
     }
     if (tables.asset.size_bytes == 0) return prepare_tables(job, std::move(spec), std::move(facts), true);
     const auto bytes = assets_.read(tables.asset.digest);
