@@ -102,7 +102,8 @@ Status render_all(std::vector<std::unique_ptr<LiveRun>> alive, const BenchOption
         for (std::unique_ptr<LiveRun>& live : alive) {
             const auto ended = advance(*live, goal, reference, writer);
             if (ended.status().code() == StatusCode::kCancelled)
-                return {StatusCode::kCancelled, "interrupted; finished runs are in " + options.out + ", --resume does the others"};
+                return {StatusCode::kCancelled,
+                        "interrupted; finished runs are in " + options.out + ", --resume does the others"};
             if (!ended.ok()) return {ended.status().code(), live->label + ": " + ended.status().message()};
             if (!*ended) continue;
             done.push_back(done_line(live->last_checkpoint, live->curve, live->run.threshold));
@@ -121,7 +122,8 @@ Result<std::vector<AlgorithmChoice>> parse_choices(const std::vector<std::string
         auto choice = parse_algorithm(text);
         if (!choice.ok()) return choice.status();
         for (const AlgorithmChoice& other : choices) {
-            if (other.name == choice->name && other.parameters == choice->parameters) return invalid_argument("--algorithms names " + text + " twice");
+            if (other.name == choice->name && other.parameters == choice->parameters)
+                return invalid_argument("--algorithms names " + text + " twice");
         }
         choices.push_back(std::move(choice).value());
     }
@@ -227,7 +229,8 @@ void add_bench_command(CLI::App& app, int* exit_code) {
         ->delimiter(',')->required();
     command->add_option("--out", options->out, "JSON lines to write")->required()->type_name("FILE");
     command->add_flag("--resume", options->resume, "Skip the runs that FILE holds to the end; start the others again");
-    auto* time = command->add_option("--time", options->time, "Seconds that a run may take")->check(CLI::Range(0.001, 30 * 86400.0));
+    auto* time = command->add_option("--time", options->time, "Seconds that a run may take")
+                     ->check(CLI::Range(0.001, 30 * 86400.0));
     auto* spp = command->add_option("--spp", options->spp, "Iterations (samples per pixel) that a run may take")
                     ->check(CLI::Range(1u, 1u << 24));
     command->add_option("--seeds", options->seeds, "Runs of each algorithm")->capture_default_str()->check(CLI::Range(1, 1000));

@@ -60,26 +60,24 @@ Result<RegionMeans> render(ProgressiveRender& render, const JobSpec& spec, bool 
 nlohmann::ordered_json describe(const ReferenceOptions& options, const JobSpec& spec, const ProgressiveRender& render,
                                 const Estimate& mean, const std::string& exr) {
     const UnitCounters& counters = render.counters();
-    return {{"format", "lightloom-reference 1"},
-            {"sha256", sha256(exr).hex()},
-            {"scene", options.job.scene},
-            {"scene_digest", spec.scene_root.hex()},
-            {"algorithm", spec.algorithm},
-            {"parameters", spec.parameters},
-            {"seed", spec.seed},
-            {"max_depth", spec.max_depth},
-            {"width", spec.frame.width},
-            {"height", spec.frame.height},
-            {"samples_per_pixel", render.iterations()},
-            {"groups", render.groups()},
-            {"seconds", render.seconds()},
-            {"preparation_seconds", render.preparation_seconds()},
-            {"threads", options.threads},
-            {"rays", counters.rays},
-            {"dropped_samples", render.dropped()},
-            {"mean_y", mean.mean},
-            {"mean_y_se", mean.standard_error()},
-            {"build", kBuildId}};
+    nlohmann::ordered_json json = {{"format", "lightloom-reference 1"},
+                                   {"sha256", sha256(exr).hex()},
+                                   {"scene", options.job.scene},
+                                   {"scene_digest", spec.scene_root.hex()}};
+    json.update(settings_json(spec));
+    json.update(nlohmann::ordered_json{{"width", spec.frame.width},
+                                       {"height", spec.frame.height},
+                                       {"samples_per_pixel", render.iterations()},
+                                       {"groups", render.groups()},
+                                       {"seconds", render.seconds()},
+                                       {"preparation_seconds", render.preparation_seconds()},
+                                       {"threads", options.threads},
+                                       {"rays", counters.rays},
+                                       {"dropped_samples", render.dropped()},
+                                       {"mean_y", mean.mean},
+                                       {"mean_y_se", mean.standard_error()},
+                                       {"build", kBuildId}});
+    return json;
 }
 
 int reference(ReferenceOptions& options) {
@@ -144,8 +142,8 @@ int reference(ReferenceOptions& options) {
     if (checker_choice.name.empty()) return kSuccess;
     if (progressive->groups() < kLeastGroups) {
         return report_error(failed_precondition(
-            output.string() + " consists of " + std::to_string(progressive->groups()) + " groups of iterations; a cross-check needs " +
-            std::to_string(kLeastGroups) + " to know its error: render longer"));
+            output.string() + " consists of " + std::to_string(progressive->groups()) +
+            " groups of iterations; a cross-check needs " + std::to_string(kLeastGroups) + " to know its error: render longer"));
     }
 
     const RenderSettings checker{checker_choice.name, checker_choice.parameters, spec->seed + 1, spec->max_depth};

@@ -72,16 +72,19 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, c
     coordinator_options.directory = scratch.path;
     coordinator_options.identity = *identity;
     coordinator_options.scene_files_needed = false;
-    // Everybody in this process shares the one scene; it is built when somebody asks for it. A build takes the description over, so
-    // its failure is final: a second attempt would build and render an empty scene.
+    // Everybody in this process shares the one scene; it is built when somebody asks for it. A build takes the description
+    // over, so its failure is final: a second attempt would build and render an empty scene.
     std::mutex build_mutex;
     std::optional<Result<std::shared_ptr<const Scene>>> built_scene;
     const auto build_scene = [&]() -> Result<std::shared_ptr<const Scene>> {
         const std::lock_guard only_one(build_mutex);
         if (!built_scene) {
             auto built = Scene::build(std::move(scene->imported.description), {.width = spec->width, .height = spec->height});
-            built_scene = built.ok() ? Result<std::shared_ptr<const Scene>>(std::shared_ptr<const Scene>(std::move(built).value()))
-                                     : Result<std::shared_ptr<const Scene>>(built.status());
+            if (built.ok()) {
+                built_scene = std::shared_ptr<const Scene>(std::move(built).value());
+            } else {
+                built_scene = built.status();
+            }
         }
         return *built_scene;
     };
@@ -140,9 +143,11 @@ void add_render_command(CLI::App& app, int* exit_code) {
     command->add_option("--workers", options->workers, "Embedded workers; the bytes do not depend on it")
         ->check(CLI::Range(1, 256))->capture_default_str();
     command->add_option("--table-cache", options->cache.directory,
-                        "Directory in which learned tables are kept for the next render, or off")
+                        "Directory in which learned tables are kept for the next render, or off; it holds nothing else, no "
+                        "scene files and no images")
         ->envname("LIGHTLOOM_TABLE_CACHE")->capture_default_str();
-    command->add_option("--table-cache-size", options->cache.megabytes, "MB that it may hold; the tables used least recently go first")
+    command->add_option("--table-cache-size", options->cache.megabytes,
+                        "MB that it may hold; the tables used least recently go first")
         ->check(CLI::Range(uint64_t(1), uint64_t(1) << 30))->capture_default_str();
     command->callback([options, exit_code] {
         uint32_t threads = options->threads;

@@ -80,7 +80,7 @@ int list_jobs(const ServiceOptions& options) {
         const std::string total = job.unit_total > 0 ? std::to_string(job.unit_total) : "-";
         const std::string units = std::to_string(job.unit_done) + "/" + total;
         std::string note = job.message;
-        if (job.state == JobState::kPreparing) note = std::string(to_string(job.phase)) + " ";
+        if (job.state == JobState::kPreparing) note = phase_text(job) + " ";
         if (job.message.empty() && !is_terminal(job.state) && job.eta_seconds >= 0) note += duration_text(job.eta_seconds);
         std::printf("%-18s %-10s %-8s %14s %8llu  %s\n", job.job_id.c_str(), std::string(to_string(job.state)).c_str(),
                     job.spec.algorithm.c_str(), units.c_str(),

@@ -108,8 +108,10 @@ Status draw_gamma(const SubspaceTables& t, const std::string& path) {
     for (int x = 0; x < picture.width; ++x) {
         for (int y = 0; y < picture.height; ++y) {
             double sum = 0, count = 0;
-            for (uint32_t j = cell_begin(x, picture.width, t.eye_count); j < cell_begin(x + 1, picture.width, t.eye_count); ++j) {
-                for (uint32_t i = cell_begin(y, picture.height, t.light_count); i < cell_begin(y + 1, picture.height, t.light_count); ++i) {
+            const uint32_t eye_end = cell_begin(x + 1, picture.width, t.eye_count);
+            const uint32_t light_end = cell_begin(y + 1, picture.height, t.light_count);
+            for (uint32_t j = cell_begin(x, picture.width, t.eye_count); j < eye_end; ++j) {
+                for (uint32_t i = cell_begin(y, picture.height, t.light_count); i < light_end; ++i) {
                     sum += double(t.column(j)[i]);
                     count += 1;
                 }
@@ -157,10 +159,21 @@ nlohmann::ordered_json describe(const TableFile& file) {
     const Statistics s = measure(t);
     return {{"sha256", file.digest.hex()},
             {"size_bytes", file.size_bytes},
-            {"light_subspaces", {{"count", t.light_count}, {"emitter_cells", t.division.cell_count()}, {"labels", s.light_labels}}},
+            {"light_subspaces",
+             {{"count", t.light_count}, {"emitter_cells", t.division.cell_count()}, {"labels", s.light_labels}}},
             {"eye_subspaces", {{"count", t.eye_count}, {"labels", s.eye_labels}}},
-            {"q", {{"minimum", s.q[0]}, {"p10", s.q[1]}, {"median", s.q[2]}, {"p90", s.q[3]}, {"maximum", s.q[4]}, {"share_of_top_ten", s.q_top_ten}}},
-            {"gamma_column_entropy_bits", {{"minimum", s.entropy[0]}, {"mean", s.entropy[1]}, {"maximum", s.entropy[2]}, {"uniform", std::log2(double(t.light_count))}}},
+            {"q",
+             {{"minimum", s.q[0]},
+              {"p10", s.q[1]},
+              {"median", s.q[2]},
+              {"p90", s.q[3]},
+              {"maximum", s.q[4]},
+              {"share_of_top_ten", s.q_top_ten}}},
+            {"gamma_column_entropy_bits",
+             {{"minimum", s.entropy[0]},
+              {"mean", s.entropy[1]},
+              {"maximum", s.entropy[2]},
+              {"uniform", std::log2(double(t.light_count))}}},
             {"subspaces_with_more_than_one_window", s.windows},
             {"vertices_per_path", t.vertices_per_path}};
 }
@@ -172,10 +185,10 @@ void print(const TableFile& file) {
     std::printf("  light      %u subspaces, %u of them cells of emitters; %zu labels occur; %.3g connectible vertices per path\n",
                 t.light_count, t.division.cell_count(), s.light_labels, t.vertices_per_path);
     std::printf("  eye        %u subspaces; %zu labels occur\n", t.eye_count, s.eye_labels);
-    std::printf("  Q          minimum %.4g, 10 %% %.4g, median %.4g, 90 %% %.4g, maximum %.4g; the ten largest hold %.1f %%\n", s.q[0],
-                s.q[1], s.q[2], s.q[3], s.q[4], 100 * s.q_top_ten);
-    std::printf("  Gamma      entropy of a column %.2f to %.2f bits, mean %.2f; uniform would be %.2f\n", s.entropy[0], s.entropy[2],
-                s.entropy[1], std::log2(double(t.light_count)));
+    std::printf("  Q          minimum %.4g, 10 %% %.4g, median %.4g, 90 %% %.4g, maximum %.4g; the ten largest hold %.1f %%\n",
+                s.q[0], s.q[1], s.q[2], s.q[3], s.q[4], 100 * s.q_top_ten);
+    std::printf("  Gamma      entropy of a column %.2f to %.2f bits, mean %.2f; uniform would be %.2f\n",
+                s.entropy[0], s.entropy[2], s.entropy[1], std::log2(double(t.light_count)));
     std::printf("  windows    %zu subspaces keep more than one\n", s.windows);
 }
 

@@ -20,10 +20,10 @@ Result<TableFile> read_tables(const std::string& path, const Scene& scene);
 /// Sizes, labels that occur, quantiles of Q, entropy of Gamma's columns in bits, windows, digest.
 nlohmann::ordered_json describe(const TableFile& file);
 void print(const TableFile& file);
-/// PREFIX-kappa-eye.png and PREFIX-kappa-light.png: the subspaces of what the camera sees first, in false colours (a light sub-path that
-/// ends there is taken to come along the normal). PREFIX-gamma.png: a column per eye subspace, a row per light subspace, brightness by
-/// the logarithm of Gamma over uniform. PREFIX-q.png: a bar per light subspace, height by the logarithm of Q; cells of emitters in
-/// another colour.
+/// PREFIX-kappa-eye.png and PREFIX-kappa-light.png: the subspaces of what the camera sees first, in false colours (a light
+/// sub-path that ends there is taken to come along the normal). PREFIX-gamma.png: a column per eye subspace, a row per
+/// light subspace, brightness by the logarithm of Gamma over uniform. PREFIX-q.png: a bar per light subspace, height by the
+/// logarithm of Q; cells of emitters in another colour.
 Status draw(const TableFile& file, const Scene& scene, const std::string& prefix);
 
 }  // namespace lightloom::client

@@ -34,7 +34,7 @@ std::string line_of(const JobInfo& job, int percent) {
 
 /// "tracing training paths 65536/200000  ETA 12 s"
 std::string phase_line(const JobInfo& job) {
-    std::string line(to_string(job.phase));
+    std::string line = phase_text(job);
     if (job.phase == PreparePhase::kTracing) {
         line += ' ';
         line += std::to_string(job.phase_done) + "/" + std::to_string(job.phase_total);
@@ -116,7 +116,8 @@ void Progress::show(const JobInfo& job) {
         std::fprintf(stderr, "\r\033[K[%s] %s", bar.c_str(), text.c_str());
         std::fflush(stderr);
         open_ = true;
-    } else if (job.state == JobState::kPreparing && (new_phase || (job.phase == PreparePhase::kTracing && waited >= kPlainInterval))) {
+    } else if (job.state == JobState::kPreparing &&
+               (new_phase || (job.phase == PreparePhase::kTracing && waited >= kPlainInterval))) {
         last_ = now;
         std::fprintf(stderr, "%s\n", phase_line(job).c_str());
     } else if (new_state && job.state == JobState::kRunning && job.tables.asset.size_bytes > 0) {

@@ -86,7 +86,8 @@ Result<ImageFiles> as_half(const ImageFiles& files, const std::string& name) {
     auto exr = encode_exr(*image, ExrPixelType::kHalf);
     if (!exr.ok()) return exr.status();
     Json json = Json::parse(files.manifest, nullptr, false);
-    if (json.is_discarded() || !json["image"].is_object()) return data_loss("the manifest that arrived is damaged; fetch it again");
+    if (json.is_discarded() || !json["image"].is_object())
+        return data_loss("the manifest that arrived is damaged; fetch it again");
     const Digest digest = sha256(*exr);
     json["image"]["sha256"] = digest.hex();
     json["image"]["size_bytes"] = exr->size();

@@ -52,7 +52,11 @@ Status no_job(const std::string& id) {
 Coordinator::Coordinator(CoordinatorOptions options)
     : options_(std::move(options)), assets_(options_.directory / "assets"),
       table_cache_(options_.table_cache, options_.table_cache_bytes),
-      ticker_([this](std::stop_token stop) { tick(stop); }) {}
+      ticker_([this](std::stop_token stop) { tick(stop); }) {
+    // Jobs do not outlive the coordinator, so nobody names the tables that it finds.
+    if (const size_t count = assets_.remove_all_that_begin_with(kTablesPrefix); count > 0)
+        spdlog::info("removed the tables of {} earlier job(s)", count);
+}
 
 Coordinator::~Coordinator() {
     {
@@ -142,7 +146,8 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     if (auto answer = repeated()) return *answer;
     const auto unended = std::count_if(jobs_.begin(), jobs_.end(), [](const auto& j) { return !is_terminal(j->state); });
     if (size_t(unended) >= options_.max_jobs)
-        return Status(StatusCode::kResourceExhausted, "the coordinator holds as many jobs as it may; submit again when some ended");
+        return Status(StatusCode::kResourceExhausted,
+                      "the coordinator holds as many jobs as it may; submit again when some ended");
     auto record = std::make_shared<JobRecord>();
     JobRecord& job = *record;
     job.id = new_id("job");
@@ -156,7 +161,9 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     requests_[request_id] = &job;
     spdlog::info("{}: accepted, {} {}", job.id, spec.algorithm, job.spec.scene_root.hex().substr(0, 12));
     ++job.running_tasks;
-    job.prepare_task = std::jthread([this, &job](std::stop_token stop) { prepare(job, stop); });
+    job.prepare_task = std::jthread([this, &job](std::stop_token stop) {
+        run_task(job, "to prepare this job: its scene or frame is too large", [&] { return prepare(job, stop); });
+    });
     return snapshot(job);
 }
 
@@ -273,12 +280,14 @@ JobInfo Coordinator::snapshot(const JobRecord& job) const {
     info.duplicates_different = job.duplicates_different;
     info.tables = job.tables;
     info.phase = job.phase;
+    if (job.maker) info.waits_for = job.maker->id;
     if (job.training) {
         info.unit_leased = job.training->leased_count();
         info.phase_total = job.training_samples;
         info.phase_done = std::min(info.phase_total, job.training->done_count() * kTrainingUnitSamples);
         if (job.phase == PreparePhase::kTracing && info.phase_done > 0)
-            info.eta_seconds = seconds_between(job.training_begin, now) * double(info.phase_total - info.phase_done) / double(info.phase_done);
+            info.eta_seconds = seconds_between(job.training_begin, now) * double(info.phase_total - info.phase_done) /
+                               double(info.phase_done);
     }
     return info;
 }
@@ -293,6 +302,9 @@ void Coordinator::end_job(JobRecord& job, JobState state) {
         job.units.reset();
     }
     discard_training(job);
+    if (job.maker) discarded_.push_back(std::move(job.maker));
+    job.maker.reset();
+    drop_tables(job);
     if (job.reducer) discarded_.push_back(std::move(job.reducer));
     discarded_.push_back(std::make_shared<std::vector<ImageLayer>>(std::move(job.layers)));
     job.reducer.reset();
@@ -307,13 +319,34 @@ void Coordinator::fail_job(JobRecord& job, const Status& why) {
 }
 
 void Coordinator::unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Failures failures, const Status& why) {
-    const std::string unit = key.kind == UnitKind::kRender ? std::to_string(key.group) + "/" + std::to_string(key.tile)
-                                                           : "of training " + std::to_string(key.group);
+    const std::string unit = unit_name(key);
     spdlog::warn("{}: unit {} failed ({}): {}", job.id, unit, failures.total, why.message());
     // Units are pure functions: what is wrong with the request is wrong on every worker.
     if (failures.workers >= kMaxFailedWorkers || failures.total >= kMaxUnitFailures || why.code() == StatusCode::kInvalidArgument)
         fail_job(job, {why.code(), "unit " + unit + ": " + why.message()});
     work_changed_.notify_all();
+}
+
+void Coordinator::leases_expired(JobRecord& job, UnitTable& units, const std::vector<UnitTable::Expired>& expired) {
+    job.expired_leases += expired.size();
+    spdlog::warn("{}: {} lease(s) ran out; the units go to other workers", job.id, expired.size());
+    work_changed_.notify_all();
+    for (const UnitTable::Expired& lease : expired) {
+        // A worker that is heard of has lost a lease on the way, not its life. Of those that a silent one held, the oldest was in
+        // work and bears the blame; the others waited behind it.
+        WorkerRecord& worker = *workers_[lease.worker];
+        if (worker.left || worker.blamed == worker.last_heard ||
+            seconds_between(worker.last_heard, options_.clock()) < 0.5 * options_.lease_seconds)
+            continue;
+        worker.blamed = worker.last_heard;
+        const std::set<uint32_t> lost = units.lose(lease.unit, lease.worker);
+        if (lost.size() < kMaxLostWorkers) continue;
+        std::string names;
+        for (const uint32_t index : lost) names += (names.empty() ? "" : ", ") + workers_[index]->id;
+        return fail_job(job, {StatusCode::kAborted, "unit " + unit_name(lease.unit) + ": " + std::to_string(lost.size()) +
+                                                        " workers fell silent over it (" + names +
+                                                        "); it may crash them or exhaust their memory, see their logs"});
+    }
 }
 
 void Coordinator::forget_old_jobs() {
@@ -337,13 +370,12 @@ void Coordinator::tick(std::stop_token stop) {
         work_changed_.wait_for(lock, kTick);
         const TimePoint now = options_.clock();
         for (const auto& job : jobs_) {
+            if (job->maker) resume_waiting(job);
             UnitTable* const units = open_table(*job);
             if (!units) continue;
-            const size_t expired = units->expire(now);
-            if (expired > 0) {
-                job->expired_leases += expired;
-                spdlog::warn("{}: {} lease(s) ran out; the units go to other workers", job->id, expired);
-                work_changed_.notify_all();
+            if (const auto expired = units->expire(now); !expired.empty()) {
+                leases_expired(*job, *units, expired);
+                if (is_terminal(job->state)) continue;
             }
             const double limit = job->spec.time_limit_seconds;
             if (limit > 0 && job->rendering && !job->closed && seconds_between(job->first_render, now) >= limit) {

@@ -1,7 +1,7 @@
 #pragma once
-// Coordinator: accepts jobs, leases their units to workers, merges what comes back exactly once, and writes the image. Before that
-// it has workers trace the training set of algorithms that need tables, and learns these. It knows neither gRPC nor light
-// transport; time comes from an injected clock. Safe for any number of threads.
+// Coordinator: accepts jobs, leases their units to workers, merges what comes back exactly once, and writes the image.
+// Before that it has workers trace the training set of algorithms that need tables, and learns these. It knows neither
+// gRPC nor light transport; time comes from an injected clock. Safe for any number of threads.
 
 #include <condition_variable>
 #include <filesystem>
@@ -115,11 +115,16 @@ class Coordinator {
     Status check_assets(const JobSpec& spec) const;
     void fail_job(JobRecord& job, const Status& why);
     void end_job(JobRecord& job, JobState state);
-    void prepare(JobRecord& job, std::stop_token stop);
+    /// The body of a job's thread: its error, or too little memory for it, fails the job and nothing else. `purpose`
+    /// completes "the coordinator has too little memory ...".
+    void run_task(JobRecord& job, const char* purpose, const std::function<Status()>& task);
+    Status prepare(JobRecord& job, std::stop_token stop);
     void plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables);
-    void prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts);
+    Status prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait);
+    std::shared_ptr<JobRecord> find_maker(const JobRecord& job) const;
+    void resume_waiting(const std::shared_ptr<JobRecord>& job);
+    Status take_over_tables(JobRecord& job);
     void open_training(JobRecord& job, UnitKind kind, uint64_t samples);
-    void make_tables(JobRecord& job, std::stop_token stop);
     Status learn(JobRecord& job, std::stop_token stop);
     Result<TrainingData> collect_training(JobRecord& job, size_t emitter_count, std::stop_token stop);
     Status choose_training_samples(JobRecord& job, const TrainingData& probe, const Scene& scene, std::stop_token stop);
@@ -127,16 +132,21 @@ class Coordinator {
     Status adopt_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts, std::string_view bytes, TablesInfo tables);
     bool repair_tables(const std::string& job_id);
     void discard_training(JobRecord& job);
+    /// Removes the asset of an ended job's tables unless another job needs it.
+    void drop_tables(const JobRecord& job);
     /// The open units of a kind, or null.
     static UnitTable* table_for(JobRecord& job, UnitKind kind);
     /// The units that can be leased now, or null.
     static UnitTable* open_table(JobRecord& job);
     void size_window(JobRecord& job) const;
-    void finish(JobRecord& job);
-    void write_results(JobRecord& job);
+    Status write_results(JobRecord& job);
     void forget_old_jobs();
     void finish_if_complete(JobRecord& job);
+    /// Enters a result into its table: nothing for the first one, which the caller merges; otherwise the answer.
+    std::optional<SubmitAck> repeated_result(JobRecord& job, UnitTable& units, const UnitKey& key, const WorkerRecord& worker,
+                                             const Digest& digest);
     void unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Failures failures, const Status& why);
+    void leases_expired(JobRecord& job, UnitTable& units, const std::vector<UnitTable::Expired>& expired);
     void tick(std::stop_token stop);
     std::optional<UnitLease> next_unit(WorkerRecord& worker);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <ctime>
 #include <new>
+#include <stdexcept>
 
 #include "common/film/atomic_file.h"
 #include "common/transport/catalog.h"
@@ -27,36 +28,42 @@ std::string utc(std::time_t time) {
 
 }  // namespace
 
-void Coordinator::prepare(JobRecord& job, std::stop_token stop) {
+void Coordinator::run_task(JobRecord& job, const char* purpose, const std::function<Status()>& task) {
+    const auto no_memory = [&] {
+        return Status(StatusCode::kResourceExhausted, std::string("the coordinator has too little memory ") + purpose);
+    };
+    Status status;
+    try {
+        status = task();
+    } catch (const std::bad_alloc&) {  // one job too large must not end the coordinator and all others
+        status = no_memory();
+    } catch (const std::length_error&) {
+        status = no_memory();
+    }
+    const std::lock_guard lock(mutex_);
+    if (!status.ok() && !closing_) fail_job(job, status);
+    --job.running_tasks;
+}
+
+Status Coordinator::prepare(JobRecord& job, std::stop_token stop) {
     JobSpec spec;
     {
         const std::lock_guard lock(mutex_);
         spec = job.spec;
     }
     auto facts = options_.read_scene(assets_, spec, stop);
-    Status problem = facts.status();
-    if (facts.ok()) {
-        const Rect& crop = facts->frame.crop;
-        if (crop.empty() || crop.area() > kMaxPartialPixels)
-            problem = invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) + " pixels");
-    }
-    if (problem.ok()) {
-        const auto algorithm = find_algorithm(spec.algorithm);
-        const auto parameters = parse_parameters(**algorithm, spec.parameters);
-        spec.frame = facts->frame;
-        spec.parameters = complete_parameters(**algorithm, *parameters);
-        if (spec.max_depth < 0) spec.max_depth = facts->max_depth;
-        if ((*algorithm)->needs_tables) {
-            prepare_tables(job, std::move(spec), *std::move(facts));
-        } else {
-            plan_units(job, std::move(spec), *std::move(facts), {});
-        }
-    } else {
-        const std::lock_guard lock(mutex_);
-        fail_job(job, problem);
-    }
-    const std::lock_guard lock(mutex_);
-    --job.running_tasks;
+    if (!facts.ok()) return facts.status();
+    const Rect& crop = facts->frame.crop;
+    if (crop.empty() || crop.area() > kMaxPartialPixels)
+        return invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) + " pixels");
+    const auto algorithm = find_algorithm(spec.algorithm);
+    const auto parameters = parse_parameters(**algorithm, spec.parameters);
+    spec.frame = facts->frame;
+    spec.parameters = complete_parameters(**algorithm, *parameters);
+    if (spec.max_depth < 0) spec.max_depth = facts->max_depth;
+    if ((*algorithm)->needs_tables) return prepare_tables(job, std::move(spec), *std::move(facts), true);
+    plan_units(job, std::move(spec), *std::move(facts), {});
+    return {};
 }
 
 void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables) {
@@ -69,17 +76,10 @@ void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, Tab
     // Gigabytes for a large frame: made before anybody has to wait for the mutex.
     std::optional<UnitTable> units;
     units.emplace(plan, spec.samples_per_pixel, 1, options_.shuffle_seed);
-    std::shared_ptr<Reducer> reducer;
-    Status problem;
-    try {
-        reducer = std::make_shared<Reducer>(frame, plan.tile_count());
-    } catch (const std::bad_alloc&) {  // one job too large must not end the coordinator and all others
-        problem = {StatusCode::kResourceExhausted, "the coordinator has no memory for the sums of a frame this large"};
-    }
+    auto reducer = std::make_shared<Reducer>(frame, plan.tile_count());
 
     const std::lock_guard lock(mutex_);
     if (job.state != JobState::kPreparing) return;
-    if (!problem.ok()) return fail_job(job, problem);
     job.prepared = options_.clock();
     job.spec = std::move(spec);
     job.exposure_scale = facts.exposure_scale;
@@ -120,23 +120,19 @@ void Coordinator::finish_if_complete(JobRecord& job) {
     job.units->close();
     changed(job);
     ++job.running_tasks;
-    job.finish_task = std::jthread([this, &job] { finish(job); });
+    job.finish_task = std::jthread([this, &job] {
+        run_task(job, "to write the image of this job", [&] { return write_results(job); });
+    });
 }
 
-void Coordinator::finish(JobRecord& job) {
-    write_results(job);
-    const std::lock_guard lock(mutex_);
-    --job.running_tasks;
-}
-
-void Coordinator::write_results(JobRecord& job) {
+Status Coordinator::write_results(JobRecord& job) {
     std::shared_ptr<Reducer> reducer;
     JobSpec spec;
     float scale = 1;
     std::vector<ImageLayer> layers;
     {
         const std::lock_guard lock(mutex_);
-        if (job.state != JobState::kFinishing) return;
+        if (job.state != JobState::kFinishing) return {};
         reducer = job.reducer;
         layers = std::move(job.layers);
         spec = job.spec;
@@ -144,16 +140,13 @@ void Coordinator::write_results(JobRecord& job) {
     }
     reducer->freeze();
     const auto image = encode_image(spec, *reducer, scale, std::move(layers));
-    if (!image.ok()) {
-        const std::lock_guard lock(mutex_);
-        return fail_job(job, image.status());
-    }
+    if (!image.ok()) return image.status();
     const Digest digest = sha256(*image);
 
     Manifest manifest;
     {
         const std::lock_guard lock(mutex_);
-        if (job.state != JobState::kFinishing) return;  // cancelled meanwhile
+        if (job.state != JobState::kFinishing) return {};  // cancelled meanwhile
         job.image_digest = digest;
         job.image_size = image->size();
         job.merged_groups = reducer->folded_groups();
@@ -185,11 +178,11 @@ void Coordinator::write_results(JobRecord& job) {
     std::filesystem::create_directories(job.directory, error);
     Status status = write_file_atomically((job.directory / "image.exr").string(), *image);
     if (status.ok()) status = write_file_atomically((job.directory / "manifest.json").string(), to_json(manifest));
+    LL_RETURN_IF_ERROR(status);
 
     const std::lock_guard lock(mutex_);
-    if (job.state != JobState::kFinishing) return;
-    if (!status.ok()) return fail_job(job, status);
-    end_job(job, JobState::kSucceeded);
+    if (job.state == JobState::kFinishing) end_job(job, JobState::kSucceeded);
+    return {};
 }
 
 }  // namespace lightloom

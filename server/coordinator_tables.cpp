@@ -43,7 +43,8 @@ uint64_t training_samples(const JobSpec& spec) {
 /// Above any data that the unit can have: a few paths per sample, each of the greatest length, and a sum per block of the frame.
 uint64_t largest_training_payload(const JobSpec& spec, const TrainingWork& work) {
     const FrameLayout& frame = spec.frame;
-    const uint64_t blocks = std::min(uint64_t(frame.crop.area()), work.total_samples + uint64_t(frame.crop.width() + frame.crop.height() + 1));
+    const uint64_t most_blocks = work.total_samples + uint64_t(frame.crop.width() + frame.crop.height() + 1);
+    const uint64_t blocks = std::min(uint64_t(frame.crop.area()), most_blocks);
     const uint64_t path = sizeof(TrainingPath) + uint64_t(spec.max_depth + 3) * sizeof(TrainingVertex);
     return 256 + blocks * sizeof(double) + work.sample_count * 4 * path;
 }
@@ -62,7 +63,7 @@ UnitTable* Coordinator::table_for(JobRecord& job, UnitKind kind) {
 }
 
 void Coordinator::discard_training(JobRecord& job) {
-    discarded_.push_back(std::make_shared<std::vector<std::optional<TrainingData>>>(std::move(job.training_parts)));
+    discarded_.push_back(std::make_shared<std::vector<JobRecord::TrainingPart>>(std::move(job.training_parts)));
     discarded_.push_back(std::make_shared<SceneFacts>(std::move(job.facts)));
     job.training_parts.clear();
     job.facts = {};
@@ -83,17 +84,71 @@ void Coordinator::open_training(JobRecord& job, UnitKind kind, uint64_t samples)
     work_changed_.notify_all();
 }
 
-void Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts) {
-    if (adopt_cached_tables(job, spec, facts)) return;
+Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait) {
+    if (adopt_cached_tables(job, spec, facts)) return {};
     const std::lock_guard lock(mutex_);
-    if (job.state != JobState::kPreparing) return;
+    if (job.state != JobState::kPreparing) return {};
     // Who chose the training set knows what it costs.
     const bool open_size = spec.time_limit_seconds > 0 && !job.submitted.parameters.contains(kTrainingPaths);
     const uint64_t samples = training_samples(spec);
+    job.table_key = table_key(options_.identity, spec);
     job.spec = std::move(spec);
     job.facts = std::move(facts);
-    if (open_size && samples > kMinTrainingSamples) return open_training(job, UnitKind::kProbe, std::min(kProbeSamples, samples));
-    open_training(job, UnitKind::kTraining, samples);
+    if (may_wait && (job.maker = find_maker(job))) {
+        job.phase = PreparePhase::kWaitingForTables;
+        spdlog::info("{}: waits for the tables of {}", job.id, job.maker->id);
+        changed(job);
+        return {};
+    }
+    job.makes_tables = true;
+    const bool probe = open_size && samples > kMinTrainingSamples;
+    open_training(job, probe ? UnitKind::kProbe : UnitKind::kTraining, probe ? std::min(kProbeSamples, samples) : samples);
+    return {};
+}
+
+std::shared_ptr<Coordinator::JobRecord> Coordinator::find_maker(const JobRecord& job) const {
+    for (const auto& other : jobs_) {
+        const bool makes = other->makes_tables && !is_terminal(other->state);
+        if (other.get() != &job && makes && other->table_key == job.table_key) return other;
+    }
+    return nullptr;
+}
+
+void Coordinator::resume_waiting(const std::shared_ptr<JobRecord>& job) {
+    // A time-limited maker may settle for a smaller training set, which makes other tables.
+    const JobRecord& maker = *job->maker;
+    const bool making = maker.state == JobState::kPreparing && maker.table_key == job->table_key;
+    if (making || closing_ || job->running_tasks > 0) return;
+    ++job->running_tasks;
+    JobRecord& record = *job;
+    job->prepare_task = std::jthread([this, &record] {
+        run_task(record, "to prepare this job: its frame or tables are too large", [&] { return take_over_tables(record); });
+    });
+}
+
+Status Coordinator::take_over_tables(JobRecord& job) {
+    JobSpec spec;
+    SceneFacts facts;
+    TablesInfo tables;
+    {
+        const std::lock_guard lock(mutex_);
+        if (job.state != JobState::kPreparing) return {};
+        const std::shared_ptr<JobRecord> maker = std::move(job.maker);
+        if (maker->tables.cache_key == job.table_key) {
+            tables = maker->tables;
+            job.tables_asset = maker->tables_asset;
+        }
+        spec = job.spec;
+        facts = std::move(job.facts);
+        job.phase = PreparePhase::kReadingScene;
+        changed(job);
+    }
+    if (tables.asset.size_bytes == 0) return prepare_tables(job, std::move(spec), std::move(facts), true);
+    const auto bytes = assets_.read(tables.asset.digest);
+    if (!bytes.ok()) return prepare_tables(job, std::move(spec), std::move(facts), false);
+    tables.from_cache = true;
+    tables.capped_by_time_limit = false;
+    return adopt_tables(job, spec, facts, *bytes, std::move(tables));
 }
 
 bool Coordinator::adopt_cached_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts) {
@@ -113,6 +168,11 @@ Status Coordinator::adopt_tables(JobRecord& job, const JobSpec& spec, const Scen
                                  TablesInfo tables) {
     const Digest digest = sha256(bytes);
     tables.asset = {digest, bytes.size()};
+    {
+        const std::lock_guard lock(mutex_);
+        if (is_terminal(job.state)) return {};
+        job.tables_asset = digest;  // before the bytes are there, so that no job that ends takes them away
+    }
     if (assets_.contains(digest) && !assets_.read(digest).ok()) assets_.remove(digest);
     Status stored = assets_.put(digest, bytes);
     // An equal job stores the same bytes at this moment.
@@ -122,14 +182,19 @@ Status Coordinator::adopt_tables(JobRecord& job, const JobSpec& spec, const Scen
     }
     LL_RETURN_IF_ERROR(stored);
     plan_units(job, spec, facts, std::move(tables));
+    const std::lock_guard lock(mutex_);
+    if (is_terminal(job.state)) drop_tables(job);  // it ended while they were stored
     return {};
 }
 
-void Coordinator::make_tables(JobRecord& job, std::stop_token stop) {
-    const Status status = learn(job, stop);
-    const std::lock_guard lock(mutex_);
-    if (!status.ok() && !closing_) fail_job(job, status);
-    --job.running_tasks;
+void Coordinator::drop_tables(const JobRecord& job) {
+    const Digest& digest = job.tables_asset;
+    if (digest == Digest()) return;
+    for (const auto& other : jobs_) {
+        const bool waits = other->maker && other->maker->tables_asset == digest;
+        if (waits || (!is_terminal(other->state) && other->tables_asset == digest)) return;
+    }
+    assets_.remove(digest);
 }
 
 Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
@@ -143,6 +208,11 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
     const auto scene = build_scene();
     if (!scene.ok()) return scene.status();
     const EmitterSet& emitters = (*scene)->emitters();
+    build_scene = {};  // it may hold what the scene was built from
+    {
+        const std::lock_guard lock(mutex_);
+        job.facts.build_scene = {};
+    }
 
     bool probe = true;
     while (probe) {
@@ -190,7 +260,8 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
         table_cache_.store(info.cache_key, bytes, info);
         spdlog::info("{}: tables of {} x {} subspaces from {} samples; {:.2f} s traced, {:.2f} s learned{}{}", job.id,
                      info.light_subspaces, info.eye_subspaces, info.training_samples, info.trace_seconds,
-                     info.classifier_seconds + info.energy_seconds + info.gamma_seconds, info.note.empty() ? "" : "; ", info.note);
+                     info.classifier_seconds + info.energy_seconds + info.gamma_seconds,
+                     info.note.empty() ? "" : "; ", info.note);
         LL_RETURN_IF_ERROR(adopt_tables(job, spec, facts, bytes, std::move(info)));
     }
     return {};
@@ -210,19 +281,22 @@ Result<TrainingData> Coordinator::collect_training(JobRecord& job, size_t emitte
         // Digest and size were right; a worker whose data are nonsense all the same loses its unit.
         std::vector<std::pair<uint32_t, Status>> bad;
         for (uint32_t i = 0; i < parts.size(); ++i)
-            if (Status s = parts[i]->validate(emitter_count); !s.ok()) bad.emplace_back(i, std::move(s));
+            if (Status s = parts[i].data->validate(emitter_count); !s.ok()) bad.emplace_back(i, std::move(s));
         if (bad.empty()) {
             TrainingData all;
             for (auto& part : parts) {
-                if (const Status s = all.append(*part); !s.ok()) return s;
-                part.reset();
+                if (stop.stop_requested()) return over();
+                if (const Status s = all.append(*part.data); !s.ok()) return s;
+                part.data.reset();
             }
             return all;
         }
         lock.lock();
         for (const auto& [unit, why] : bad) {
             if (!alive()) return over();
-            parts[unit].reset();
+            job.training_bytes -= parts[unit].bytes;
+            job.traced_seconds -= parts[unit].seconds;
+            parts[unit] = {};
             ++job.rejected;
             const UnitKey key{unit, 0, kind};
             unit_failed(job, key, job.training->reopen(key), why);
@@ -243,7 +317,8 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
         spec = job.spec;
         facts = job.facts;
         traced = job.traced_seconds;
-        for (const auto& w : workers_) crew += !w->left && seconds_between(w->last_heard, options_.clock()) <= options_.lease_seconds;
+        const TimePoint now = options_.clock();
+        for (const auto& w : workers_) crew += !w->left && seconds_between(w->last_heard, now) <= options_.lease_seconds;
     }
     const auto parameters = TransportParameters::read(render_settings(spec));
     if (!parameters.ok()) return parameters.status();
@@ -254,13 +329,15 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
     const double learned = seconds_since(begin), samples = double(std::max<uint64_t>(1, probe.samples));
     const double budget = kTrainingShare * spec.time_limit_seconds - traced - learned;
     const uint64_t wanted = training_samples(spec);
-    const uint64_t chosen = affordable_training_samples({traced / samples / double(std::max<size_t>(1, crew)), learned / samples}, budget, wanted);
+    const TrainingRate rate{traced / samples / double(std::max<size_t>(1, crew)), learned / samples};
+    const uint64_t chosen = affordable_training_samples(rate, budget, wanted);
     spec = with_training_samples(spec, chosen);
     spdlog::info("{}: the time limit has room for {} of {} training samples", job.id, chosen, wanted);
     {
         const std::lock_guard lock(mutex_);
         if (job.state != JobState::kPreparing) return over();
         job.capped_by_time_limit = chosen < wanted;
+        job.table_key = table_key(options_.identity, spec);
     }
     if (chosen < wanted && adopt_cached_tables(job, spec, facts)) return {};
     const std::lock_guard lock(mutex_);
@@ -317,29 +394,17 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
         unit_failed(*job, reference.key, units->fail(reference.key, worker->index), problem);
         return SubmitAck{SubmitOutcome::kRejected, problem.message()};
     }
-    switch (units->complete(reference.key, worker->index, digest)) {
-        case UnitTable::Completion::kUnknown: return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};
-        case UnitTable::Completion::kDuplicateSame:
-            ++job->duplicates_same;
-            changed(*job);
-            return SubmitAck{SubmitOutcome::kDuplicateSame, {}};
-        case UnitTable::Completion::kDuplicateDifferent:
-            ++job->duplicates_different;
-            changed(*job);
-            spdlog::error("{}: training unit {} from {} differs from the data taken in before; one of two workers computes wrongly: "
-                          "compare their hosts and builds", job->id, reference.key.group, worker_id);
-            return SubmitAck{SubmitOutcome::kDuplicateDifferent, "the unit was taken in before with other bytes"};
-        case UnitTable::Completion::kFirst: break;
-    }
+    if (auto answer = repeated_result(*job, *units, reference.key, *worker, digest)) return *std::move(answer);
     job->training_bytes += payload.size();
     // Units differ little in size: a set that is far too large shows before hours were spent on it.
     const double projected = double(job->training_bytes) * units->group_total() / double(units->done_count());
     if (job->training_bytes > options_.training_bytes || projected > 1.25 * double(options_.training_bytes)) {
-        fail_job(*job, {StatusCode::kResourceExhausted, "the training data need more than the " + std::to_string(options_.training_bytes >> 20) +
-                                                            " MiB that a job may have; choose fewer training-paths"});
+        fail_job(*job, {StatusCode::kResourceExhausted,
+                        "the training data need more than the " + std::to_string(options_.training_bytes >> 20) +
+                            " MiB that a job may have; choose fewer training-paths"});
         return SubmitAck{SubmitOutcome::kRejected, job->message};
     }
-    job->training_parts[reference.key.group] = *std::move(data);
+    job->training_parts[reference.key.group] = {*std::move(data), payload.size(), trace_seconds};
     job->traced_seconds += trace_seconds;
     changed(*job);
     work_changed_.notify_all();

@@ -66,7 +66,10 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
             job->training_begin = options_.clock();
             ++job->running_tasks;
             JobRecord& record = *job;
-            job->train_task = std::jthread([this, &record](std::stop_token stop) { make_tables(record, stop); });
+            job->train_task = std::jthread([this, &record](std::stop_token stop) {
+                run_task(record, "to learn the tables of this job; choose fewer training-paths or subspaces",
+                         [&] { return learn(record, stop); });
+            });
         }
         return UnitLease{job->id, job->spec, *unit, {}};
     }
@@ -192,6 +195,25 @@ Result<SubmitAck> Coordinator::submit_payload(const std::string& worker_id, cons
     return SubmitAck{SubmitOutcome::kRejected, partial.status().message()};
 }
 
+std::optional<SubmitAck> Coordinator::repeated_result(JobRecord& job, UnitTable& units, const UnitKey& key,
+                                                      const WorkerRecord& worker, const Digest& digest) {
+    switch (units.complete(key, worker.index, digest)) {
+        case UnitTable::Completion::kUnknown: return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};
+        case UnitTable::Completion::kDuplicateSame:
+            ++job.duplicates_same;
+            changed(job);
+            return SubmitAck{SubmitOutcome::kDuplicateSame, {}};
+        case UnitTable::Completion::kDuplicateDifferent:
+            ++job.duplicates_different;
+            changed(job);
+            spdlog::error("{}: unit {} from {} differs from the bytes taken in before; one of two workers computes wrongly: "
+                          "compare their hosts and builds", job.id, unit_name(key), worker.id);
+            return SubmitAck{SubmitOutcome::kDuplicateDifferent, "the unit was taken in before with other bytes"};
+        case UnitTable::Completion::kFirst: break;
+    }
+    return std::nullopt;
+}
+
 Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, const UnitReference& reference,
                                               const Digest& digest, Partial partial) {
     std::shared_ptr<Reducer> reducer;
@@ -209,22 +231,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
             return SubmitAck{SubmitOutcome::kStale, "job " + reference.job_id + " is not running (any more)"};
         index = worker->index;
         const auto known = job->units->find(reference.key);
-        switch (job->units->complete(reference.key, index, digest)) {
-            case UnitTable::Completion::kUnknown:
-                return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};
-            case UnitTable::Completion::kDuplicateSame:
-                ++job->duplicates_same;
-                changed(*job);
-                return SubmitAck{SubmitOutcome::kDuplicateSame, {}};
-            case UnitTable::Completion::kDuplicateDifferent:
-                ++job->duplicates_different;
-                changed(*job);
-                spdlog::error("{}: unit {}/{} from {} differs from the bytes merged before; one of two workers computes "
-                              "wrongly: compare their hosts and builds", job->id, reference.key.group,
-                              reference.key.tile, worker_id);
-                return SubmitAck{SubmitOutcome::kDuplicateDifferent, "the unit was merged before with other bytes"};
-            case UnitTable::Completion::kFirst: break;
-        }
+        if (auto answer = repeated_result(*job, *job->units, reference.key, *worker, digest)) return *std::move(answer);
         unit = *known;
         reducer = job->reducer;
     }

@@ -13,6 +13,7 @@ struct Coordinator::WorkerRecord {
     uint32_t index = 0;  ///< In workers_.
     WorkerHello hello;
     TimePoint last_heard;
+    std::optional<TimePoint> blamed;  ///< The last_heard for which a unit bears the blame already.
     bool left = false;
     uint32_t waiting = 0;  ///< lease_units calls that wait now.
     uint64_t merged = 0;
@@ -58,16 +59,31 @@ struct Coordinator::JobRecord {
     std::optional<UnitTable> training;  ///< Units of kind `training_kind`, in kPreparing.
     UnitKind training_kind = UnitKind::kTraining;
     uint64_t training_samples = 0;
-    std::vector<std::optional<TrainingData>> training_parts;  ///< By unit.
+    struct TrainingPart {
+        std::optional<TrainingData> data;
+        uint64_t bytes = 0;   ///< As it came.
+        double seconds = 0;   ///< That the worker took.
+    };
+    std::vector<TrainingPart> training_parts;  ///< By unit.
     uint64_t training_bytes = 0;        ///< Of these.
     double traced_seconds = 0;          ///< Of the workers, over these.
     bool capped_by_time_limit = false;
+    Digest table_key;                   ///< Of the tables that the job needs; set before `makes_tables` or `maker`.
+    bool makes_tables = false;          ///< It probes, traces and learns itself.
+    std::shared_ptr<JobRecord> maker;   ///< Makes the same tables; this job waits for them.
     TimePoint training_begin;           ///< The first training unit was leased; unset before.
     TablesInfo tables;
+    Digest tables_asset;                ///< Of the tables that the job names, or is about to; zero before.
 
     std::jthread prepare_task, train_task, finish_task;
     int running_tasks = 0;  ///< Of these. A job is forgotten only without any, so that nobody waits for one under the mutex.
 };
+
+/// Behind the word "unit", for people.
+inline std::string unit_name(const UnitKey& key) {
+    return key.kind == UnitKind::kRender ? std::to_string(key.group) + "/" + std::to_string(key.tile)
+                                         : "of training " + std::to_string(key.group);
+}
 
 inline Status no_worker(const std::string& id) { return not_found("unknown worker " + id + "; register again"); }
 
@@ -76,5 +92,8 @@ inline constexpr size_t kMaxDroppedPerJob = 64;
 inline constexpr int kMaxFailedWorkers = 3;
 /// The same for a unit that failed this often where there are fewer workers.
 inline constexpr int kMaxUnitFailures = 10;
+/// A unit over which this many workers went silent fails its job: it seems to crash them. More than for failures, because hosts
+/// also go down for reasons of their own.
+inline constexpr size_t kMaxLostWorkers = 5;
 
 }  // namespace lightloom

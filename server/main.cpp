@@ -46,12 +46,15 @@ int main(int argc, char** argv) {
     bool plaintext = false;
     std::optional<uint64_t> shuffle;
     app.add_option("--listen", listen, "HOST:PORT for clients and workers; port 0 picks a free one")->capture_default_str();
-    app.add_option("--data", data, "Directory for scene files and images")->capture_default_str();
+    app.add_option("--data", data,
+                   "Directory for scene files, images, the tables that running jobs read (assets/, removed with the last "
+                   "such job) and the table cache (tables/)")->capture_default_str();
     app.add_option("--status", status, "HOST:PORT of the status page (/healthz, /api/v1/status), or off")->capture_default_str();
     app.add_option("--lease", lease, "Seconds without a heartbeat after which a unit goes to another worker")
         ->check(CLI::Range(0.2, 3600.0))->capture_default_str();
-    app.add_option("--table-cache-size", table_cache_mb, "MB of learned tables that are kept in --data for later jobs; 0 keeps none")
-        ->capture_default_str();
+    app.add_option("--table-cache-size", table_cache_mb,
+                   "MB of the table cache: learned tables that later jobs find again, also after a restart; those used "
+                   "least recently go first; 0 keeps none")->capture_default_str();
     app.add_option("--port-file", port_file, "Write \"GRPC_PORT STATUS_PORT\" here once both listen");
     app.add_flag("--allow-plaintext", plaintext, "Listen on other than loopback addresses");
     app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();

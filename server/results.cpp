@@ -27,6 +27,10 @@ std::string shell_word(const std::string& word) {
 
 }  // namespace
 
+Json settings_json(const JobSpec& spec) {
+    return {{"algorithm", spec.algorithm}, {"parameters", spec.parameters}, {"seed", spec.seed}, {"max_depth", spec.max_depth}};
+}
+
 Json to_json(const TablesInfo& t) {
     return {{"sha256", t.asset.digest.hex()},
             {"size_bytes", t.asset.size_bytes},
@@ -72,18 +76,15 @@ std::string to_json(const Manifest& m) {
                      {"groups", m.groups},
                      {"spec_digest", spec.image_digest().hex()}};
     const Rect& crop = spec.frame.crop;
-    json["spec"] = {{"algorithm", spec.algorithm},
-                    {"parameters", spec.parameters},
-                    {"seed", spec.seed},
-                    {"max_depth", spec.max_depth},
-                    {"requested_samples_per_pixel", spec.samples_per_pixel},
-                    {"time_limit_seconds", spec.time_limit_seconds},
-                    {"scene", m.scene_main},
-                    {"scene_root", spec.scene_root.hex()},
-                    {"frame",
-                     {{"width", spec.frame.width},
-                      {"height", spec.frame.height},
-                      {"crop", {crop.x0, crop.y0, crop.x1, crop.y1}}}}};
+    json["spec"] = settings_json(spec);
+    json["spec"].update(Json{{"requested_samples_per_pixel", spec.samples_per_pixel},
+                             {"time_limit_seconds", spec.time_limit_seconds},
+                             {"scene", m.scene_main},
+                             {"scene_root", spec.scene_root.hex()},
+                             {"frame",
+                              {{"width", spec.frame.width},
+                               {"height", spec.frame.height},
+                               {"crop", {crop.x0, crop.y0, crop.x1, crop.y1}}}}});
     json["build"] = {{"build_id", m.identity.build_id},
                      {"math_profile", m.identity.math_profile},
                      {"golden_digest", m.identity.golden_digest.hex()}};

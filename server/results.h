@@ -39,8 +39,11 @@ struct Manifest {
     uint64_t expired_leases = 0, rejected_results = 0;
 };
 
-/// Command line for a shell that renders one dropped sample again; its unit for a splat, which is known only by where it would have landed.
+/// Command line for a shell that renders one dropped sample again; its unit for a splat, which is known only by where it
+/// would have landed.
 std::string replay_command(const JobSpec& spec, const std::string& scene, const ManifestDropped& dropped);
+/// What light transport was asked for, as manifests and reports of references show it.
+nlohmann::ordered_json settings_json(const JobSpec& spec);
 /// Tables as manifests and statistics show them.
 nlohmann::ordered_json to_json(const TablesInfo& tables);
 /// The manifest as JSON text.

@@ -7,6 +7,25 @@
 #include "common/transport/first_hit.h"
 
 namespace lightloom {
+namespace {
+
+Result<ImportedScene> read_scene(const AssetStore& assets, const Digest& root, const std::filesystem::path& scratch) {
+    const auto text = assets.read(root);
+    if (!text.ok()) return text.status();
+    const auto manifest = AssetManifest::parse(*text);
+    if (!manifest.ok()) return manifest.status();
+    std::string directory = (scratch / "scene-XXXXXX").string();
+    std::error_code error;
+    std::filesystem::create_directories(scratch, error);
+    if (!::mkdtemp(directory.data())) return internal_error(directory + ": cannot be made");
+    const Status status = assets.materialise(*manifest, directory);
+    auto scene = status.ok() ? import_pbrt((std::filesystem::path(directory) / manifest->main).string())
+                             : Result<ImportedScene>(status);
+    std::filesystem::remove_all(directory, error);
+    return scene;
+}
+
+}  // namespace
 
 Result<SceneFacts> scene_facts(const SceneDescription& description, const JobSpec& spec) {
     const auto frame = frame_layout(description.film, {.width = spec.width, .height = spec.height});
@@ -23,26 +42,18 @@ Result<SceneFacts> scene_facts(const SceneDescription& description, const JobSpe
 SceneReader make_scene_reader(std::filesystem::path scratch) {
     return [scratch = std::move(scratch)](const AssetStore& assets, const JobSpec& spec,
                                           std::stop_token) -> Result<SceneFacts> {
-        const auto text = assets.read(spec.scene_root);
-        if (!text.ok()) return text.status();
-        const auto manifest = AssetManifest::parse(*text);
-        if (!manifest.ok()) return manifest.status();
-        std::string directory = (scratch / "scene-XXXXXX").string();
-        std::error_code error;
-        std::filesystem::create_directories(scratch, error);
-        if (!::mkdtemp(directory.data())) return internal_error(directory + ": cannot be made");
-        const Status status = assets.materialise(*manifest, directory);
-        auto scene = status.ok() ? import_pbrt((std::filesystem::path(directory) / manifest->main).string())
-                                 : Result<ImportedScene>(status);
-        std::filesystem::remove_all(directory, error);
+        const auto scene = read_scene(assets, spec.scene_root, scratch);
         if (!scene.ok()) return scene.status();
         auto facts = scene_facts(scene->description, spec);
         if (!facts.ok()) return facts;
         const auto algorithm = find_algorithm(spec.algorithm);
         if (!algorithm.ok() || !(*algorithm)->needs_tables) return facts;
-        const auto description = std::make_shared<SceneDescription>(std::move(scene->description));
-        facts->build_scene = [description, width = spec.width, height = spec.height]() -> Result<std::shared_ptr<const Scene>> {
-            auto built = Scene::build(std::move(*description), {.width = width, .height = height});
+        // Read a second time when it is needed, while workers trace: of the jobs that wait for their turn none holds a scene.
+        facts->build_scene = [&assets, scratch, root = spec.scene_root, width = spec.width,
+                              height = spec.height]() -> Result<std::shared_ptr<const Scene>> {
+            auto again = read_scene(assets, root, scratch);
+            if (!again.ok()) return again.status();
+            auto built = Scene::build(std::move(again->description), {.width = width, .height = height});
             if (!built.ok()) return built.status();
             return std::shared_ptr<const Scene>(std::move(built).value());
         };

@@ -29,7 +29,7 @@ std::string status_json(const Coordinator& coordinator) {
                         {"state", to_string(j.state)},
                         {"message", j.message},
                         {"algorithm", j.spec.algorithm},
-                        {"phase", j.state == JobState::kPreparing ? Json(to_string(j.phase)) : Json(nullptr)},
+                        {"phase", j.state == JobState::kPreparing ? Json(phase_text(j)) : Json(nullptr)},
                         {"phase_done", j.phase_done},
                         {"phase_total", j.phase_total},
                         {"units_done", j.unit_done},
@@ -54,7 +54,8 @@ std::string status_json(const Coordinator& coordinator) {
                            {"lost", w.lost}});
     }
     // Messages may quote bytes that are not UTF-8 (file names, cut texts); the default of dump() is to throw.
-    return Json{{"jobs", std::move(jobs)}, {"workers", std::move(workers)}}.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+    const Json status{{"jobs", std::move(jobs)}, {"workers", std::move(workers)}};
+    return status.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 http::response<http::string_body> respond(const Coordinator& coordinator, const http::request<http::empty_body>& request) {

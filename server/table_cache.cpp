@@ -3,7 +3,10 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <type_traits>
 #include <vector>
 
 #include "common/film/atomic_file.h"
@@ -26,6 +29,9 @@ void put(std::string& out, std::string_view name, std::string_view value) {
     out += '\n';
 }
 
+/// JSON has no other numbers; a null in their place would make the entry a damaged one.
+double finite(double value) { return std::isfinite(value) ? value : 0; }
+
 Json to_json(const TablesInfo& info) {
     return {{"light_subspaces", info.light_subspaces},
             {"eye_subspaces", info.eye_subspaces},
@@ -35,27 +41,43 @@ Json to_json(const TablesInfo& info) {
             {"classifier_seconds", info.classifier_seconds},
             {"energy_seconds", info.energy_seconds},
             {"gamma_seconds", info.gamma_seconds},
-            {"uniform_loss", info.uniform_loss},
-            {"loss", info.loss},
+            {"uniform_loss", finite(info.uniform_loss)},
+            {"loss", finite(info.loss)},
             {"prior_strength", info.prior_strength},
             {"note", info.note}};
 }
 
-/// Only of text whose digest was right, so that every field is there.
-TablesInfo info_from(const Json& json) {
+/// False unless the field is there and of the type.
+template <class T>
+bool take(const Json& json, const char* name, T* out) {
+    const auto item = json.find(name);
+    if (item == json.end()) return false;
+    if constexpr (std::is_same_v<T, bool>) {
+        if (!item->is_boolean()) return false;
+    } else if constexpr (std::is_integral_v<T>) {
+        if (!item->is_number_unsigned() || item->template get<uint64_t>() > std::numeric_limits<T>::max()) return false;
+    } else if constexpr (std::is_floating_point_v<T>) {
+        if (!item->is_number()) return false;
+    } else {
+        if (!item->is_string()) return false;
+    }
+    *out = item->template get<T>();
+    return true;
+}
+
+/// A right digest says only that the entry is what somebody wrote.
+Result<TablesInfo> info_from(std::string_view text) {
+    const Json json = Json::parse(text, nullptr, false);
     TablesInfo info;
-    info.light_subspaces = json.value("light_subspaces", 0u);
-    info.eye_subspaces = json.value("eye_subspaces", 0u);
-    info.training_samples = json.value("training_samples", uint64_t(0));
-    info.capped_by_time_limit = json.value("capped_by_time_limit", false);
-    info.trace_seconds = json.value("trace_seconds", 0.0);
-    info.classifier_seconds = json.value("classifier_seconds", 0.0);
-    info.energy_seconds = json.value("energy_seconds", 0.0);
-    info.gamma_seconds = json.value("gamma_seconds", 0.0);
-    info.uniform_loss = json.value("uniform_loss", 0.0);
-    info.loss = json.value("loss", 0.0);
-    info.prior_strength = json.value("prior_strength", 0.0);
-    info.note = json.value("note", std::string());
+    const bool complete =
+        json.is_object() && take(json, "light_subspaces", &info.light_subspaces) &&
+        take(json, "eye_subspaces", &info.eye_subspaces) && take(json, "training_samples", &info.training_samples) &&
+        take(json, "capped_by_time_limit", &info.capped_by_time_limit) &&
+        take(json, "trace_seconds", &info.trace_seconds) && take(json, "classifier_seconds", &info.classifier_seconds) &&
+        take(json, "energy_seconds", &info.energy_seconds) && take(json, "gamma_seconds", &info.gamma_seconds) &&
+        take(json, "uniform_loss", &info.uniform_loss) && take(json, "loss", &info.loss) &&
+        take(json, "prior_strength", &info.prior_strength) && take(json, "note", &info.note);
+    if (!complete) return data_loss("the entry's report is malformed");
     info.from_cache = true;
     return info;
 }
@@ -117,6 +139,8 @@ std::optional<TableCache::Entry> TableCache::find(const Digest& key) const {
     Status status = parts.status();
     if (parts.ok() && parts->key_line != key.hex()) status = data_loss("the entry is that of another job");
     if (status.ok()) status = parse_tables(parts->tables).status();
+    Result<TablesInfo> info = status.ok() ? info_from(parts->info_line) : status;
+    status = info.status();
     std::error_code ignored;
     if (!status.ok()) {
         spdlog::warn("cached tables {} cannot be used and are made again: {}", path.string(), status.message());
@@ -124,7 +148,7 @@ std::optional<TableCache::Entry> TableCache::find(const Digest& key) const {
         return std::nullopt;
     }
     fs::last_write_time(path, fs::file_time_type::clock::now(), ignored);
-    Entry entry{std::string(parts->tables), info_from(Json::parse(parts->info_line, nullptr, false))};
+    Entry entry{std::string(parts->tables), *std::move(info)};
     entry.info.cache_key = key;
     entry.info.asset = {sha256(entry.bytes), entry.bytes.size()};
     return entry;

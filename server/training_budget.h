@@ -18,8 +18,8 @@ struct TrainingRate {
     double learn_seconds_per_sample = 0;  ///< Of the coordinator.
 };
 
-/// The largest power of two whose training fits into `seconds`, between kMinTrainingSamples and `wanted` (which is also what comes of
-/// a budget that has room for it). Powers of two, so that jobs with similar limits can share their tables.
+/// The largest power of two whose training fits into `seconds`, between kMinTrainingSamples and `wanted` (which is also
+/// what comes of a budget that has room for it). Powers of two, so that jobs with similar limits can share their tables.
 uint64_t affordable_training_samples(const TrainingRate& rate, double seconds, uint64_t wanted);
 
 }  // namespace lightloom

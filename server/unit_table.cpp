@@ -89,6 +89,7 @@ std::optional<WorkUnit> UnitTable::lease(uint32_t worker, TimePoint expiry) {
     e.state = State::kLeased;
     e.worker = worker;
     e.expiry = expiry;
+    e.ticket = ++tickets_;
     ++leased_count_;
     return e.unit;
 }
@@ -101,8 +102,10 @@ bool UnitTable::renew(const UnitKey& key, uint32_t worker, TimePoint expiry) {
         leased_.insert(key);
         e->state = State::kLeased;
         e->worker = worker;
+        e->ticket = ++tickets_;
         ++leased_count_;
     }
+    e->lost_with.erase(worker);
     if (e->worker == worker) e->expiry = expiry;
     return true;
 }
@@ -126,13 +129,22 @@ void UnitTable::release_all(uint32_t worker) {
     for (const UnitKey& key : leased) release(key, worker);
 }
 
-size_t UnitTable::expire(TimePoint now) {
-    std::vector<UnitKey> expired;
+std::vector<UnitTable::Expired> UnitTable::expire(TimePoint now) {
+    std::vector<Expired> expired;
     for (const UnitKey& key : leased_) {
-        if (entry(key)->expiry < now) expired.push_back(key);
+        if (const Entry& e = *entry(key); e.expiry < now) expired.push_back({key, e.worker});
     }
-    for (const UnitKey& key : expired) make_pending(*entry(key));
-    return expired.size();
+    std::sort(expired.begin(), expired.end(),
+              [&](const Expired& a, const Expired& b) { return entry(a.unit)->ticket < entry(b.unit)->ticket; });
+    for (const Expired& lease : expired) make_pending(*entry(lease.unit));
+    return expired;
+}
+
+std::set<uint32_t> UnitTable::lose(const UnitKey& key, uint32_t worker) {
+    Entry* e = entry(key);
+    if (!e || e->state == State::kDone) return {};
+    e->lost_with.insert(worker);
+    return e->lost_with;
 }
 
 UnitTable::Completion UnitTable::complete(const UnitKey& key, uint32_t worker, const Digest& digest) {

@@ -33,8 +33,14 @@ class UnitTable {
     /// Gives the unit back if `worker` holds it.
     void release(const UnitKey& key, uint32_t worker);
     void release_all(uint32_t worker);
-    /// Puts units back whose lease ended before `now`; their number.
-    size_t expire(TimePoint now);
+    struct Expired {
+        UnitKey unit;
+        uint32_t worker = 0;
+    };
+    /// Puts units back whose lease ended before `now`: these, the one that was leased first in front.
+    std::vector<Expired> expire(TimePoint now);
+    /// `worker` went silent over the unit. All workers that did, but for those that have renewed it since.
+    std::set<uint32_t> lose(const UnitKey& key, uint32_t worker);
 
     enum class Completion { kFirst, kDuplicateSame, kDuplicateDifferent, kUnknown };
     /// A result arrived. kFirst: the caller merges it and is the only one to be told so, unless it calls reopen().
@@ -80,7 +86,8 @@ class UnitTable {
         State state = State::kPending;
         uint32_t worker = 0;
         int failures = 0;
-        std::set<uint32_t> failed_on;
+        std::set<uint32_t> failed_on, lost_with;
+        uint64_t ticket = 0;  ///< Of the lease: these count up.
         TimePoint expiry;
         Digest digest;
     };
@@ -108,7 +115,7 @@ class UnitTable {
     std::set<UnitKey> pending_, leased_;
     uint64_t unit_total_ = 0;
     uint32_t group_total_ = 0;
-    uint64_t done_count_ = 0, leased_count_ = 0;
+    uint64_t done_count_ = 0, leased_count_ = 0, tickets_ = 0;
     uint32_t merged_groups_ = 0;
     uint32_t group_limit_ = UINT32_MAX;
     bool closed_ = false;

@@ -37,8 +37,8 @@ grpc::Status send(grpc::ClientWriter<Request>& writer, Request& message, std::st
 
 }  // namespace
 
-GrpcWorkerPort::GrpcWorkerPort(const std::shared_ptr<grpc::Channel>& channel)
-    : worker_(v1::WorkerService::NewStub(channel)), assets_(v1::AssetService::NewStub(channel)) {}
+GrpcWorkerPort::GrpcWorkerPort(const std::shared_ptr<grpc::Channel>& channel, double read_seconds)
+    : read_seconds_(read_seconds), worker_(v1::WorkerService::NewStub(channel)), assets_(v1::AssetService::NewStub(channel)) {}
 
 Result<WorkerGrant> GrpcWorkerPort::register_worker(const WorkerHello& hello) {
     grpc::ClientContext context;
@@ -154,26 +154,30 @@ Status GrpcWorkerPort::goodbye(const std::string& worker_id) {
 
 Status GrpcWorkerPort::read_asset(const Digest& digest, uint64_t offset,
                                   const std::function<Status(std::string_view)>& sink) {
-    grpc::ClientContext context;
-    v1::ReadRequest request;
-    wire::put(digest, request.mutable_digest());
-    request.set_offset_bytes(offset);
-    const auto reader = assets_->Read(&context, request);
-    v1::Chunk chunk;
-    while (reader->Read(&chunk)) {
-        if (chunk.offset_bytes() != offset) {
-            context.TryCancel();
-            (void)reader->Finish();
-            return data_loss("the coordinator sent a chunk out of order");
+    // How long an asset takes is not known before its size is; a call that ran out of time but moved is continued from there.
+    for (;;) {
+        const uint64_t begin = offset;
+        grpc::ClientContext context;
+        set_deadline(context, read_seconds_);
+        v1::ReadRequest request;
+        wire::put(digest, request.mutable_digest());
+        request.set_offset_bytes(offset);
+        const auto reader = assets_->Read(&context, request);
+        v1::Chunk chunk;
+        while (reader->Read(&chunk)) {
+            Status status = chunk.offset_bytes() == offset ? sink(chunk.data())
+                                                           : data_loss("the coordinator sent a chunk out of order");
+            if (!status.ok()) {
+                context.TryCancel();
+                (void)reader->Finish();
+                return status;
+            }
+            offset += chunk.data().size();
         }
-        offset += chunk.data().size();
-        if (Status status = sink(chunk.data()); !status.ok()) {
-            context.TryCancel();
-            (void)reader->Finish();
-            return status;
-        }
+        const Status status = wire::from_grpc(reader->Finish());
+        const bool slow = double(offset - begin) < read_seconds_ * kSlowestBytesPerSecond;
+        if (status.code() != StatusCode::kDeadlineExceeded || slow) return status;
     }
-    return wire::from_grpc(reader->Finish());
 }
 
 }  // namespace lightloom

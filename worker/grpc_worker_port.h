@@ -11,7 +11,8 @@ namespace lightloom {
 
 class GrpcWorkerPort final : public WorkerPort {
   public:
-    explicit GrpcWorkerPort(const std::shared_ptr<grpc::Channel>& channel);
+    /// `read_seconds`: an asset that brings next to nothing for so long is given up with kDeadlineExceeded.
+    explicit GrpcWorkerPort(const std::shared_ptr<grpc::Channel>& channel, double read_seconds = 60);
     Result<WorkerGrant> register_worker(const WorkerHello& hello) override;
     Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds,
                                                std::stop_token stop) override;
@@ -27,6 +28,7 @@ class GrpcWorkerPort final : public WorkerPort {
                       const std::function<Status(std::string_view)>& sink) override;
 
   private:
+    const double read_seconds_;
     std::unique_ptr<v1::WorkerService::Stub> worker_;
     std::unique_ptr<v1::AssetService::Stub> assets_;
 };

@@ -30,7 +30,8 @@ std::string host_name() {
     return ::gethostname(name, sizeof name - 1) == 0 ? name : "unknown";
 }
 
-constexpr const char* kFooter = R"(A worker calls its coordinator and listens on no port, so start as many as you like, wherever you like:
+constexpr const char* kFooter = R"(A worker calls its coordinator and listens on no port, so start as many as you like,
+wherever you like:
 
   lightloom-worker --server render1:50051
   lightloom-worker --server render1:50051 --threads 8
@@ -51,7 +52,8 @@ int main(int argc, char** argv) {
     uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
     app.add_option("--server", server, "HOST:PORT of the coordinator")->capture_default_str();
     app.add_option("--threads", threads, "Threads to render with")->check(CLI::Range(1, 1024))->capture_default_str();
-    app.add_option("--cache", cache, "Directory for scene files and tables; may be shared by the workers of a host")->capture_default_str();
+    app.add_option("--cache", cache, "Directory for scene files and tables; may be shared by the workers of a host")
+        ->capture_default_str();
     app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
     app.add_option("--pretend-golden-digest", golden_override, "")->group("");  // tests of the refusal
     try {

@@ -141,13 +141,15 @@ Result<std::shared_ptr<const Scene>> RendererCache::scene(const JobSpec& spec, s
     return scene;
 }
 
-Result<std::shared_ptr<const SubspaceTables>> RendererCache::tables(const UnitLease& lease, const Scene& scene, std::stop_token stop) {
+Result<std::shared_ptr<const SubspaceTables>> RendererCache::tables(const UnitLease& lease, const Scene& scene,
+                                                                    std::stop_token stop) {
     const AssetReference& asset = lease.tables;
     if (asset.size_bytes == 0) return std::shared_ptr<const SubspaceTables>();
     const auto bytes = tables_(asset, stop);
     if (!bytes.ok()) {
         if (bytes.status().code() == StatusCode::kCancelled) return bytes.status();
-        return Status(bytes.status().code(), "this worker cannot get the tables " + asset.digest.hex() + ": " + bytes.status().message());
+        return Status(bytes.status().code(),
+                      "this worker cannot get the tables " + asset.digest.hex() + ": " + bytes.status().message());
     }
     auto tables = parse_tables(*bytes);
     Status status = tables.ok() ? tables->validate(scene.emitters()) : tables.status();
@@ -180,9 +182,10 @@ Result<TrainingTracer> RendererCache::tracer(const JobSpec& spec, std::stop_toke
     const std::lock_guard lock(mutex_);
     const auto built = scene(spec, stop);
     if (!built.ok()) return built.status();
-    return TrainingTracer([scene = *built, settings = render_settings(spec)](const TrainingWork& work, std::stop_token unit_stop) {
-        return trace_training(*scene, settings, work, unit_stop);
-    });
+    return TrainingTracer(
+        [scene = *built, settings = render_settings(spec)](const TrainingWork& work, std::stop_token unit_stop) {
+            return trace_training(*scene, settings, work, unit_stop);
+        });
 }
 
 }  // namespace lightloom

@@ -1,6 +1,6 @@
 #pragma once
-// Where a worker's scenes and tables come from: fetched by digest into a directory that outlives the process, verified whenever they
-// are read from there, built once per scene and resolution, and kept while recent jobs need them.
+// Where a worker's scenes and tables come from: fetched by digest into a directory that outlives the process, verified
+// whenever they are read from there, built once per scene and resolution, and kept while recent jobs need them.
 
 #include <filesystem>
 #include <list>

@@ -37,7 +37,8 @@ std::string name_of(const UnitReference& unit) {
 }  // namespace
 
 Worker::Worker(WorkerPort& port, WorkerOptions options, RendererSource renderers, TracerSource tracers)
-    : port_(port), options_(std::move(options)), renderers_(std::move(renderers)), tracers_(std::move(tracers)), arena_(int(options_.thread_count)) {}
+    : port_(port), options_(std::move(options)), renderers_(std::move(renderers)), tracers_(std::move(tracers)),
+      arena_(int(options_.thread_count)) {}
 
 std::string Worker::id() {
     const std::lock_guard lock(mutex_);
@@ -156,7 +157,8 @@ bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
     }
     const bool able = made.ok() || made.code() == StatusCode::kCancelled;
     if (!able) spdlog::error("{}: {}", name_of(reference), made.message());
-    // A heartbeat that still named a unit which is given back would take it again, and nobody would render it until that lease ran out.
+    // A heartbeat that still named a unit which is given back would take it again, and nobody would render it until that
+    // lease ran out.
     std::unique_lock beat(beat_mutex_, std::defer_lock);
     if (!made.ok()) beat.lock();
     {
@@ -200,7 +202,10 @@ Status Worker::trace_unit(const UnitLease& lease, std::stop_token unit_stop, std
     if (!seconds.ok()) return seconds.status();
     if (!data.ok()) return data.status();
     const std::string payload = serialize(*data);
-    submit(lease, [&](const std::string& worker_id) { return port_.submit_training(worker_id, lease, payload, *seconds); }, drain);
+    const auto send = [&](const std::string& worker_id) {
+        return port_.submit_training(worker_id, lease, payload, *seconds);
+    };
+    submit(lease, send, drain);
     return {};
 }
 

@@ -18,7 +18,8 @@
 
 namespace lightloom {
 
-/// The renderer of a unit's job; fetches and builds what it needs, and may keep it for the next call. Called from several threads.
+/// The renderer of a unit's job; fetches and builds what it needs, and may keep it for the next call. Called from several
+/// threads.
 using RendererSource = std::function<Result<std::shared_ptr<const Renderer>>(const UnitLease& lease, std::stop_token stop)>;
 /// Traces a training unit of a job; the same holds for what it needs.
 using TrainingTracer = std::function<Result<TrainingData>(const TrainingWork& work, std::stop_token stop)>;
@@ -55,7 +56,8 @@ class Worker {
     Status render_unit(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain);
     Status trace_unit(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain);
     /// Waits for the unit's turn and calls `make` on all threads; how long that took.
-    Result<double> in_turn(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain, const std::function<void()>& make);
+    Result<double> in_turn(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain,
+                           const std::function<void()>& make);
     /// Sends until there is an answer.
     using Send = std::function<Result<SubmitAck>(const std::string& worker_id)>;
     void submit(const UnitLease& lease, const Send& send, std::stop_token stop);

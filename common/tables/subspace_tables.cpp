@@ -10,6 +10,7 @@ namespace lightloom {
 namespace {
 
 constexpr std::string_view kMagic = "lightloom-tables 1\n";
+static_assert(kMagic.starts_with(kTablesPrefix));
 
 Status positive(const std::vector<float>& values, size_t count, const char* name) {
     if (values.size() != count) return data_loss(std::string(name) + " has the wrong size");

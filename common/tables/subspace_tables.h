@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/core/digest.h"
@@ -45,6 +46,9 @@ struct SubspaceTables {
 
 /// Tables without knowledge: one subspace on both sides. Always valid; what a scene without connectable paths gets.
 SubspaceTables trivial_tables(const EmitterSet& emitters);
+
+/// What serialized tables of every version begin with.
+inline constexpr std::string_view kTablesPrefix = "lightloom-tables ";
 
 /// Named, versioned sections, each with its own SHA-256. The same tables have the same bytes on every host.
 std::string serialize(const SubspaceTables& tables);

@@ -1,6 +1,7 @@
 #include "common/tables/train.h"
 
 #include <algorithm>
+#include <cfloat>
 #include <chrono>
 #include <cmath>
 
@@ -31,8 +32,10 @@ class Stopwatch {
 std::vector<double> block_brightness(const TrainingData& d) {
     const int w = d.blocks_x, h = d.blocks_y;
     const double per_block = double(d.samples) / double(d.block_sum.size());
+    // A block whose sum left the range knows nothing of its brightness and takes that of its neighbours.
+    const auto known = [](double s) { return std::isfinite(s) ? s : 0; };
     double mean = 0;
-    for (const double s : d.block_sum) mean += s / per_block;
+    for (const double s : d.block_sum) mean += known(s) / per_block;
     mean /= double(d.block_sum.size());
     std::vector<double> out(d.block_sum.size());
     for (int y = 0; y < h; ++y) {
@@ -40,7 +43,7 @@ std::vector<double> block_brightness(const TrainingData& d) {
             double sum = 0;
             int count = 0;
             for (int j = std::max(0, y - 1); j <= std::min(h - 1, y + 1); ++j)
-                for (int i = std::max(0, x - 1); i <= std::min(w - 1, x + 1); ++i, ++count) sum += d.block_sum[size_t(j * w + i)];
+                for (int i = std::max(0, x - 1); i <= std::min(w - 1, x + 1); ++i, ++count) sum += known(d.block_sum[size_t(j * w + i)]);
             out[size_t(y * w + x)] = sum / (count * per_block) + 0.1 * mean;
         }
     }
@@ -66,7 +69,7 @@ uint32_t used_labels(const SubspaceTree& tree) {
 
 /// kappa of both sides.
 void train_classifiers(const TrainingData& d, const std::vector<double>& brightness, const EmitterSet& emitters,
-                       const TrainingOptions& o, SubspaceTables* tables) {
+                       const TrainingOptions& o, std::stop_token stop, SubspaceTables* tables) {
     size_t nodes = 0;
     for (const TrainingPath& p : d.paths) nodes += p.vertex_count;
     const size_t stride = std::max<size_t>(1, nodes / kClassifierEnds);
@@ -75,7 +78,7 @@ void train_classifiers(const TrainingData& d, const std::vector<double>& brightn
         const TrainingPath& p = d.paths[x];
         const TrainingVertex* v = &d.vertices[p.first_vertex];
         const float weight = float(double(p.estimate) / brightness[p.block]);
-        if (!(weight > 0)) continue;
+        if (!(weight > 0) || !std::isfinite(weight) || !d.in_range(p)) continue;
         for (uint32_t s = 1; s + 1 < p.vertex_count; ++s) {
             if (!(v[s].density > 0)) continue;
             eye.push_back({end_between(v[s], v[s + 1]), weight});
@@ -91,6 +94,7 @@ void train_classifiers(const TrainingData& d, const std::vector<double>& brightn
     light_options.first_label = sources;
     light_options.direction_weight = float(o.direction_weight);
     light_options.seed = o.seed;
+    light_options.stop = stop;
     ClassifierOptions eye_options = light_options;
     eye_options.subspaces = o.eye_subspaces;
     eye_options.first_label = 0;
@@ -102,10 +106,13 @@ void train_classifiers(const TrainingData& d, const std::vector<double>& brightn
 }
 
 /// Q, windows and the number of connectible vertices.
-void measure_energy(const TrainingData& d, const EmitterSet& emitters, const TrainingOptions& o, SubspaceTables* t) {
+void measure_energy(const TrainingData& d, const EmitterSet& emitters, const TrainingOptions& o, std::stop_token stop,
+                    SubspaceTables* t) {
     std::vector<double> sum(t->light_count, 0.0), count(t->light_count, 0.0);
     double vertices = 0;
     for (const TrainingPath& p : d.light_paths) {
+        if (stop.stop_requested()) return;
+        if (!d.in_range(p)) continue;
         const TrainingVertex* v = &d.vertices[p.first_vertex];
         for (uint32_t i = 0; i < p.vertex_count; ++i) {
             if (!(v[i].density > 0)) continue;
@@ -123,7 +130,7 @@ void measure_energy(const TrainingData& d, const EmitterSet& emitters, const Tra
     const double floor = total > 0 ? 1e-3 * total / t->light_count : 1;
     t->energy.clear(), t->window.clear();
     for (uint32_t i = 0; i < t->light_count; ++i) {
-        t->energy.push_back(float(sum[i] / paths + floor));
+        t->energy.push_back(float(std::min(sum[i] / paths + floor, double(FLT_MAX))));
         const double expected = count[i] / paths * o.nominal_paths;
         const double windows = expected > 0 ? std::ceil(o.reuse_target / expected) : double(o.reuse_windows);
         t->window.push_back(uint16_t(std::clamp(windows, 1.0, double(o.reuse_windows))));
@@ -132,13 +139,15 @@ void measure_energy(const TrainingData& d, const EmitterSet& emitters, const Tra
 }
 
 GammaDataset gamma_dataset(const TrainingData& d, const std::vector<double>& brightness, const EmitterSet& emitters,
-                           const TrainingOptions& o, const SubspaceTables& t) {
+                           const TrainingOptions& o, std::stop_token stop, const SubspaceTables& t) {
     GammaDataset out;
     out.light_count = t.light_count, out.eye_count = t.eye_count;
     out.source_count = t.division.cell_count();
     out.energy = t.energy;
     std::vector<float> weights;
     for (const TrainingPath& p : d.paths) {
+        if (stop.stop_requested()) return out;
+        if (!d.in_range(p)) continue;
         const TrainingVertex* v = &d.vertices[p.first_vertex];
         GammaPath path;
         path.first_node = uint32_t(out.nodes.size());
@@ -177,24 +186,26 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
     Stopwatch watch;
     SubspaceTables tables;
     const std::vector<double> brightness = block_brightness(data);
-    train_classifiers(data, brightness, emitters, options, &tables);
+    train_classifiers(data, brightness, emitters, options, stop, &tables);
+    if (stop.stop_requested()) return cancelled;
     report->classifier_seconds = watch.lap();
     if (uint64_t(tables.light_count) * tables.eye_count > kMaxGammaCells)
         return invalid_argument("Gamma would have " + std::to_string(tables.light_count) + " x " + std::to_string(tables.eye_count) +
                                 " entries and goes to every worker; ask for fewer light-subspaces or eye-subspaces (at most " +
                                 std::to_string(kMaxGammaCells) + " entries)");
-    if (stop.stop_requested()) return cancelled;
-    measure_energy(data, emitters, options, &tables);
+    measure_energy(data, emitters, options, stop, &tables);
     report->energy_seconds = watch.lap();
-    const GammaDataset dataset = gamma_dataset(data, brightness, emitters, options, tables);
+    const GammaDataset dataset = gamma_dataset(data, brightness, emitters, options, stop, tables);
+    if (stop.stop_requested()) return cancelled;
     report->paths = dataset.paths.size(), report->nodes = dataset.nodes.size();
     if (dataset.paths.empty()) report->note = "no path of this scene can be connected: uniform tables";
-    if (stop.stop_requested()) return cancelled;
     GammaOptions gamma;
     gamma.trainer = options.trainer;
     gamma.mix = options.mix;
     gamma.seed = options.seed;
+    gamma.stop = stop;
     tables.gamma = train_gamma(dataset, gamma, &report->gamma);
+    if (stop.stop_requested()) return cancelled;
     report->gamma_seconds = watch.lap();
     const uint32_t light = std::min(tables.light_count, report->gamma.light_resolution);
     const uint32_t eye = std::min(tables.eye_count, report->gamma.eye_resolution);
@@ -202,6 +213,12 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
         report->note = "the training set tells " + std::to_string(light) + " light and " + std::to_string(eye) +
                        " eye subspaces apart, of " + std::to_string(options.light_subspaces) + " and " +
                        std::to_string(options.eye_subspaces) + " asked for";
+    for (const std::vector<TrainingPath>* list : {&data.paths, &data.light_paths})
+        for (const TrainingPath& p : *list) report->out_of_range += !data.in_range(p);
+    if (report->out_of_range > 0)
+        report->note += (report->note.empty() ? "" : "; ") + std::to_string(report->out_of_range) + " of " +
+                        std::to_string(data.paths.size() + data.light_paths.size()) +
+                        " training paths left the range of single precision and were left out";
     LL_RETURN_IF_ERROR(tables.validate(emitters));
     return tables;
 }

@@ -2,8 +2,8 @@
 // From training data to tables: brightness of blocks, kappa, Q, Gamma, windows. [Su, Li and Wang 2022, section 5]
 //
 // Cleaning of the dataset, for what it trains only (no image is made of it): a path without a connectible edge teaches Gamma
-// nothing and is left out; w_X is cut at its 99.99 % quantile, so that one lucky path does not own a column; centroids see
-// contributions cut at their 99.9 % quantile.
+// nothing and is left out, as is one whose numbers left the range of single precision (counted); w_X is cut at its 99.99 %
+// quantile, so that one lucky path does not own a column; centroids see contributions cut at their 99.9 % quantile.
 
 #include <cstdint>
 #include <functional>
@@ -33,11 +33,12 @@ struct TrainingOptions {
 struct TrainingReport {
     GammaReport gamma;
     uint64_t paths = 0, nodes = 0;
+    uint64_t out_of_range = 0;  ///< Paths and light sub-paths that were left out; see TrainingData::in_range().
     double classifier_seconds = 0, energy_seconds = 0, gamma_seconds = 0;
-    std::string note;  ///< One line when the tables are simpler than asked; empty otherwise.
+    std::string note;  ///< One line when the tables are simpler than asked or data were left out; empty otherwise.
 };
 
-/// kCancelled after a stop request; otherwise always valid tables, whatever the data hold.
+/// kCancelled within about a second of a stop request; otherwise always valid tables, whatever the data hold.
 Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& emitters, const TrainingOptions& options,
                                     std::stop_token stop, TrainingReport* report);
 

@@ -109,7 +109,8 @@ void order_centroids(std::vector<Point>& c, size_t begin, size_t end) {
 }
 
 /// Index of the nearest centroid of every end.
-std::vector<uint32_t> nearest(const std::vector<WeightedEnd>& ends, const Space& space, const std::vector<Point>& centroids) {
+std::vector<uint32_t> nearest(const std::vector<WeightedEnd>& ends, const Space& space, const std::vector<Point>& centroids,
+                              const std::stop_token& stop) {
     // Axis by axis, so that the inner loop is over centroids in vector registers.
     std::array<std::vector<float>, kAxes> columns;
     for (size_t a = 0; a < kAxes; ++a)
@@ -117,7 +118,7 @@ std::vector<uint32_t> nearest(const std::vector<WeightedEnd>& ends, const Space&
     std::vector<uint32_t> labels(ends.size());
     fork_join(ends.size(), [&](size_t first, size_t last) {
         std::vector<float> distance(centroids.size());
-        for (size_t e = first; e < last; ++e) {
+        for (size_t e = first; e < last && !stop.stop_requested(); ++e) {
             const Point p = space.point(ends[e].end);
             std::fill(distance.begin(), distance.end(), 0.0f);
             for (size_t a = 0; a < kAxes; ++a) {
@@ -140,7 +141,7 @@ class TreeBuilder {
         : ends_(ends), space_(space), labels_(std::move(labels)), votes_(label_count, 0.0), first_label_(first_label),
           node_budget_(size_t(kNodesPerSubspace) * label_count) {}
 
-    SubspaceTree build() {
+    SubspaceTree build(const std::stop_token& stop) {
         // Breadth first, so that a spent budget leaves every part of space equally fine.
         struct Task {
             uint32_t node;
@@ -151,7 +152,7 @@ class TreeBuilder {
         std::iota(items.begin(), items.end(), 0u);
         nodes_.assign(1, SubspaceTree::make_leaf(first_label_));
         std::vector<Task> tasks{{0, 0, items.size(), 0}};
-        for (size_t t = 0; t < tasks.size(); ++t) {
+        for (size_t t = 0; t < tasks.size() && !stop.stop_requested(); ++t) {
             const Task task = tasks[t];
             const auto begin = items.begin() + std::ptrdiff_t(task.begin), end = items.begin() + std::ptrdiff_t(task.end);
             bool pure = false;
@@ -212,8 +213,8 @@ SubspaceTree train_classifier(const std::vector<WeightedEnd>& ends, const Classi
     order_centroids(centroids, 0, centroids.size());
     centroids.erase(std::unique(centroids.begin(), centroids.end()), centroids.end());
     if (centroids.size() < 2) return single();
-    std::vector<uint32_t> labels = nearest(ends, space, centroids);
-    return TreeBuilder(ends, space, std::move(labels), uint32_t(centroids.size()), options.first_label).build();
+    std::vector<uint32_t> labels = nearest(ends, space, centroids, options.stop);
+    return TreeBuilder(ends, space, std::move(labels), uint32_t(centroids.size()), options.first_label).build(options.stop);
 }
 
 }  // namespace lightloom

@@ -3,6 +3,7 @@
 // reproduces those labels. Deterministic for a given seed. [Su, Li and Wang 2022, section 5.1; algorithms.md 1.3, 1.4]
 
 #include <cstdint>
+#include <stop_token>
 #include <vector>
 
 #include "common/tables/classifier.h"
@@ -19,6 +20,7 @@ struct ClassifierOptions {
     uint32_t first_label = 0;
     float direction_weight = 0.05f;  ///< k_d.
     uint64_t seed = 0;
+    std::stop_token stop;            ///< Requested: returns soon, with a tree of no use.
 };
 
 /// At most options.subspaces labels are used (fewer when there are fewer distinct ends). Labels are in the order of a balanced

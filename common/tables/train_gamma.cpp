@@ -158,7 +158,10 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
         for (const double lambda : kStrengths) {
             if (bits > 2 && lambda != 0.1) continue;
             std::vector<float> candidate = b;
-            for (int i = 0; i < (bits > 2 ? kCoarseSteps : kStepsPerStrength); ++i) problem->improve(&candidate, prior, lambda, train);
+            for (int i = 0; i < (bits > 2 ? kCoarseSteps : kStepsPerStrength); ++i) {
+                if (options.stop.stop_requested()) return b;
+                problem->improve(&candidate, prior, lambda, train);
+            }
             const double loss = problem->loss(candidate, judge);
             if (loss < level_loss) level_loss = loss, strength = lambda, best_b = std::move(candidate);
         }
@@ -170,7 +173,7 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
             b = std::move(best_b);
             // What judged may teach as well once the choice is made.
             if (finest)
-                for (int i = 0; i < kFinalSteps; ++i) problem->improve(&b, prior, strength, all);
+                for (int i = 0; i < kFinalSteps && !options.stop.stop_requested(); ++i) problem->improve(&b, prior, strength, all);
         } else {
             b = prior;  // finer subspaces than the data support: keep the coarser model, lifted
         }
@@ -199,6 +202,7 @@ std::vector<float> train_adam(const GammaDataset& data, const GammaOptions& opti
     for (int epoch = 0; epoch < kEpochs; ++epoch) {
         for (size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[size_t(rng.next_u64() % i)]);
         for (size_t begin = 0; begin < order.size(); begin += kBatch) {
+            if (options.stop.stop_requested()) return b;
             const size_t end = std::min(order.size(), begin + kBatch);
             problem.gradient(b, &order[begin], order.data() + end, &g);
             power1 *= kBeta1, power2 *= kBeta2;

@@ -9,6 +9,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <stop_token>
 #include <vector>
 
 namespace lightloom {
@@ -41,6 +42,7 @@ struct GammaOptions {
     double mix = 0.1;
     double held_out = 0.2;  ///< Share of the paths that only judge (mm).
     uint64_t seed = 0;
+    std::stop_token stop;   ///< Requested: returns soon, with a matrix of no use.
 };
 
 /// What training found, for reports.

@@ -1,5 +1,6 @@
 #include "common/tables/training_data.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -26,7 +27,10 @@ void take(std::string_view& rest, uint64_t count, std::vector<T>* values) {
 
 }  // namespace
 
-Status TrainingData::append(const TrainingData& other) {
+Status TrainingData::append(const TrainingData& other, uint64_t max_vertices) {
+    if (vertices.size() + other.vertices.size() > max_vertices)
+        return {StatusCode::kResourceExhausted, "the training data have more than " + std::to_string(max_vertices) +
+                                                    " path vertices; choose fewer training-paths"};
     if (blocks_x == 0) {
         blocks_x = other.blocks_x, blocks_y = other.blocks_y;
         block_sum.assign(other.block_sum.size(), 0.0);
@@ -54,17 +58,22 @@ Status TrainingData::validate(size_t emitter_count) const {
     for (const std::vector<TrainingPath>* list : {&paths, &light_paths}) {
         for (const TrainingPath& p : *list) {
             if (p.vertex_count < 1 || uint64_t(p.first_vertex) + p.vertex_count > vertices.size() ||
-                p.block >= block_sum.size() || vertices[p.first_vertex].emitter >= emitter_count ||
-                !std::isfinite(p.estimate) || !std::isfinite(p.square))
+                p.block >= block_sum.size() || vertices[p.first_vertex].emitter >= emitter_count)
                 return data_loss("training data with a malformed path");
         }
     }
     // Classifiers sort by these: an order needs numbers.
     const auto finite = [](const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
     for (const TrainingVertex& v : vertices)
-        if (!finite(v.position) || !finite(v.normal) || !std::isfinite(v.density))
+        if (!finite(v.position) || !finite(v.normal))
             return data_loss("training data with a vertex that is nowhere");
     return {};
+}
+
+bool TrainingData::in_range(const TrainingPath& path) const {
+    const TrainingVertex* v = &vertices[path.first_vertex];
+    return std::isfinite(path.estimate) && std::isfinite(path.square) &&
+           std::all_of(v, v + path.vertex_count, [](const TrainingVertex& x) { return std::isfinite(x.density); });
 }
 
 std::string serialize(const TrainingData& d) {

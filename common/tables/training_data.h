@@ -42,9 +42,16 @@ struct TrainingData {
     std::vector<TrainingPath> light_paths;
     std::vector<TrainingVertex> vertices;
 
-    /// Appends another unit's data of the same frame; kInvalidArgument for another one's.
-    Status append(const TrainingData& other);
+    static constexpr uint64_t kMaxVertices = UINT32_MAX;  ///< TrainingPath::first_vertex has 32 bits.
+
+    /// Appends another unit's data of the same frame; kInvalidArgument for another one's, kResourceExhausted above
+    /// `max_vertices`.
+    Status append(const TrainingData& other, uint64_t max_vertices = kMaxVertices);
+    /// Everything that training relies on. Estimates, squares, densities and sums may leave the range of their type in a scene
+    /// of extremes; see in_range().
     Status validate(size_t emitter_count) const;
+    /// Whether all numbers of a path are finite. Training leaves the others out.
+    bool in_range(const TrainingPath& path) const;
 };
 
 std::string serialize(const TrainingData& data);

@@ -59,6 +59,8 @@ class AssetStore {
     Status put(const Digest& digest, std::string_view bytes);
     /// Forgets a file that turned out to be damaged, so that it can be fetched or stored again.
     void remove(const Digest& digest);
+    /// Removes the complete files that begin with `prefix`; their number.
+    size_t remove_all_that_begin_with(std::string_view prefix);
 
     /// One upload in progress. Destroyed before it is complete, it leaves its bytes for a later one to go on from.
     class Upload {

@@ -5,6 +5,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 
 #include "common/film/atomic_file.h"
 #include "common/work/asset.h"
@@ -95,6 +96,21 @@ Status AssetStore::put(const Digest& digest, std::string_view bytes) {
 void AssetStore::remove(const Digest& digest) {
     std::error_code ignored;
     fs::remove(path_of(digest), ignored);
+}
+
+size_t AssetStore::remove_all_that_begin_with(std::string_view prefix) {
+    size_t count = 0;
+    std::error_code error;
+    std::vector<fs::path> found;
+    std::string first(prefix.size(), '\0');
+    for (fs::recursive_directory_iterator item(directory_, error), end; !error && item != end; item.increment(error)) {
+        if (item->is_directory(error) && item->path().filename() == "incoming") item.disable_recursion_pending();
+        if (!item->is_regular_file(error)) continue;
+        std::ifstream in(item->path(), std::ios::binary);
+        if (in.read(first.data(), std::streamsize(first.size())) && first == prefix) found.push_back(item->path());
+    }
+    for (const fs::path& path : found) count += fs::remove(path, error);
+    return count;
 }
 
 Result<AssetStore::Upload> AssetStore::begin_upload(const Digest& digest, uint64_t size_bytes) {

@@ -24,8 +24,14 @@ std::string_view to_string(PreparePhase phase) {
         case PreparePhase::kProbing: return "measuring how fast training is";
         case PreparePhase::kTracing: return "tracing training paths";
         case PreparePhase::kLearning: return "learning the tables";
+        case PreparePhase::kWaitingForTables: return "waiting for the tables of another job";
     }
     return "preparing";
+}
+
+std::string phase_text(const JobInfo& job) {
+    const bool named = job.phase == PreparePhase::kWaitingForTables && !job.waits_for.empty();
+    return named ? "waiting for the tables of " + job.waits_for : std::string(to_string(job.phase));
 }
 
 }  // namespace lightloom

@@ -72,7 +72,7 @@ struct SubmitAck {
 enum class JobState { kPreparing, kRunning, kFinishing, kSucceeded, kFailed, kCancelled };
 bool is_terminal(JobState state);
 /// What a job in kPreparing is doing.
-enum class PreparePhase { kReadingScene, kProbing, kTracing, kLearning };
+enum class PreparePhase { kReadingScene, kProbing, kTracing, kLearning, kWaitingForTables };
 /// For people: "tracing training paths".
 std::string_view to_string(PreparePhase phase);
 
@@ -112,8 +112,11 @@ struct JobInfo {
     double prepare_seconds = 0, finish_seconds = 0;
     PreparePhase phase = PreparePhase::kReadingScene;  ///< In kPreparing.
     uint64_t phase_done = 0, phase_total = 0;          ///< Training samples.
+    std::string waits_for;                             ///< The job that makes the tables, in kWaitingForTables.
     TablesInfo tables;
 };
+/// For people: "waiting for the tables of job-0123".
+std::string phase_text(const JobInfo& job);
 
 enum class ImageKind { kFinal, kPreview };
 

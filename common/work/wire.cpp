@@ -162,6 +162,7 @@ void put(const JobInfo& in, v1::Job* out) {
     if (in.state == JobState::kPreparing) out->set_phase(v1::PreparePhase(int(in.phase) + 1));
     out->set_phase_done_count(in.phase_done);
     out->set_phase_total_count(in.phase_total);
+    out->set_waits_for(in.waits_for);
     if (in.tables.asset.size_bytes > 0) put_tables(in.tables, out->mutable_tables());
 }
 
@@ -197,10 +198,11 @@ Result<JobInfo> get(const v1::Job& in) {
     info.duplicates_different = in.duplicate_different_count();
     info.prepare_seconds = in.prepare_seconds();
     info.finish_seconds = in.finish_seconds();
-    if (in.phase() >= v1::PREPARE_PHASE_READING_SCENE && in.phase() <= v1::PREPARE_PHASE_LEARNING)
+    if (in.phase() >= v1::PREPARE_PHASE_READING_SCENE && in.phase() <= v1::PREPARE_PHASE_WAITING_FOR_TABLES)
         info.phase = PreparePhase(int(in.phase()) - 1);
     info.phase_done = in.phase_done_count();
     info.phase_total = in.phase_total_count();
+    info.waits_for = in.waits_for();
     if (in.has_tables()) {
         auto tables = get_tables(in.tables());
         if (!tables.ok()) return tables.status();

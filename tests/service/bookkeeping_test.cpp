@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include "common/film/atomic_file.h"
+#include "common/scene/scene.h"
+#include "server/scene_reader.h"
 #include "tests/service/fake.h"
 
 namespace lightloom {
@@ -193,6 +196,31 @@ TEST(Coordinator, DroppedSamplesOfGroupsBeyondTheImageDoNotCount) {
     ASSERT_TRUE(manifest.ok());
     EXPECT_NE(manifest->find("\"iteration\": 0"), std::string::npos);
     EXPECT_EQ(manifest->find("\"iteration\": 2"), std::string::npos);
+}
+
+TEST(SceneReader, FactsKeepNoSceneAndBuildItWhenAsked) {
+    const testing::TempDirectory directory;
+    const std::filesystem::path scenes = std::filesystem::path(LIGHTLOOM_SOURCE_DIR) / "tests/scenes";
+    const auto manifest = AssetManifest::of_files(scenes, {"furnace-box.pbrt"});
+    ASSERT_TRUE(manifest.ok()) << manifest.status().message();
+    AssetStore assets(directory.path / "assets");
+    ASSERT_TRUE(assets.put(manifest->root(), manifest->canonical_text()).ok());
+    ASSERT_TRUE(assets.put(manifest->entries[0].digest, *read_file((scenes / "furnace-box.pbrt").string())).ok());
+    JobSpec spec;
+    spec.algorithm = "spcbpt";
+    spec.scene_root = manifest->root();
+    spec.width = spec.height = 16;
+    const auto facts = make_scene_reader(directory.path / "scratch")(assets, spec, {});
+    ASSERT_TRUE(facts.ok()) << facts.status().message();
+    // What took the description over could do so once only.
+    for (int i = 0; i < 2; ++i) {
+        const auto scene = facts->build_scene();
+        ASSERT_TRUE(scene.ok()) << scene.status().message();
+        EXPECT_EQ((*scene)->frame(), facts->frame);
+        EXPECT_FALSE((*scene)->emitters().all().empty());
+    }
+    assets.remove(manifest->entries[0].digest);
+    EXPECT_FALSE(facts->build_scene().ok()) << "it was read again";
 }
 
 TEST(Coordinator, AWaitThatIsNotANumberIsRefused) {

@@ -1,5 +1,8 @@
 // Tables on their way: the broadcast, damaged copies, and training under a time limit.
 
+#include <arpa/inet.h>
+#include <sys/socket.h>
+
 #include "tests/service/table_service.h"
 
 namespace lightloom {
@@ -71,6 +74,59 @@ TEST(Broadcast, DamagedTablesAreFetchedAgain) {
     NoisyPort broken(local, 1000);
     SceneFetcher helpless(broken, elsewhere.path);
     EXPECT_EQ(helpless.tables(asset, {}).status().code(), StatusCode::kDataLoss);
+}
+
+TEST(Broadcast, ShortenedTablesAreFetchedAgain) {
+    TableService service;
+    LocalWorkerPort local(*service.coordinator);
+    AssetStore& assets = service.coordinator->assets();
+    const std::string bytes = serialize(trivial_tables(golden()->emitters()));
+    const AssetReference asset{sha256(bytes), bytes.size()};
+    ASSERT_TRUE(assets.put(asset.digest, bytes).ok());
+    const TempDirectory directory, elsewhere;
+    NoisyPort port(local, 0);
+    SceneFetcher fetcher(port, directory.path);
+    ASSERT_TRUE(fetcher.tables(asset, {}).ok());
+    int reads = 1;
+    for (const size_t size : {bytes.size() - 1, bytes.size() / 2, size_t(0)}) {
+        std::filesystem::resize_file(AssetStore(directory.path / "assets").path_of(asset.digest), size);
+        const auto got = fetcher.tables(asset, {});
+        ASSERT_TRUE(got.ok()) << size << ": " << got.status().message();
+        EXPECT_EQ(*got, bytes) << size;
+        EXPECT_EQ(port.reads, ++reads) << size;
+    }
+    // The coordinator's copy, over the wire: what came of it is no use later, but does not stand in the way either.
+    const auto server = GrpcServer::start(*service.coordinator, "127.0.0.1:0");
+    ASSERT_TRUE(server.ok()) << server.status().message();
+    GrpcWorkerPort wire(grpc::CreateChannel("127.0.0.1:" + std::to_string((*server)->port()), grpc::InsecureChannelCredentials()));
+    std::filesystem::resize_file(assets.path_of(asset.digest), bytes.size() / 2);
+    SceneFetcher other(wire, elsewhere.path);
+    const Status lost = other.tables(asset, {}).status();
+    EXPECT_EQ(lost.code(), StatusCode::kDataLoss);
+    EXPECT_NE(lost.message().find("the wrong size"), std::string::npos) << lost.message();
+    assets.remove(asset.digest);
+    ASSERT_TRUE(assets.put(asset.digest, bytes).ok());
+    const auto got = other.tables(asset, {});
+    ASSERT_TRUE(got.ok()) << got.status().message();
+    EXPECT_EQ(*got, bytes);
+}
+
+TEST(Broadcast, ACoordinatorThatDoesNotAnswerIsGivenUp) {
+    const int listener = ::socket(AF_INET, SOCK_STREAM, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t length = sizeof address;
+    ASSERT_EQ(::bind(listener, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    ASSERT_EQ(::listen(listener, 4), 0);
+    ASSERT_EQ(::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &length), 0);
+    const std::string target = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+    GrpcWorkerPort port(grpc::CreateChannel(target, grpc::InsecureChannelCredentials()), 0.3);
+    const auto begin = std::chrono::steady_clock::now();
+    const Status status = port.read_asset(sha256("x"), 0, [](std::string_view) { return Status(); });
+    EXPECT_EQ(status.code(), StatusCode::kDeadlineExceeded) << status.message();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+    ::close(listener);
 }
 
 /// Workers with real light, all in this process.
@@ -171,15 +227,16 @@ TEST(Broadcast, AWorkerWithoutTheTablesRefusesAndOthersRender) {
 }
 
 TEST(Broadcast, TablesDamagedAtTheCoordinatorAreRestored) {
-    for (const bool copy : {true, false}) {
+    for (const auto& [copy, shortened] : {std::pair(true, false), std::pair(true, true), std::pair(false, false)}) {
         TempDirectory cache;
-        TableService service([&](CoordinatorOptions& o) {
-            if (copy) o.table_cache = cache.path;
+        TableService service([&, keep = copy](CoordinatorOptions& o) {
+            if (keep) o.table_cache = cache.path;
         });
         const std::string id = train_by_hand(service, service.table_spec(2));
         const AssetReference asset = service.coordinator->get_job(id)->tables.asset;
         std::string bytes = *service.coordinator->assets().read(asset.digest);
         bytes[bytes.size() / 2] ^= 1;
+        if (shortened) bytes.resize(bytes.size() / 2);
         ASSERT_TRUE(write_file_atomically(service.coordinator->assets().path_of(asset.digest).string(), bytes).ok());
         LightCrew crew;
         crew.add(std::make_unique<LocalWorkerPort>(*service.coordinator), service.identity);

@@ -58,7 +58,14 @@ TEST(Tables, TrainingUnitsOfSilentWorkersGoToOthers) {
 }
 
 TEST(Tables, DamagedTrainingDataAreRefusedAndTheUnitIsLeasedAgain) {
-    TableService service;
+    uint64_t bytes = 0;
+    {
+        TableService measured;
+        measured.submit_training(measured.table_spec());
+        for (const auto& [worker, lease] : lease_all(measured)) bytes += traced(lease).size();
+    }
+    // Room for every unit once: what is thrown away must not count.
+    TableService service([&](CoordinatorOptions& o) { o.training_bytes = bytes + 1000; });
     const std::string id = service.submit_training(service.table_spec());
     auto held = lease_all(service);
     ASSERT_EQ(held.size(), 3u);
@@ -133,6 +140,92 @@ TEST(Tables, JobsCanBeCancelledInEveryPhase) {
     cancel(train_by_hand(service, service.table_spec()));
     const std::string last = train_by_hand(service, service.table_spec());
     EXPECT_EQ(service.coordinator->get_job(last)->state, JobState::kRunning) << "the service goes on";
+}
+
+JobInfo wait_waiting(TableService& service, const std::string& id) {
+    return service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kWaitingForTables; });
+}
+
+TEST(Tables, AnEqualJobWaitsForThemInsteadOfTrainingToo) {
+    TableService service;
+    const std::string first = service.submit_training(service.table_spec(2)), second = service.submit_now(service.table_spec(7));
+    const JobInfo waiting = wait_waiting(service, second);
+    EXPECT_EQ(waiting.waits_for, first);
+    EXPECT_EQ(phase_text(waiting), "waiting for the tables of " + first);
+    const auto held = lease_all(service);
+    EXPECT_EQ(held.size(), 3u) << "of the first only";
+    for (const auto& [worker, lease] : held) {
+        EXPECT_EQ(lease.job_id, first);
+        EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
+    }
+    const auto running = [](const JobInfo& j) { return j.state == JobState::kRunning; };
+    const JobInfo made = service.wait(first, running), taken = service.wait(second, running);
+    EXPECT_FALSE(made.tables.from_cache);
+    EXPECT_TRUE(taken.tables.from_cache);
+    EXPECT_EQ(taken.waits_for, "");
+    EXPECT_EQ(taken.tables.asset.digest, made.tables.asset.digest);
+    EXPECT_EQ(taken.spec.samples_per_pixel, 7u);
+    JobSpec other = service.table_spec(2);
+    other.seed = 9;
+    EXPECT_EQ(service.coordinator->get_job(service.submit_training(other))->phase, PreparePhase::kTracing);
+}
+
+TEST(Tables, AJobThatWaitedMakesThemItselfWhenTheOtherEnds) {
+    for (const bool fails : {false, true}) {
+        TableService service;
+        const std::string first = service.submit_training(service.table_spec(2));
+        const std::string second = service.submit_now(service.table_spec(2));
+        const std::string third = service.submit_now(service.table_spec(2));
+        wait_waiting(service, second);
+        wait_waiting(service, third);
+        if (fails) {
+            const std::string worker = service.add_worker();
+            const UnitLease lease = service.lease(worker).at(0);
+            ASSERT_TRUE(service.coordinator->release_unit(worker, lease.reference(), invalid_argument("boom")).ok());
+            EXPECT_EQ(service.coordinator->get_job(first)->state, JobState::kFailed);
+        } else {
+            ASSERT_TRUE(service.coordinator->cancel_job(first).ok());
+        }
+        // Of the two that waited, one goes on and the other waits for it.
+        std::string maker;
+        for (int i = 0; i < 1000 && maker.empty(); ++i) {
+            for (const std::string& id : {second, third})
+                if (service.coordinator->get_job(id)->phase == PreparePhase::kTracing) maker = id;
+            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        }
+        ASSERT_FALSE(maker.empty());
+        const std::string other = maker == second ? third : second;
+        service.wait(other, [&](const JobInfo& j) { return j.waits_for == maker; });
+        for (const auto& [worker, lease] : lease_all(service)) {
+            EXPECT_EQ(lease.job_id, maker);
+            EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
+        }
+        const auto running = [](const JobInfo& j) { return j.state == JobState::kRunning; };
+        EXPECT_EQ(service.wait(maker, running).tables.asset.digest, service.wait(other, running).tables.asset.digest);
+    }
+}
+
+TEST(Tables, TheirBytesGoWithTheLastJobThatNamesThem) {
+    TableService service;
+    const std::string first = service.submit_training(service.table_spec(2)), second = service.submit_now(service.table_spec(3));
+    wait_waiting(service, second);
+    for (const auto& [worker, lease] : lease_all(service)) service.give(worker, lease, traced(lease));
+    const auto running = [](const JobInfo& j) { return j.state == JobState::kRunning; };
+    const Digest digest = service.wait(first, running).tables.asset.digest;
+    ASSERT_TRUE(service.coordinator->cancel_job(first).ok());
+    service.wait(second, running);
+    EXPECT_TRUE(service.coordinator->assets().contains(digest));
+    ASSERT_TRUE(service.coordinator->cancel_job(second).ok());
+    EXPECT_FALSE(service.coordinator->assets().contains(digest));
+    // What a coordinator that was killed left behind goes when the next one starts; files of scenes stay.
+    const Digest left = sha256(serialize(trivial_tables(golden()->emitters())));
+    ASSERT_TRUE(service.coordinator->assets().put(left, serialize(trivial_tables(golden()->emitters()))).ok());
+    CoordinatorOptions options;
+    options.directory = service.directory.path;
+    service.coordinator.reset();
+    Coordinator next(options);
+    EXPECT_FALSE(next.assets().contains(left));
+    EXPECT_TRUE(next.assets().contains(service.root));
 }
 
 TEST(TableCache, ASecondJobStartsAtOnceAndAChangedOneDoesNot) {
@@ -221,6 +314,63 @@ TEST(TableCache, DamagedEntriesAreRemovedAndTheDirectoryStaysBounded) {
     EXPECT_LE(total, 5 * bytes.size() / 2 + 4096);
     EXPECT_TRUE(cache.find(sha256("39"))) << "the newest entry stays";
     EXPECT_FALSE(TableCache({}, 1000).find(key));
+}
+
+TEST(TableCache, AMalformedReportIsADamagedEntry) {
+    const TempDirectory directory;
+    const std::string bytes = serialize(trivial_tables(golden()->emitters()));
+    const TableCache cache(directory.path, 1 << 20);
+    const Digest key = sha256("a");
+    cache.store(key, bytes, {.loss = std::numeric_limits<double>::infinity()});
+    EXPECT_TRUE(cache.find(key)) << "no report that we write ourselves is damaged";
+    const std::string file = *read_file(cache.path_of(key).string());
+    const size_t head = file.find('\n') + 1, begin = file.find('\n', head) + 1, end = file.find('\n', begin);
+    const std::string good = file.substr(begin, end - begin);
+    const auto find_with = [&](const std::string& report) {
+        const std::string rest = file.substr(head, begin - head) + report + file.substr(end);
+        const std::string whole = file.substr(0, head - 65) + sha256(rest).hex() + "\n" + rest;
+        EXPECT_TRUE(write_file_atomically(cache.path_of(key).string(), whole).ok());
+        return cache.find(key).has_value();
+    };
+    EXPECT_TRUE(find_with(good));
+    const auto with = [&](const std::string& field, const std::string& value) {
+        const size_t at = good.find("\"" + field + "\":") + field.size() + 3;
+        return good.substr(0, at) + value + good.substr(good.find_first_of(",}", at));
+    };
+    EXPECT_TRUE(find_with(with("loss", "1.5")));
+    for (const std::string& report : {std::string("null"), std::string("[]"), std::string("{}"), std::string("7"), std::string(),
+                                      std::string("{\"loss\":"), with("loss", "null"), with("loss", "\"1\""), with("note", "null"),
+                                      with("note", "5"), with("training_samples", "-1"), with("light_subspaces", "4294967296"),
+                                      with("eye_subspaces", "1.5"), with("capped_by_time_limit", "0")}) {
+        EXPECT_FALSE(find_with(report)) << report;
+        EXPECT_FALSE(std::filesystem::exists(cache.path_of(key))) << report;
+    }
+}
+
+TEST(Tables, TooLittleMemoryFailsTheJobAndNothingElse) {
+    TableService service([](CoordinatorOptions& o) {
+        o.read_scene = [](const AssetStore&, const JobSpec& spec, std::stop_token) -> Result<SceneFacts> {
+            if (spec.seed == 1) throw std::bad_alloc();
+            SceneFacts facts = golden_facts();
+            facts.build_scene = [seed = spec.seed, build = facts.build_scene] {
+                if (seed == 2) throw std::length_error("vector");
+                if (seed == 3) throw std::bad_alloc();
+                return build();
+            };
+            return facts;
+        };
+    });
+    for (const uint64_t seed : {1, 2, 3}) {
+        JobSpec spec = service.table_spec();
+        spec.seed = seed;
+        const std::string id = service.submit_training(spec);
+        lease_all(service);
+        const JobInfo info = service.wait_end(id);
+        EXPECT_EQ(info.state, JobState::kFailed);
+        EXPECT_NE(info.message.find("the coordinator has too little memory to " + std::string(seed == 1 ? "prepare" : "learn")),
+                  std::string::npos) << info.message;
+    }
+    EXPECT_EQ(service.coordinator->get_job(train_by_hand(service, service.table_spec()))->state, JobState::kRunning);
 }
 
 }  // namespace

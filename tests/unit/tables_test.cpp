@@ -4,8 +4,10 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include <chrono>
 #include <cstring>
 #include <limits>
+#include <thread>
 
 #include "common/tables/train_classifier.h"
 #include "common/transport/training.h"
@@ -223,15 +225,88 @@ TEST(TrainingData, BadPathsAreRefused) {
         {"light path beyond", [](TrainingData& d) { d.light_paths[0].vertex_count = 1u << 30; }},
         {"block beyond", [](TrainingData& d) { d.paths[0].block = uint32_t(d.block_sum.size()); }},
         {"emitter beyond", [&](TrainingData& d) { d.vertices[d.paths[0].first_vertex].emitter = uint32_t(emitters); }},
-        {"estimate not a number", [](TrainingData& d) { d.paths[0].estimate = kNan; }},
         {"vertex nowhere", [](TrainingData& d) { d.vertices[1].position.y = kNan; }},
-        {"density infinite", [](TrainingData& d) { d.vertices[1].density = kInfinity; }},
-        {"square infinite", [](TrainingData& d) { d.paths[0].square = kInfinity; }},
     };
     for (const auto& [name, change] : mutations) {
         TrainingData bad = good;
         change(bad);
         EXPECT_FALSE(bad.validate(emitters).ok()) << name;
+    }
+}
+
+TEST(TrainingData, PathsOutOfRangeAreLeftOutAndCounted) {
+    const auto scene = testing::diffuse_box();
+    const TrainingData good = small_data(scene);
+    ASSERT_GT(good.paths.size(), 20u);
+    ASSERT_GT(good.light_paths.size(), 1u);
+    TrainingOptions options;
+    options.light_subspaces = options.eye_subspaces = 20;
+    const auto train = [&](const TrainingData& data, TrainingReport* report) {
+        EXPECT_TRUE(data.validate(scene->emitters().all().size()).ok());
+        const Result<SubspaceTables> tables = train_tables(data, scene->emitters(), options, {}, report);
+        EXPECT_TRUE(tables.ok()) << tables.status().message();
+        return tables.ok() ? serialize(*tables) : std::string();
+    };
+    TrainingReport report;
+    train(good, &report);
+    EXPECT_EQ(report.out_of_range, 0u);
+    EXPECT_EQ(report.note.find("range"), std::string::npos) << report.note;
+    // Left out means that the rest trains as if they had never been there.
+    TrainingData without = good;
+    for (const size_t x : {3, 5, 7, 9}) without.paths[x].estimate = without.paths[x].square = 0;
+    const TrainingPath& light = good.light_paths[1];
+    for (uint32_t i = 0; i < light.vertex_count; ++i) without.vertices[light.first_vertex + i].density = 0;
+    TrainingData wild = good;
+    wild.paths[3].estimate = kNan;
+    wild.paths[5].square = kInfinity;
+    wild.vertices[wild.paths[7].first_vertex].density = kInfinity;
+    wild.vertices[wild.paths[9].first_vertex + 1].density = kNan;
+    wild.vertices[light.first_vertex].density = kInfinity;
+    TrainingReport again;
+    EXPECT_EQ(train(wild, &again), train(without, &report));
+    EXPECT_EQ(again.out_of_range, 5u);
+    const std::string all = std::to_string(good.paths.size() + good.light_paths.size());
+    EXPECT_NE(again.note.find("5 of " + all + " training paths"), std::string::npos) << again.note;
+    wild.block_sum[0] = std::numeric_limits<double>::infinity();
+    train(wild, &again);
+}
+
+TEST(TrainingData, RefusesToGrowBeyondItsIndices) {
+    const TrainingData part = small_data(testing::diffuse_box(), 60);
+    TrainingData all;
+    ASSERT_TRUE(all.append(part, 2 * part.vertices.size()).ok());
+    ASSERT_TRUE(all.append(part, 2 * part.vertices.size()).ok());
+    const Status full = all.append(part, 2 * part.vertices.size());
+    EXPECT_EQ(full.code(), StatusCode::kResourceExhausted);
+    EXPECT_NE(full.message().find("training-paths"), std::string::npos) << full.message();
+    EXPECT_EQ(all.vertices.size(), 2 * part.vertices.size()) << "nothing was taken in";
+}
+
+/// Stopped at any moment, training returns soon, whichever loop it is in.
+TEST(Training, ActsOnAStopRequestWithinASecond) {
+    const auto scene = testing::glossy();
+    const TrainingData part = small_data(scene, 4096);
+    TrainingData data;
+    for (int i = 0; i < 12; ++i) ASSERT_TRUE(data.append(part).ok());
+    for (const GammaTrainer trainer : {GammaTrainer::kMm, GammaTrainer::kAdam}) {
+        TrainingOptions options;
+        options.trainer = trainer;
+        for (const int milliseconds : {0, 20, 60, 150, 250}) {
+            std::stop_source stop;
+            std::chrono::steady_clock::time_point asked;
+            std::jthread clock([&] {
+                std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds));
+                asked = std::chrono::steady_clock::now();
+                stop.request_stop();
+            });
+            TrainingReport report;
+            const Result<SubspaceTables> tables = train_tables(data, scene->emitters(), options, stop.get_token(), &report);
+            const auto answered = std::chrono::steady_clock::now();
+            clock.join();
+            EXPECT_LT(answered - asked, std::chrono::seconds(1)) << milliseconds;
+            if (answered < asked) continue;  // a fast machine was through before
+            EXPECT_EQ(tables.status().code(), StatusCode::kCancelled) << milliseconds;
+        }
     }
 }
 
