@@ -110,7 +110,7 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, c
             work,
             WorkerOptions{.identity = *identity, .thread_count = threads, .host = "embedded", .process_id = uint64_t(::getpid())},
             [&](const UnitLease& lease, std::stop_token stop) { return renderers.renderer(lease, stop); },
-            [&](const JobSpec& job, std::stop_token stop) { return renderers.tracer(job, stop); }));
+            [&](const UnitLease& lease, std::stop_token stop) { return renderers.tracer(lease, stop); }));
         running.emplace_back([worker = workers.back().get()](std::stop_token stop) { (void)worker->run(stop); });
     }
     ClientTimes times{.import_seconds = scene->import_seconds, .digest_seconds = scene->digest_seconds};

@@ -283,8 +283,10 @@ JobInfo Coordinator::snapshot(const JobRecord& job) const {
     if (job.maker) info.waits_for = job.maker->id;
     if (job.training) {
         info.unit_leased = job.training->leased_count();
-        info.phase_total = job.training_samples;
-        info.phase_done = std::min(info.phase_total, job.training->done_count() * kTrainingUnitSamples);
+        const TrainingWork& work = job.training_work;
+        info.phase_total = work.total_samples;
+        info.phase_done =
+            work.first_sample + std::min(work.sample_count, uint64_t(job.training->done_count()) * kTrainingUnitSamples);
         if (job.phase == PreparePhase::kTracing && info.phase_done > 0)
             info.eta_seconds = seconds_between(job.training_begin, now) * double(info.phase_total - info.phase_done) /
                                double(info.phase_done);
@@ -304,7 +306,9 @@ void Coordinator::end_job(JobRecord& job, JobState state) {
     discard_training(job);
     if (job.maker) discarded_.push_back(std::move(job.maker));
     job.maker.reset();
-    drop_tables(job);
+    drop_tables(job.tables_asset);
+    drop_tables(job.guide.digest);
+    job.guide_bytes.reset();
     if (job.reducer) discarded_.push_back(std::move(job.reducer));
     discarded_.push_back(std::make_shared<std::vector<ImageLayer>>(std::move(job.layers)));
     job.reducer.reset();

@@ -124,7 +124,9 @@ class Coordinator {
     std::shared_ptr<JobRecord> find_maker(const JobRecord& job) const;
     void resume_waiting(const std::shared_ptr<JobRecord>& job);
     Status take_over_tables(JobRecord& job);
-    void open_training(JobRecord& job, UnitKind kind, uint64_t samples);
+    void open_training(JobRecord& job, UnitKind kind, const TrainingWork& work);
+    void open_first_round(JobRecord& job);
+    Status open_guided_round(JobRecord& job, const SubspaceTables& pilot);
     Status learn(JobRecord& job, std::stop_token stop);
     Result<TrainingData> collect_training(JobRecord& job, size_t emitter_count, std::stop_token stop);
     Status choose_training_samples(JobRecord& job, const TrainingData& probe, const Scene& scene, std::stop_token stop);
@@ -133,7 +135,8 @@ class Coordinator {
     bool repair_tables(const std::string& job_id);
     void discard_training(JobRecord& job);
     /// Removes the asset of an ended job's tables unless another job needs it.
-    void drop_tables(const JobRecord& job);
+    void drop_tables(const Digest& digest);
+    Status store_tables(const Digest& digest, std::string_view bytes);
     /// The open units of a kind, or null.
     static UnitTable* table_for(JobRecord& job, UnitKind kind);
     /// The units that can be leased now, or null.

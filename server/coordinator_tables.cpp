@@ -16,25 +16,6 @@
 namespace lightloom {
 namespace {
 
-constexpr const char* kTrainingPaths = "training-paths";
-constexpr auto kPoll = std::chrono::milliseconds(100);
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
-
-Status over() { return {StatusCode::kCancelled, "the job ended while its tables were made"}; }
-
-/// The spec with another size of the training set, in canonical text.
-JobSpec with_training_samples(const JobSpec& spec, uint64_t samples) {
-    JobSpec out = spec;
-    out.parameters[kTrainingPaths] = std::to_string(samples);
-    const auto algorithm = find_algorithm(out.algorithm);
-    const auto parameters = parse_parameters(**algorithm, out.parameters);
-    out.parameters = complete_parameters(**algorithm, *parameters);
-    return out;
-}
-
 uint64_t training_samples(const JobSpec& spec) {
     const auto algorithm = find_algorithm(spec.algorithm);
     return uint64_t(parameter_value(**algorithm, *parse_parameters(**algorithm, spec.parameters), kTrainingPaths));
@@ -70,11 +51,11 @@ void Coordinator::discard_training(JobRecord& job) {
     job.training.reset();
 }
 
-void Coordinator::open_training(JobRecord& job, UnitKind kind, uint64_t samples) {
+void Coordinator::open_training(JobRecord& job, UnitKind kind, const TrainingWork& work) {
     job.training.reset();
-    job.training.emplace(Plan::training(samples, kind), samples, UINT32_MAX, options_.shuffle_seed);
+    job.training.emplace(Plan::training(kind, work), work.sample_count, UINT32_MAX, options_.shuffle_seed);
     job.training_kind = kind;
-    job.training_samples = samples;
+    job.training_work = work;
     job.training_parts.clear();
     job.training_parts.resize(job.training->group_total());
     job.training_bytes = 0;
@@ -101,8 +82,12 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
         return {};
     }
     job.makes_tables = true;
-    const bool probe = open_size && samples > kMinTrainingSamples;
-    open_training(job, probe ? UnitKind::kProbe : UnitKind::kTraining, probe ? std::min(kProbeSamples, samples) : samples);
+    if (open_size && samples > kMinTrainingSamples) {
+        const uint64_t probe = std::min(kProbeSamples, samples);
+        open_training(job, UnitKind::kProbe, {0, probe, probe});
+    } else {
+        open_first_round(job);
+    }
     return {};
 }
 
@@ -164,6 +149,17 @@ bool Coordinator::adopt_cached_tables(JobRecord& job, const JobSpec& spec, const
     return true;
 }
 
+Status Coordinator::store_tables(const Digest& digest, std::string_view bytes) {
+    if (assets_.contains(digest) && !assets_.read(digest).ok()) assets_.remove(digest);
+    Status stored = assets_.put(digest, bytes);
+    // An equal job stores the same bytes at this moment.
+    for (int i = 0; i < 100 && stored.code() == StatusCode::kAborted; ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        stored = assets_.put(digest, bytes);
+    }
+    return stored;
+}
+
 Status Coordinator::adopt_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts, std::string_view bytes,
                                  TablesInfo tables) {
     const Digest digest = sha256(bytes);
@@ -173,179 +169,23 @@ Status Coordinator::adopt_tables(JobRecord& job, const JobSpec& spec, const Scen
         if (is_terminal(job.state)) return {};
         job.tables_asset = digest;  // before the bytes are there, so that no job that ends takes them away
     }
-    if (assets_.contains(digest) && !assets_.read(digest).ok()) assets_.remove(digest);
-    Status stored = assets_.put(digest, bytes);
-    // An equal job stores the same bytes at this moment.
-    for (int i = 0; i < 100 && stored.code() == StatusCode::kAborted; ++i) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(20));
-        stored = assets_.put(digest, bytes);
-    }
-    LL_RETURN_IF_ERROR(stored);
+    LL_RETURN_IF_ERROR(store_tables(digest, bytes));
     plan_units(job, spec, facts, std::move(tables));
     const std::lock_guard lock(mutex_);
-    if (is_terminal(job.state)) drop_tables(job);  // it ended while they were stored
+    job.guide_bytes.reset();
+    drop_tables(std::exchange(job.guide, {}).digest);
+    if (is_terminal(job.state)) drop_tables(digest);  // it ended while they were stored
     return {};
 }
 
-void Coordinator::drop_tables(const JobRecord& job) {
-    const Digest& digest = job.tables_asset;
+void Coordinator::drop_tables(const Digest& digest) {
     if (digest == Digest()) return;
     for (const auto& other : jobs_) {
         const bool waits = other->maker && other->maker->tables_asset == digest;
-        if (waits || (!is_terminal(other->state) && other->tables_asset == digest)) return;
+        const bool names = other->tables_asset == digest || other->guide.digest == digest;
+        if (waits || (!is_terminal(other->state) && names)) return;
     }
     assets_.remove(digest);
-}
-
-Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
-    std::function<Result<std::shared_ptr<const Scene>>()> build_scene;
-    {
-        const std::lock_guard lock(mutex_);
-        if (job.state != JobState::kPreparing) return over();
-        build_scene = job.facts.build_scene;
-    }
-    if (!build_scene) return internal_error("this coordinator cannot build the scene that tables are learned for");
-    const auto scene = build_scene();
-    if (!scene.ok()) return scene.status();
-    const EmitterSet& emitters = (*scene)->emitters();
-    build_scene = {};  // it may hold what the scene was built from
-    {
-        const std::lock_guard lock(mutex_);
-        job.facts.build_scene = {};
-    }
-
-    bool probe = true;
-    while (probe) {
-        const auto data = collect_training(job, emitters.all().size(), stop);
-        if (!data.ok()) return data.status();
-        JobSpec spec;
-        SceneFacts facts;
-        TablesInfo info;
-        {
-            const std::lock_guard lock(mutex_);
-            if (job.state != JobState::kPreparing) return over();
-            probe = job.training_kind == UnitKind::kProbe;
-            spec = job.spec;
-            if (!probe) {
-                facts = std::move(job.facts);
-                info.trace_seconds = seconds_between(job.training_begin, options_.clock());
-                info.capped_by_time_limit = job.capped_by_time_limit;
-                job.phase = PreparePhase::kLearning;
-                changed(job);
-            }
-        }
-        if (probe) {
-            LL_RETURN_IF_ERROR(choose_training_samples(job, *data, **scene, stop));
-            const std::lock_guard lock(mutex_);
-            if (job.state != JobState::kPreparing) return {};  // it found tables in the cache, or was cancelled
-            continue;
-        }
-        const auto parameters = TransportParameters::read(render_settings(spec));
-        if (!parameters.ok()) return parameters.status();
-        TrainingReport report;
-        const auto tables = train_tables(*data, emitters, parameters->training, stop, &report);
-        if (!tables.ok()) return tables.status();
-        info.light_subspaces = tables->light_count;
-        info.eye_subspaces = tables->eye_count;
-        info.training_samples = data->samples;
-        info.classifier_seconds = report.classifier_seconds;
-        info.energy_seconds = report.energy_seconds;
-        info.gamma_seconds = report.gamma_seconds;
-        info.uniform_loss = report.gamma.uniform_loss;
-        info.loss = report.gamma.loss;
-        info.prior_strength = report.gamma.prior_strength;
-        info.note = report.note;
-        info.cache_key = table_key(options_.identity, spec);
-        const std::string bytes = serialize(*tables);
-        table_cache_.store(info.cache_key, bytes, info);
-        spdlog::info("{}: tables of {} x {} subspaces from {} samples; {:.2f} s traced, {:.2f} s learned{}{}", job.id,
-                     info.light_subspaces, info.eye_subspaces, info.training_samples, info.trace_seconds,
-                     info.classifier_seconds + info.energy_seconds + info.gamma_seconds,
-                     info.note.empty() ? "" : "; ", info.note);
-        LL_RETURN_IF_ERROR(adopt_tables(job, spec, facts, bytes, std::move(info)));
-    }
-    return {};
-}
-
-Result<TrainingData> Coordinator::collect_training(JobRecord& job, size_t emitter_count, std::stop_token stop) {
-    std::unique_lock lock(mutex_);
-    for (;;) {
-        const auto alive = [&] { return job.state == JobState::kPreparing && !stop.stop_requested(); };
-        const auto complete = [&] { return job.training->done_count() == job.training->group_total(); };
-        work_changed_.wait_for(lock, kPoll, [&] { return !alive() || complete(); });
-        if (!alive()) return over();
-        if (!complete()) continue;
-        auto parts = std::move(job.training_parts);
-        const UnitKind kind = job.training_kind;
-        lock.unlock();
-        // Digest and size were right; a worker whose data are nonsense all the same loses its unit.
-        std::vector<std::pair<uint32_t, Status>> bad;
-        for (uint32_t i = 0; i < parts.size(); ++i)
-            if (Status s = parts[i].data->validate(emitter_count); !s.ok()) bad.emplace_back(i, std::move(s));
-        if (bad.empty()) {
-            TrainingData all;
-            for (auto& part : parts) {
-                if (stop.stop_requested()) return over();
-                if (const Status s = all.append(*part.data); !s.ok()) return s;
-                part.data.reset();
-            }
-            return all;
-        }
-        lock.lock();
-        for (const auto& [unit, why] : bad) {
-            if (!alive()) return over();
-            job.training_bytes -= parts[unit].bytes;
-            job.traced_seconds -= parts[unit].seconds;
-            parts[unit] = {};
-            ++job.rejected;
-            const UnitKey key{unit, 0, kind};
-            unit_failed(job, key, job.training->reopen(key), why);
-        }
-        if (!alive()) return over();
-        job.training_parts = std::move(parts);
-    }
-}
-
-Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& probe, const Scene& scene, std::stop_token stop) {
-    JobSpec spec;
-    SceneFacts facts;
-    double traced = 0;
-    size_t crew = 0;
-    {
-        const std::lock_guard lock(mutex_);
-        if (job.state != JobState::kPreparing) return over();
-        spec = job.spec;
-        facts = job.facts;
-        traced = job.traced_seconds;
-        const TimePoint now = options_.clock();
-        for (const auto& w : workers_) crew += !w->left && seconds_between(w->last_heard, now) <= options_.lease_seconds;
-    }
-    const auto parameters = TransportParameters::read(render_settings(spec));
-    if (!parameters.ok()) return parameters.status();
-    const auto begin = Clock::now();
-    TrainingReport report;
-    const auto tables = train_tables(probe, scene.emitters(), parameters->training, stop, &report);
-    if (!tables.ok()) return tables.status();
-    const double learned = seconds_since(begin), samples = double(std::max<uint64_t>(1, probe.samples));
-    const double budget = kTrainingShare * spec.time_limit_seconds - traced - learned;
-    const uint64_t wanted = training_samples(spec);
-    const TrainingRate rate{traced / samples / double(std::max<size_t>(1, crew)), learned / samples};
-    const uint64_t chosen = affordable_training_samples(rate, budget, wanted);
-    spec = with_training_samples(spec, chosen);
-    spdlog::info("{}: the time limit has room for {} of {} training samples", job.id, chosen, wanted);
-    {
-        const std::lock_guard lock(mutex_);
-        if (job.state != JobState::kPreparing) return over();
-        job.capped_by_time_limit = chosen < wanted;
-        job.table_key = table_key(options_.identity, spec);
-    }
-    if (chosen < wanted && adopt_cached_tables(job, spec, facts)) return {};
-    const std::lock_guard lock(mutex_);
-    if (job.state != JobState::kPreparing) return over();
-    job.spec = std::move(spec);
-    job.training_begin = options_.clock();
-    open_training(job, UnitKind::kTraining, chosen);
-    return {};
 }
 
 Result<uint64_t> Coordinator::expected_training_bytes(const UnitReference& reference) const {
@@ -413,23 +253,29 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
 
 bool Coordinator::repair_tables(const std::string& job_id) {
     std::shared_ptr<JobRecord> job;
-    TablesInfo tables;
+    std::shared_ptr<const std::string> guide;
+    AssetReference asset;
+    Digest cache_key;
     {
         const std::lock_guard lock(mutex_);
         job = find_job(job_id);
-        if (!job || job->state != JobState::kRunning) return false;
-        tables = job->tables;
+        if (!job || is_terminal(job->state)) return false;
+        guide = job->guide_bytes;
+        asset = guide ? job->guide : job->tables.asset;
+        cache_key = job->tables.cache_key;
     }
-    const Digest& digest = tables.asset.digest;
-    if (tables.asset.size_bytes == 0) return false;
+    const Digest& digest = asset.digest;
+    if (asset.size_bytes == 0) return false;
     const std::lock_guard only_one(repair_mutex_);
     if (assets_.read(digest).ok()) return false;  // the worker's own trouble, or repaired meanwhile
     assets_.remove(digest);
-    const auto entry = table_cache_.find(tables.cache_key);
-    const bool same = entry && entry->info.asset.digest == digest;
-    const Status stored = same ? assets_.put(digest, entry->bytes) : data_loss("no other copy is left; submit the job again");
+    const auto entry = guide ? std::nullopt : table_cache_.find(cache_key);
+    const bool cached = entry && entry->info.asset.digest == digest;
+    const Status stored = guide    ? assets_.put(digest, *guide)
+                          : cached ? assets_.put(digest, entry->bytes)
+                                   : data_loss("no other copy is left; submit the job again");
     if (stored.ok() || stored.code() == StatusCode::kAborted) {
-        spdlog::warn("{}: tables {} were damaged on disk and are restored from the cache", job_id, digest.hex().substr(0, 12));
+        spdlog::warn("{}: tables {} were damaged on disk and are restored", job_id, digest.hex().substr(0, 12));
         return true;
     }
     const std::lock_guard lock(mutex_);

@@ -71,7 +71,7 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
                          [&] { return learn(record, stop); });
             });
         }
-        return UnitLease{job->id, job->spec, *unit, {}};
+        return UnitLease{job->id, job->spec, *unit, job->guide};
     }
     return std::nullopt;
 }

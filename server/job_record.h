@@ -58,7 +58,7 @@ struct Coordinator::JobRecord {
     SceneFacts facts;                   ///< From the reading of the scene until the units are planned.
     std::optional<UnitTable> training;  ///< Units of kind `training_kind`, in kPreparing.
     UnitKind training_kind = UnitKind::kTraining;
-    uint64_t training_samples = 0;
+    TrainingWork training_work;         ///< What of the set these units trace.
     struct TrainingPart {
         std::optional<TrainingData> data;
         uint64_t bytes = 0;   ///< As it came.
@@ -67,6 +67,8 @@ struct Coordinator::JobRecord {
     std::vector<TrainingPart> training_parts;  ///< By unit.
     uint64_t training_bytes = 0;        ///< Of these.
     double traced_seconds = 0;          ///< Of the workers, over these.
+    AssetReference guide;               ///< Tables that the training units read; empty for pilots and probes.
+    std::shared_ptr<const std::string> guide_bytes;  ///< Of these, should the disk lose them.
     bool capped_by_time_limit = false;
     Digest table_key;                   ///< Of the tables that the job needs; set before `makes_tables` or `maker`.
     bool makes_tables = false;          ///< It probes, traces and learns itself.

@@ -178,14 +178,21 @@ Result<std::shared_ptr<const Renderer>> RendererCache::renderer(const UnitLease&
     return shared;
 }
 
-Result<TrainingTracer> RendererCache::tracer(const JobSpec& spec, std::stop_token stop) {
+Result<TrainingTracer> RendererCache::tracer(const UnitLease& lease, std::stop_token stop) {
+    const Digest image = lease.spec.image_digest();
     const std::lock_guard lock(mutex_);
-    const auto built = scene(spec, stop);
+    if (tracer_ && tracer_image_ == image && tracer_guide_ == lease.tables.digest) return tracer_;
+    const auto built = scene(lease.spec, stop);
     if (!built.ok()) return built.status();
-    return TrainingTracer(
-        [scene = *built, settings = render_settings(spec)](const TrainingWork& work, std::stop_token unit_stop) {
-            return trace_training(*scene, settings, work, unit_stop);
-        });
+    const auto guide = tables(lease, **built, stop);
+    if (!guide.ok()) return guide.status();
+    auto generator = TrainingGenerator::create(**built, render_settings(lease.spec), guide->get());
+    if (!generator.ok()) return generator.status();
+    tracer_image_ = image, tracer_guide_ = lease.tables.digest;
+    tracer_ = [scene = *built, generator = *std::move(generator)](const TrainingWork& work, std::stop_token unit_stop) {
+        return generator.trace(work, unit_stop);
+    };
+    return tracer_;
 }
 
 }  // namespace lightloom

@@ -35,13 +35,14 @@ class SceneFetcher {
     AssetStore store_;
 };
 
-/// Keeps the last few scenes and renderers.
+/// Keeps the last few scenes and renderers, and the last tracer.
 class RendererCache {
   public:
     RendererCache(SceneSource scenes, TableSource tables) : scenes_(std::move(scenes)), tables_(std::move(tables)) {}
     /// Fails, naming the tables, when they cannot be had or do not fit the scene.
     Result<std::shared_ptr<const Renderer>> renderer(const UnitLease& lease, std::stop_token stop);
-    Result<TrainingTracer> tracer(const JobSpec& spec, std::stop_token stop);
+    /// The same for the tables that guide a training unit, if it has any.
+    Result<TrainingTracer> tracer(const UnitLease& lease, std::stop_token stop);
 
   private:
     Result<std::shared_ptr<const Scene>> scene(const JobSpec& spec, std::stop_token stop);
@@ -61,6 +62,8 @@ class RendererCache {
     TableSource tables_;
     std::list<SceneEntry> scene_entries_;        // most recent first
     std::list<RendererEntry> renderer_entries_;  // most recent first
+    Digest tracer_image_, tracer_guide_;         // of the last tracer
+    TrainingTracer tracer_;
 };
 
 }  // namespace lightloom

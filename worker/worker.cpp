@@ -195,7 +195,7 @@ Status Worker::render_unit(const UnitLease& lease, std::stop_token unit_stop, st
 }
 
 Status Worker::trace_unit(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain) {
-    const auto tracer = tracers_(lease.spec, unit_stop);
+    const auto tracer = tracers_(lease, unit_stop);
     if (!tracer.ok()) return tracer.status();
     Result<TrainingData> data = internal_error("not traced");
     const auto seconds = in_turn(lease, unit_stop, drain, [&] { data = (*tracer)(lease.unit.training, unit_stop); });

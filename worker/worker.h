@@ -23,7 +23,7 @@ namespace lightloom {
 using RendererSource = std::function<Result<std::shared_ptr<const Renderer>>(const UnitLease& lease, std::stop_token stop)>;
 /// Traces a training unit of a job; the same holds for what it needs.
 using TrainingTracer = std::function<Result<TrainingData>(const TrainingWork& work, std::stop_token stop)>;
-using TracerSource = std::function<Result<TrainingTracer>(const JobSpec& spec, std::stop_token stop)>;
+using TracerSource = std::function<Result<TrainingTracer>(const UnitLease& lease, std::stop_token stop)>;
 
 struct WorkerOptions {
     BuildIdentity identity;

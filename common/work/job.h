@@ -40,6 +40,7 @@ enum class UnitKind : uint8_t {
     kRender,    ///< A partial of the image.
     kTraining,  ///< Paths that the job's tables are learned from; never part of an image.
     kProbe,     ///< The same, only to measure how many of them a time-limited job can afford.
+    kPilot,     ///< The same, for the first tables, which guide the tracing of kTraining; see TrainingGenerator.
 };
 
 /// Identity of a unit inside a job. Units of one group complete one another: their techniques' weights sum to one only
@@ -60,7 +61,7 @@ struct WorkUnit {
     /// the plan. `first_light_path` numbers them within the group.
     uint64_t first_light_path = 0;
     uint64_t light_path_count = 0;
-    TrainingWork training = {};  ///< Kinds kTraining and kProbe only.
+    TrainingWork training = {};  ///< All kinds but kRender.
 };
 
 /// One full-frame group of iterations.
@@ -93,9 +94,9 @@ class Plan {
     /// `light_paths_per_pixel` is N1, in light paths per pixel and iteration (0 for algorithms that splat nothing).
     /// `whole_frame` forbids tiles (stratified pairing, photon maps).
     Plan(const FrameLayout& frame, double light_paths_per_pixel, bool whole_frame = false);
-    /// The plan of a training set of `samples`: group i is the unit of samples i * kTrainingUnitSamples onwards, its iterations are
-    /// samples.
-    static Plan training(uint64_t samples, UnitKind kind);
+    /// The plan of a part of a training set, `work`: group i is the unit of its samples i * kTrainingUnitSamples onwards, its
+    /// iterations are samples.
+    static Plan training(UnitKind kind, const TrainingWork& work);
 
     /// Group `index` of an unbounded job.
     Group group(uint32_t index) const;
@@ -116,7 +117,7 @@ class Plan {
     std::vector<Rect> tiles_;
     uint32_t max_group_iterations_ = 1;
     UnitKind kind_ = UnitKind::kRender;
-    uint64_t training_samples_ = 0;
+    TrainingWork training_;
 };
 
 }  // namespace lightloom

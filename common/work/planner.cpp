@@ -69,19 +69,19 @@ Plan::Plan(const FrameLayout& frame, double light_paths_per_pixel, bool whole_fr
     max_group_iterations_ = uint32_t(std::max<int64_t>(1, kUnitSamples / largest));
 }
 
-Plan Plan::training(uint64_t samples, UnitKind kind) {
+Plan Plan::training(UnitKind kind, const TrainingWork& work) {
     Plan plan;
     plan.tiles_.resize(1);
     plan.max_group_iterations_ = uint32_t(kTrainingUnitSamples);
     plan.kind_ = kind;
-    plan.training_samples_ = samples;
+    plan.training_ = work;
     return plan;
 }
 
 Group Plan::group(uint32_t index) const {
     if (kind_ != UnitKind::kRender) {
-        const uint64_t first = std::min(uint64_t(index) * kTrainingUnitSamples, training_samples_);
-        return {index, first, uint32_t(std::min(kTrainingUnitSamples, training_samples_ - first))};
+        const uint64_t first = std::min(uint64_t(index) * kTrainingUnitSamples, training_.sample_count);
+        return {index, first, uint32_t(std::min(kTrainingUnitSamples, training_.sample_count - first))};
     }
     uint64_t done = 0;
     for (uint32_t i = 0; i < index; ++i) {
@@ -122,7 +122,7 @@ uint32_t Plan::group_count(uint64_t iterations) const {
 std::vector<WorkUnit> Plan::units(const Group& group) const {
     if (kind_ != UnitKind::kRender) {
         return {{.key = {group.index, 0, kind_},
-                 .training = {group.first_iteration, group.iteration_count, training_samples_}}};
+                 .training = {training_.first_sample + group.first_iteration, group.iteration_count, training_.total_samples}}};
     }
     return split_group(group, tiles_, light_paths_per_pixel_);
 }

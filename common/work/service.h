@@ -153,7 +153,7 @@ class WorkerPort {
                                                          const std::vector<RunningUnit>& running) = 0;
     virtual Result<SubmitAck> submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial,
                                             double render_seconds) = 0;
-    /// The serialized training data of a unit of kind kTraining or kProbe.
+    /// The serialized training data of a unit of any kind but kRender.
     virtual Result<SubmitAck> submit_training(const std::string& worker_id, const UnitLease& lease, std::string_view payload,
                                               double trace_seconds) = 0;
     virtual Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why) = 0;

@@ -23,7 +23,7 @@ void put_key(const UnitKey& in, v1::UnitKey* out) {
 }
 
 Result<UnitKey> get_key(const v1::UnitKey& in) {
-    if (in.kind() < v1::UNIT_KIND_RENDER || in.kind() > v1::UNIT_KIND_PROBE)
+    if (in.kind() < v1::UNIT_KIND_RENDER || in.kind() > v1::UNIT_KIND_PILOT)
         return invalid_argument("a unit of unknown kind; install the same build on both hosts");
     return UnitKey{in.group(), in.tile(), UnitKind(int(in.kind()) - 1)};
 }

@@ -144,7 +144,7 @@ class LightCrew {
         workers_.push_back(std::make_unique<Worker>(
             p, WorkerOptions{.identity = identity, .thread_count = 1, .host = "h", .process_id = workers_.size()},
             [&](const UnitLease& lease, std::stop_token stop) { return cache.renderer(lease, stop); },
-            [&](const JobSpec& spec, std::stop_token stop) { return cache.tracer(spec, stop); }));
+            [&](const UnitLease& lease, std::stop_token stop) { return cache.tracer(lease, stop); }));
         threads_.emplace_back([w = workers_.back().get()](std::stop_token stop) { EXPECT_TRUE(w->run(stop).ok()); });
     }
     ~LightCrew() {
@@ -181,11 +181,10 @@ JobInfo run(int workers, bool over_grpc, const std::function<JobSpec(const Table
 }
 
 TEST(Broadcast, BytesDoNotDependOnWhoTracedAndRendered) {
-    for (const char* algorithm : {"spcbpt", "lvcbpt"}) {
+    for (const std::string algorithm : {"spcbpt", "spcbpt, one round", "lvcbpt"}) {
         const auto spec = [&](const TableService& service) {
-            JobSpec s = service.table_spec(6);
-            s.algorithm = algorithm;
-            if (s.algorithm == "lvcbpt") s.parameters = {{"training-paths", "20000"}, {"cache", "500"}};
+            JobSpec s = algorithm == "spcbpt" ? service.guided_spec(6) : service.table_spec(6);
+            if (algorithm == "lvcbpt") s.algorithm = algorithm, s.parameters = {{"training-paths", "20000"}, {"cache", "500"}};
             return s;
         };
         const JobInfo reference = run(1, false, spec);

@@ -82,7 +82,7 @@ inline RendererSource fake_renderers(double seconds = 0) {
 
 /// For workers that never see a training unit.
 inline TracerSource no_tracers() {
-    return [](const JobSpec&, std::stop_token) -> Result<TrainingTracer> { return internal_error("no light here"); };
+    return [](const UnitLease&, std::stop_token) -> Result<TrainingTracer> { return internal_error("no light here"); };
 }
 
 struct FakeService {

@@ -42,7 +42,13 @@ struct TableService : FakeService {
     JobSpec table_spec(uint32_t spp = 2) const {
         JobSpec s = spec(spp);
         s.algorithm = "spcbpt";
-        s.parameters = {{"training-paths", std::to_string(kSamples)}, {"cache", "500"}, {"light-subspaces", "40"}, {"eye-subspaces", "20"}};
+        s.parameters = {{"training-paths", std::to_string(kSamples)}, {"cache", "500"}, {"light-subspaces", "40"}, {"eye-subspaces", "20"}, {"pilot", "0"}};
+        return s;
+    }
+    /// The same, with a pilot of one unit and a guided round of two.
+    JobSpec guided_spec(uint32_t spp = 2) const {
+        JobSpec s = table_spec(spp);
+        s.parameters.erase("pilot");
         return s;
     }
     std::string submit_now(const JobSpec& s) {

@@ -1,0 +1,218 @@
+// How the coordinator learns tables: it waits for the training units of a job, chooses the size of the set where a time limit asks
+// for it, and trains in one or two rounds (see TrainingGenerator).
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "common/transport/catalog.h"
+#include "common/transport/parameters.h"
+#include "server/job_record.h"
+#include "server/training_budget.h"
+
+namespace lightloom {
+namespace {
+
+constexpr auto kPoll = std::chrono::milliseconds(100);
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+Status over() { return {StatusCode::kCancelled, "the job ended while its tables were made"}; }
+
+/// The spec with another size of the training set, in canonical text.
+JobSpec with_training_samples(const JobSpec& spec, uint64_t samples) {
+    JobSpec out = spec;
+    out.parameters[kTrainingPaths] = std::to_string(samples);
+    const auto algorithm = find_algorithm(out.algorithm);
+    const auto parameters = parse_parameters(**algorithm, out.parameters);
+    out.parameters = complete_parameters(**algorithm, *parameters);
+    return out;
+}
+
+}  // namespace
+
+Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
+    std::function<Result<std::shared_ptr<const Scene>>()> build_scene;
+    {
+        const std::lock_guard lock(mutex_);
+        if (job.state != JobState::kPreparing) return over();
+        build_scene = job.facts.build_scene;
+    }
+    if (!build_scene) return internal_error("this coordinator cannot build the scene that tables are learned for");
+    const auto scene = build_scene();
+    if (!scene.ok()) return scene.status();
+    const EmitterSet& emitters = (*scene)->emitters();
+    build_scene = {};  // it may hold what the scene was built from
+    {
+        const std::lock_guard lock(mutex_);
+        job.facts.build_scene = {};
+    }
+
+    TablesInfo info;  // of both rounds
+    for (;;) {
+        const auto data = collect_training(job, emitters.all().size(), stop);
+        if (!data.ok()) return data.status();
+        JobSpec spec;
+        UnitKind kind;
+        {
+            const std::lock_guard lock(mutex_);
+            if (job.state != JobState::kPreparing) return over();
+            spec = job.spec;
+            kind = job.training_kind;
+        }
+        if (kind == UnitKind::kProbe) {
+            LL_RETURN_IF_ERROR(choose_training_samples(job, *data, **scene, stop));
+            const std::lock_guard lock(mutex_);
+            if (job.state != JobState::kPreparing) return {};  // it found tables in the cache, or was cancelled
+            continue;
+        }
+        SceneFacts facts;
+        {
+            const std::lock_guard lock(mutex_);
+            if (job.state != JobState::kPreparing) return over();
+            if (kind == UnitKind::kTraining) facts = std::move(job.facts);
+            info.trace_seconds = seconds_between(job.training_begin, options_.clock()) - info.classifier_seconds -
+                                 info.energy_seconds - info.gamma_seconds;
+            info.capped_by_time_limit = job.capped_by_time_limit;
+            job.phase = PreparePhase::kLearning;
+            changed(job);
+        }
+        const auto parameters = TransportParameters::read(render_settings(spec));
+        if (!parameters.ok()) return parameters.status();
+        TrainingReport report;
+        const auto tables = train_tables(*data, emitters, parameters->training, stop, &report);
+        if (!tables.ok()) return tables.status();
+        info.training_samples += data->samples;
+        info.classifier_seconds += report.classifier_seconds;
+        info.energy_seconds += report.energy_seconds;
+        info.gamma_seconds += report.gamma_seconds;
+        if (kind == UnitKind::kPilot) {
+            LL_RETURN_IF_ERROR(open_guided_round(job, *tables));
+            continue;
+        }
+        info.light_subspaces = tables->light_count;
+        info.eye_subspaces = tables->eye_count;
+        info.uniform_loss = report.gamma.uniform_loss;
+        info.loss = report.gamma.loss;
+        info.prior_strength = report.gamma.prior_strength;
+        info.note = report.note;
+        info.cache_key = table_key(options_.identity, spec);
+        const std::string bytes = serialize(*tables);
+        table_cache_.store(info.cache_key, bytes, info);
+        spdlog::info("{}: tables of {} x {} subspaces from {} samples; {:.2f} s traced, {:.2f} s learned{}{}", job.id,
+                     info.light_subspaces, info.eye_subspaces, info.training_samples, info.trace_seconds,
+                     info.classifier_seconds + info.energy_seconds + info.gamma_seconds,
+                     info.note.empty() ? "" : "; ", info.note);
+        return adopt_tables(job, spec, facts, bytes, std::move(info));
+    }
+}
+
+void Coordinator::open_first_round(JobRecord& job) {
+    const auto parameters = TransportParameters::read(render_settings(job.spec));  // was read before: valid
+    const uint64_t samples = parameters->training_samples, pilot = parameters->pilot_samples;
+    open_training(job, pilot > 0 ? UnitKind::kPilot : UnitKind::kTraining, {0, pilot > 0 ? pilot : samples, samples});
+}
+
+Status Coordinator::open_guided_round(JobRecord& job, const SubspaceTables& pilot) {
+    auto bytes = std::make_shared<const std::string>(serialize(pilot));
+    const Digest digest = sha256(*bytes);
+    {
+        const std::lock_guard lock(mutex_);
+        if (job.state != JobState::kPreparing) return over();
+        job.guide = {digest, bytes->size()};  // before the bytes are there, so that no job that ends takes them away
+        job.guide_bytes = bytes;
+    }
+    LL_RETURN_IF_ERROR(store_tables(digest, *bytes));
+    const std::lock_guard lock(mutex_);
+    if (job.state != JobState::kPreparing) return drop_tables(digest), over();
+    const uint64_t total = job.training_work.total_samples, first = job.training_work.sample_count;
+    open_training(job, UnitKind::kTraining, {first, total - first, total});
+    return {};
+}
+
+Result<TrainingData> Coordinator::collect_training(JobRecord& job, size_t emitter_count, std::stop_token stop) {
+    std::unique_lock lock(mutex_);
+    for (;;) {
+        const auto alive = [&] { return job.state == JobState::kPreparing && !stop.stop_requested(); };
+        const auto complete = [&] { return job.training->done_count() == job.training->group_total(); };
+        work_changed_.wait_for(lock, kPoll, [&] { return !alive() || complete(); });
+        if (!alive()) return over();
+        if (!complete()) continue;
+        auto parts = std::move(job.training_parts);
+        const UnitKind kind = job.training_kind;
+        lock.unlock();
+        // Digest and size were right; a worker whose data are nonsense all the same loses its unit.
+        std::vector<std::pair<uint32_t, Status>> bad;
+        for (uint32_t i = 0; i < parts.size(); ++i)
+            if (Status s = parts[i].data->validate(emitter_count); !s.ok()) bad.emplace_back(i, std::move(s));
+        if (bad.empty()) {
+            TrainingData all;
+            for (auto& part : parts) {
+                if (stop.stop_requested()) return over();
+                if (const Status s = all.append(*part.data); !s.ok()) return s;
+                part.data.reset();
+            }
+            return all;
+        }
+        lock.lock();
+        for (const auto& [unit, why] : bad) {
+            if (!alive()) return over();
+            job.training_bytes -= parts[unit].bytes;
+            job.traced_seconds -= parts[unit].seconds;
+            parts[unit] = {};
+            ++job.rejected;
+            const UnitKey key{unit, 0, kind};
+            unit_failed(job, key, job.training->reopen(key), why);
+        }
+        if (!alive()) return over();
+        job.training_parts = std::move(parts);
+    }
+}
+
+Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& probe, const Scene& scene, std::stop_token stop) {
+    JobSpec spec;
+    SceneFacts facts;
+    double traced = 0;
+    size_t crew = 0;
+    {
+        const std::lock_guard lock(mutex_);
+        if (job.state != JobState::kPreparing) return over();
+        spec = job.spec;
+        facts = job.facts;
+        traced = job.traced_seconds;
+        const TimePoint now = options_.clock();
+        for (const auto& w : workers_) crew += !w->left && seconds_between(w->last_heard, now) <= options_.lease_seconds;
+    }
+    const auto parameters = TransportParameters::read(render_settings(spec));
+    if (!parameters.ok()) return parameters.status();
+    const auto begin = Clock::now();
+    TrainingReport report;
+    const auto tables = train_tables(probe, scene.emitters(), parameters->training, stop, &report);
+    if (!tables.ok()) return tables.status();
+    const double learned = seconds_since(begin), samples = double(std::max<uint64_t>(1, probe.samples));
+    const double budget = kTrainingShare * spec.time_limit_seconds - traced - learned;
+    const uint64_t wanted = parameters->training_samples;
+    const double rounds = parameters->pilot_samples > 0 ? kGuidedCost : 1;
+    const TrainingRate rate{rounds * traced / samples / double(std::max<size_t>(1, crew)), rounds * learned / samples};
+    const uint64_t chosen = affordable_training_samples(rate, budget, wanted);
+    spec = with_training_samples(spec, chosen);
+    spdlog::info("{}: the time limit has room for {} of {} training samples", job.id, chosen, wanted);
+    {
+        const std::lock_guard lock(mutex_);
+        if (job.state != JobState::kPreparing) return over();
+        job.capped_by_time_limit = chosen < wanted;
+        job.table_key = table_key(options_.identity, spec);
+    }
+    if (chosen < wanted && adopt_cached_tables(job, spec, facts)) return {};
+    const std::lock_guard lock(mutex_);
+    if (job.state != JobState::kPreparing) return over();
+    job.spec = std::move(spec);
+    job.training_begin = options_.clock();
+    open_first_round(job);
+    return {};
+}
+
+}  // namespace lightloom

@@ -1,0 +1,94 @@
+// Training in two rounds: a pilot, whose tables go out as those of a render do, and the round that they guide.
+
+#include "tests/service/table_service.h"
+
+namespace lightloom::testing {
+namespace {
+
+/// Delivers the pilot of a job and takes all units of the round that it guides.
+std::vector<std::pair<std::string, UnitLease>> deliver_pilot(TableService& service) {
+    const auto pilot = lease_all(service);
+    EXPECT_EQ(pilot.size(), 1u);
+    for (const auto& [worker, lease] : pilot) {
+        EXPECT_EQ(lease.unit.key.kind, UnitKind::kPilot);
+        EXPECT_EQ(lease.tables.size_bytes, 0u);
+        EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
+    }
+    std::vector<std::pair<std::string, UnitLease>> units;
+    for (int i = 0; i < 500 && units.empty(); ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        units = lease_all(service);
+    }
+    return units;
+}
+
+std::string guided(TableService& service, const UnitLease& lease) {
+    const auto bytes = service.coordinator->assets().read(lease.tables.digest);
+    if (!bytes.ok()) throw std::runtime_error(bytes.status().message());
+    const auto tables = parse_tables(*bytes);
+    const auto generator = TrainingGenerator::create(*golden(), render_settings(lease.spec), &*tables);
+    return serialize(*generator->trace(lease.unit.training, {}));
+}
+
+TEST(GuidedTables, AreThoseOfASingleMachine) {
+    TableService service({}, 1);
+    const std::string id = service.submit_training(service.guided_spec());
+    EXPECT_EQ(service.coordinator->get_job(id)->phase_total, kSamples) << "progress is that of the whole set";
+    auto units = deliver_pilot(service);
+    ASSERT_EQ(units.size(), 2u);
+    const Digest guide = units[0].second.tables.digest;
+    uint64_t samples = 0;
+    for (const auto& [worker, lease] : units) {
+        EXPECT_EQ(lease.unit.key.kind, UnitKind::kTraining);
+        EXPECT_EQ(lease.tables.digest, guide);
+        EXPECT_GE(lease.unit.training.first_sample, kTrainingUnitSamples);
+        samples += lease.unit.training.sample_count;
+        // What belongs to the round before is not mistaken for a result of this one.
+        UnitLease late = lease;
+        late.unit.key.kind = UnitKind::kPilot;
+        EXPECT_EQ(service.give(worker, late, guided(service, lease)).outcome, SubmitOutcome::kStale);
+    }
+    EXPECT_EQ(samples, kSamples - kTrainingUnitSamples);
+    std::reverse(units.begin(), units.end());
+    for (const auto& [worker, lease] : units)
+        EXPECT_EQ(service.give(worker, lease, guided(service, lease)).outcome, SubmitOutcome::kAccepted);
+    const JobInfo info = service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
+    ASSERT_EQ(info.state, JobState::kRunning) << info.message;
+    EXPECT_EQ(info.tables.training_samples, kSamples);
+    EXPECT_EQ(info.tables.asset.digest, tables_alone(service.guided_spec()));
+    EXPECT_FALSE(service.coordinator->assets().contains(guide)) << "nobody needs it any more";
+    ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
+}
+
+TEST(GuidedTables, AreCancelledInTheSecondRoundWithoutATrace) {
+    TableService service;
+    const std::string id = service.submit_training(service.guided_spec());
+    const auto units = deliver_pilot(service);
+    ASSERT_FALSE(units.empty());
+    const Digest guide = units[0].second.tables.digest;
+    EXPECT_TRUE(service.coordinator->assets().contains(guide));
+    ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
+    EXPECT_FALSE(service.coordinator->assets().contains(guide));
+    EXPECT_EQ(service.give(units[0].first, units[0].second, "late").outcome, SubmitOutcome::kStale);
+}
+
+TEST(GuidedTables, AGuideThatTheDiskHasLostIsRestored) {
+    TableService service;
+    const std::string id = service.submit_training(service.guided_spec());
+    const auto units = deliver_pilot(service);
+    ASSERT_EQ(units.size(), 2u);
+    const auto& [worker, lease] = units[0];
+    const auto path = service.coordinator->assets().path_of(lease.tables.digest);
+    ASSERT_TRUE(write_file_atomically(path.string(), "not what it was").ok());
+    ASSERT_FALSE(service.coordinator->assets().read(lease.tables.digest).ok());
+    ASSERT_TRUE(service.coordinator->release_unit(worker, lease.reference(), data_loss("damaged")).ok());
+    EXPECT_TRUE(service.coordinator->assets().read(lease.tables.digest).ok());
+    EXPECT_EQ(service.give(units[1].first, units[1].second, guided(service, units[1].second)).outcome, SubmitOutcome::kAccepted);
+    for (const auto& [who, unit] : lease_all(service))
+        EXPECT_EQ(service.give(who, unit, guided(service, unit)).outcome, SubmitOutcome::kAccepted);
+    EXPECT_EQ(service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; }).state, JobState::kRunning);
+    ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
+}
+
+}  // namespace
+}  // namespace lightloom::testing
