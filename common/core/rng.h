@@ -24,6 +24,7 @@ enum class Stage : uint32_t {
     kPairing = 5,
     kTraining = 6,
     kLightPool = 7,
+    kLightScramble = 8,
 };
 
 /// The identity of one stream: (job seed, stage, iteration, index of pixel or path).

@@ -36,8 +36,8 @@ void trace_bdpt_sample(SampleContext& context, LightDone&& light_done, Contribut
     const Scene& scene = context.scene;
     PathVertex *y = context.light_path_vertices, *z = context.camera_path;
     PathView view;
-    Rng rng({context.seed, Stage::kLight, context.group_iteration, context.light_path});
-    const int n = trace_light_path(scene, rng, context.max_edges, context.roulette, y, &context.counters);
+    LightSampler light_sampler({context.seed, Stage::kLight, context.group_iteration, context.light_path});
+    const int n = trace_light_path(scene, light_sampler, context.max_edges, context.roulette, y, &context.counters);
     light_done(y, n);
     const auto from_light = [&](const Rgb& value, int s, int t, Vec2 film) {
         contribute(PathContribution{value, 1, s, t, y, z, y[0].p, y[0].ng, uint32_t(y[0].emitter), film}, view);
@@ -45,7 +45,7 @@ void trace_bdpt_sample(SampleContext& context, LightDone&& light_done, Contribut
     for (int s = 2; s <= n; ++s) {
         if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
         Vec2 film;
-        z[0].p = scene.camera().sample_lens(rng.uniform2());
+        z[0].p = scene.camera().sample_lens(light_sampler.rng().uniform2());
         const Rgb c = connect_to_camera(scene, y, s, z[0].p, &film, &view, &context.counters);
         if (!c.is_black()) from_light(c, s, 1, film);
     }

@@ -23,13 +23,13 @@ struct LightAlgorithm {
     Rgb sample(SampleContext& context) const {
         const Scene& scene = context.scene;
         PathVertex* y = context.light_path_vertices;
-        Rng rng({context.seed, Stage::kLight, context.group_iteration, context.light_path});
-        const int n = trace_light_path(scene, rng, context.max_edges, context.roulette, y, &context.counters);
+        LightSampler light_sampler({context.seed, Stage::kLight, context.group_iteration, context.light_path});
+        const int n = trace_light_path(scene, light_sampler, context.max_edges, context.roulette, y, &context.counters);
         PathView view;
         for (int s = 2; s <= n; ++s) {
             if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
             Vec2 film;
-            const Vec3 lens = scene.camera().sample_lens(rng.uniform2());
+            const Vec3 lens = scene.camera().sample_lens(light_sampler.rng().uniform2());
             const Rgb contribution = connect_to_camera(scene, y, s, lens, &film, &view, &context.counters);
             if (!contribution.is_black())
                 context.splat(film, contribution * float(mis_weight(view, {TechniqueKind::kConnect, s}, LightSelection{})));

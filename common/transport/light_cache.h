@@ -58,14 +58,15 @@ LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPr
                 const bool counted = m < work.light_path_count;
                 // The others are numbered within the unit, under its tile's first pixel: no other unit of the group has those keys.
                 const uint64_t tile_key = uint64_t(scope.scene.frame().crop.index(work.owner().x0, work.owner().y0)) << 32;
-                Rng rng(counted ? RngKey{scope.seed, Stage::kLight, work.group_first_iteration, work.first_light_path + m}
-                                : RngKey{scope.seed, Stage::kLightPool, work.group_first_iteration, tile_key | m});
-                const int n = trace_light_path(scope.scene, rng, scope.max_edges, scope.roulette, y.data(), &chunk.counters);
+                const RngKey key{scope.seed, counted ? Stage::kLight : Stage::kLightPool, work.group_first_iteration,
+                                 counted ? work.first_light_path + m : tile_key | m};
+                LightSampler sampler(key);
+                const int n = trace_light_path(scope.scene, sampler, scope.max_edges, scope.roulette, y.data(), &chunk.counters);
                 finish(y.data(), n);
                 chunk.lengths.push_back(uint32_t(n));
                 chunk.vertices.insert(chunk.vertices.end(), y.begin(), y.begin() + n);
                 for (int s = 2; counted && s <= n; ++s)
-                    if (y[size_t(s - 1)].bsdf.has_smooth_lobe()) splat(y.data(), s, rng.uniform2(), m, chunk);
+                    if (y[size_t(s - 1)].bsdf.has_smooth_lobe()) splat(y.data(), s, sampler.rng().uniform2(), m, chunk);
             }
         }
     });

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/film/partial.h"
-#include "common/path/random_walk.h"
+#include "common/path/light_walk.h"
 #include "common/core/fork_join.h"
 #include "common/transport/renderer.h"
 

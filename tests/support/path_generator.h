@@ -24,8 +24,9 @@ inline void for_each_path(const Scene& scene, int count, int max_edges, uint64_t
         if (labeller != nullptr && view.k >= 2) labeller->complete(light, s, camera, t, towards, &view);
     };
     for (int i = 0; i < count; ++i) {
-        Rng rng({seed, Stage::kLight, 0, uint64_t(i)});
-        const int n = trace_light_path(scene, rng, max_edges, rule, y.data(), &counters);
+        LightSampler light_sampler({seed, Stage::kLight, 0, uint64_t(i)});
+        Rng& rng = light_sampler.rng();
+        const int n = trace_light_path(scene, light_sampler, max_edges, rule, y.data(), &counters);
         if (labeller != nullptr) labeller->label_light_path(y.data(), n);
         for (int s = 2; s <= n; ++s) {
             if (!y[size_t(s - 1)].bsdf.has_smooth_lobe()) continue;

@@ -43,10 +43,10 @@ inline LightPool trace_light_pool(const Scene& scene, uint64_t seed, int count, 
     LightPool pool(static_cast<size_t>(count));
     WalkCounters counters;
     for (size_t i = 0; i < pool.size(); ++i) {
-        Rng rng({seed, Stage::kLightPool, 0, i});
+        LightSampler sampler({seed, Stage::kLightPool, 0, i});
         pool[i].resize(size_t(max_edges));
         pool[i].resize(
-            size_t(trace_light_path(scene, rng, max_edges, {}, pool[i].data(), &counters)));
+            size_t(trace_light_path(scene, sampler, max_edges, {}, pool[i].data(), &counters)));
     }
     return pool;
 }
@@ -91,13 +91,13 @@ struct PoolAlgorithm {
         const auto connected = [&](const Rgb& contribution, int s) {
             return contribution * float(mis_weight(view, {TechniqueKind::kConnect, s}, selection));
         };
-        Rng rng({context.seed, Stage::kLight, context.group_iteration, context.light_path});
-        const int n = trace_light_path(scene, rng, context.max_edges, context.roulette, own,
+        LightSampler light_sampler({context.seed, Stage::kLight, context.group_iteration, context.light_path});
+        const int n = trace_light_path(scene, light_sampler, context.max_edges, context.roulette, own,
                                        &context.counters);
         for (int s = 2; s <= n; ++s) {
             if (!own[s - 1].bsdf.has_smooth_lobe()) continue;
             Vec2 film;
-            const Vec3 lens = scene.camera().sample_lens(rng.uniform2());
+            const Vec3 lens = scene.camera().sample_lens(light_sampler.rng().uniform2());
             const Rgb c = connect_to_camera(scene, own, s, lens, &film, &view, &context.counters);
             if (!c.is_black()) context.splat(film, connected(c, s));
         }

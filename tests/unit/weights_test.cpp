@@ -12,6 +12,7 @@
 #include "common/transport/path.h"
 #include "tests/support/path_generator.h"
 #include "tests/support/stub_algorithms.h"
+#include "tests/support/tally.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
@@ -20,6 +21,7 @@ namespace {
 using testing::FullPath;
 using testing::MergeStubSelection;
 using testing::PairingStubSelection;
+using testing::Tally;
 
 /// Sum of the weights of all techniques that can make `path`, each from its own rebuilt view.
 template <class Selection>
@@ -44,25 +46,6 @@ double weight_sum(const Scene& scene, const FullPath& path, const Selection& sel
 
 class Weights : public ::testing::TestWithParam<testing::NamedScene> {};
 
-/// Weights come from float densities, recomputed along directions that differ in the last bits;
-/// grazing events and refraction near the critical angle amplify that. 1e-4 must hold for nearly
-/// all paths, one per cent for all but those.
-struct Tally {
-    uint64_t paths = 0, loose = 0, gross = 0;
-    void add(double deviation) {
-        ++paths;
-        loose += !(std::fabs(deviation) <= 1e-4);
-        gross += !(std::fabs(deviation) <= 1e-2);
-    }
-    void check(const char* what) const {
-        EXPECT_GT(paths, 500u) << what;
-        EXPECT_LT(double(loose), 2e-3 * double(paths))
-            << what << ": " << loose << " of " << paths << " deviate by over 1e-4";
-        EXPECT_LE(double(gross), 2e-4 * double(paths))
-            << what << ": " << gross << " of " << paths << " deviate by over 1e-2";
-    }
-};
-
 TEST_P(Weights, SumToOneOverAllTechniques) {
     const auto scene = GetParam().make();
     BdptSelection bdpt;
@@ -80,14 +63,14 @@ TEST_P(Weights, SumToOneOverAllTechniques) {
         [&](const FullPath& path, int s, const PathView&, const Rgb&) {
             ++made[size_t(s)];
             if (path.k() < 2) return;
-            tallies[0].add(weight_sum(*scene, path, bdpt, Heuristic::kBalance) - 1);
-            tallies[1].add(weight_sum(*scene, path, bdpt, Heuristic::kPower) - 1);
-            tallies[2].add(weight_sum(*scene, path, merging, Heuristic::kBalance) - 1);
-            tallies[3].add(weight_sum(*scene, path, pairing, Heuristic::kBalance) - 1);
+            tallies[0].add(weight_sum(*scene, path, bdpt, Heuristic::kBalance) - 1, path);
+            tallies[1].add(weight_sum(*scene, path, bdpt, Heuristic::kPower) - 1, path);
+            tallies[2].add(weight_sum(*scene, path, merging, Heuristic::kBalance) - 1, path);
+            tallies[3].add(weight_sum(*scene, path, pairing, Heuristic::kBalance) - 1, path);
             if (s <= 1)
-                tallies[4].add(weight_sum(*scene, path, PathSelection{}, Heuristic::kBalance) - 1);
+                tallies[4].add(weight_sum(*scene, path, PathSelection{}, Heuristic::kBalance) - 1, path);
             if (s == path.k())
-                tallies[5].add(weight_sum(*scene, path, LightSelection{}, Heuristic::kBalance) - 1);
+                tallies[5].add(weight_sum(*scene, path, LightSelection{}, Heuristic::kBalance) - 1, path);
         });
     const char* names[] = {"bdpt balance", "bdpt power", "merge stub",
                            "pairing stub", "path",       "light"};
@@ -119,12 +102,12 @@ TEST_P(Weights, EveryTechniqueSeesTheSamePath) {
                 EXPECT_EQ(other->view.k, k);
                 for (int i = 0; i < k; ++i) {
                     EXPECT_EQ(other->view.delta[i], path.x[size_t(i)].delta);
-                    densities.add(other->view.fwd[i] / mine->view.fwd[i] - 1);
+                    densities.add(other->view.fwd[i] / mine->view.fwd[i] - 1, path);
                     if (mine->view.rev[i] > 0)
-                        densities.add(other->view.rev[i] / mine->view.rev[i] - 1);
+                        densities.add(other->view.rev[i] / mine->view.rev[i] - 1, path);
                 }
-                densities.add(other->view.next_event / mine->view.next_event - 1);
-                contributions.add(f_of(other->view, other->contribution, s) / f - 1);
+                densities.add(other->view.next_event / mine->view.next_event - 1, path);
+                contributions.add(f_of(other->view, other->contribution, s) / f - 1, path);
             }
         });
     densities.check("densities");

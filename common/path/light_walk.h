@@ -1,0 +1,90 @@
+#pragma once
+// The light sub-path: where its random numbers come from, and the walk from the light.
+
+#include "common/core/low_discrepancy.h"
+#include "common/path/random_walk.h"
+
+namespace lightloom {
+
+/// Random numbers of one light sub-path, keyed by (seed, stage, iteration, path). The light, the emission and the first scattering
+/// come from low-discrepancy sequences over the paths of an iteration or group; the rest is independent.
+class LightSampler {
+  public:
+    /// `key.index` is the number of the path; numbers that differ above 32 bits belong to different sequences.
+    explicit LightSampler(const RngKey& key)
+        : rng_(key),
+          scramble_(Rng({key.seed, Stage::kLightScramble, key.iteration, uint64_t(key.stage) << 56 | key.index >> 32}).next_u64()),
+          index_(uint32_t(key.index)) {}
+
+    /// In [0, 1): which light. A point of the sequence has 24 bits, too few to tell a million lights apart.
+    double pick() { return double(low_discrepancy_point(index_, scramble_).x) + rng_.uniform_double() * 0x1p-24; }
+    Vec2 position() { return low_discrepancy_point(index_, scramble_ + 1); }
+    Vec2 direction() { return low_discrepancy_point(index_, scramble_ + 2); }
+    /// For the scattering at y_{s-1}.
+    ScatterSample scattering(int s) {
+        const Vec2 u = rng_.uniform2();
+        lobe_rest_ = u.y;
+        return {u.x, s == 2 ? low_discrepancy_point(index_, scramble_ + 3) : rng_.uniform2()};
+    }
+    /// A uniform that comes for free with scattering().
+    float roulette() const { return lobe_rest_; }
+    Rng& rng() { return rng_; }
+
+  private:
+    Rng rng_;
+    uint64_t scramble_;
+    uint32_t index_;
+    float lobe_rest_ = 0;
+};
+
+/// Start of a light sub-path at path[0] and the ray that leaves it. False when nothing is emitted. y_0's alpha is F(1) / C(1),
+/// its emission without the direction.
+inline bool start_light_path(const Scene& scene, LightSampler& sampler, PathVertex* y0, WalkRay* ray) {
+    EmissionSample s;
+    if (!scene.emitters().sample_emission(sampler.pick(), sampler.position(), sampler.direction(), &s)) return false;
+    const Emitter& e = scene.emitters()[s.emitter];
+    y0->p = s.position;
+    y0->ng = s.normal;
+    y0->emitter = int32_t(s.emitter);
+    y0->alpha = scene.emitters().strength(e, s.direction) / s.pdf_position;
+    y0->survival = 1;
+    y0->label = y0->reverse_label = kNoLabel;
+    y0->fwd = s.pdf_position;
+    y0->rev = 0;
+    y0->delta = false;
+    ray->direction = s.direction;
+    ray->alpha = s.alpha;
+    ray->pdf = s.pdf_direction;
+    ray->from_infinite = e.is_infinite();
+    ray->previous_hittable = !e.is_delta();
+    ray->origin = e.is_area() ? offset_origin(s.position, s.normal, s.direction, e.reach) : s.position;
+    return true;
+}
+
+/// Traces a light sub-path into `path` (room for `max_vertices`); returns the number of vertices, y_0 included. Vertices
+/// whose own event was a Dirac lobe are kept (marked) because later vertices need them.
+inline int trace_light_path(const Scene& scene, LightSampler& sampler, int max_vertices, const RouletteRule& rule, PathVertex* path,
+                            WalkCounters* counters) {
+    WalkRay ray;
+    if (max_vertices < 1 || !start_light_path(scene, sampler, &path[0], &ray)) return 0;
+    const bool area = scene.emitters()[uint32_t(path[0].emitter)].is_area();
+    const float start = scalar_of(ray.alpha);
+    int n = 1;
+    while (n < max_vertices) {
+        SurfacePoint point;
+        ++counters->rays;
+        if (!scene.intersect(ray.origin, ray.direction, &point)) break;
+        PathVertex& v = path[n];
+        arrive<TransportMode::kImportance>(ray, path[n - 1].p, path[n - 1].ng, n > 1 || area, point, &v);
+        if (!(v.fwd > 0) || !std::isfinite(v.fwd) || !std::isfinite(v.adjoint)) break;
+        v.bsdf = scene.bsdf_at(point);
+        ++counters->vertices;
+        ++n;
+        if (n >= max_vertices) break;
+        if (!leave<TransportMode::kImportance>(&v, &path[n - 2], sampler.scattering(n), &ray)) break;
+        if (!survive(rule, n, start, sampler.roulette(), &ray)) break;
+    }
+    return n;
+}
+
+}  // namespace lightloom
