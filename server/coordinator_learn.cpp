@@ -1,5 +1,5 @@
-// How the coordinator learns tables: it waits for the training units of a job, chooses the size of the set where a time limit asks
-// for it, and trains in one or two rounds (see TrainingGenerator).
+// How the coordinator learns tables: it waits for the training units of a job, chooses the size of the set where a time
+// limit asks for it, and trains in one or two rounds (see TrainingGenerator).
 
 #include <spdlog/spdlog.h>
 

@@ -12,8 +12,8 @@ inline constexpr double kTrainingShare = 0.1;
 inline constexpr uint64_t kProbeSamples = 2048;
 /// Below this, tables are worth less than what they cost to learn.
 inline constexpr uint64_t kMinTrainingSamples = 1024;
-/// What a sample of a set that is traced in two rounds costs, over one of the probe: subspace connections find more paths, and all
-/// of them are learned from.
+/// What a sample of a set that is traced in two rounds costs, over one of the probe: subspace connections find more paths,
+/// and all of them are learned from.
 inline constexpr double kGuidedCost = 2;
 /// The catalog's parameter for the size of the set.
 inline constexpr const char* kTrainingPaths = "training-paths";

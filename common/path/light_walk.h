@@ -6,14 +6,15 @@
 
 namespace lightloom {
 
-/// Random numbers of one light sub-path, keyed by (seed, stage, iteration, path). The light, the emission and the first scattering
-/// come from low-discrepancy sequences over the paths of an iteration or group; the rest is independent.
+/// Random numbers of one light sub-path, keyed by (seed, stage, iteration, path). The light, the emission and the first
+/// scattering come from low-discrepancy sequences over the paths of an iteration or group; the rest is independent.
 class LightSampler {
   public:
     /// `key.index` is the number of the path; numbers that differ above 32 bits belong to different sequences.
     explicit LightSampler(const RngKey& key)
         : rng_(key),
-          scramble_(Rng({key.seed, Stage::kLightScramble, key.iteration, uint64_t(key.stage) << 56 | key.index >> 32}).next_u64()),
+          scramble_(Rng({key.seed, Stage::kLightScramble, key.iteration, uint64_t(key.stage) << 56 | key.index >> 32})
+                        .next_u64()),
           index_(uint32_t(key.index)) {}
 
     /// In [0, 1): which light. A point of the sequence has 24 bits, too few to tell a million lights apart.
@@ -63,8 +64,8 @@ inline bool start_light_path(const Scene& scene, LightSampler& sampler, PathVert
 
 /// Traces a light sub-path into `path` (room for `max_vertices`); returns the number of vertices, y_0 included. Vertices
 /// whose own event was a Dirac lobe are kept (marked) because later vertices need them.
-inline int trace_light_path(const Scene& scene, LightSampler& sampler, int max_vertices, const RouletteRule& rule, PathVertex* path,
-                            WalkCounters* counters) {
+inline int trace_light_path(const Scene& scene, LightSampler& sampler, int max_vertices, const RouletteRule& rule,
+                            PathVertex* path, WalkCounters* counters) {
     WalkRay ray;
     if (max_vertices < 1 || !start_light_path(scene, sampler, &path[0], &ray)) return 0;
     const bool area = scene.emitters()[uint32_t(path[0].emitter)].is_area();

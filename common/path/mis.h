@@ -75,8 +75,8 @@ inline bool can_connect(const PathView& view, int s) {
     return !(s > 0 && view.delta[s - 1]) && !(s > 0 && s < view.k && view.delta[s]);
 }
 
-/// Calls visit(s, chain) with chain = C(s) A(s) / (C(base) A(base)) for every s != base from s_min to s_max that it is not zero for,
-/// walking outward from `base`, a technique that can produce the path.
+/// Calls visit(s, chain) with chain = C(s) A(s) / (C(base) A(base)) for every s != base from s_min to s_max that it is not
+/// zero for, walking outward from `base`, a technique that can produce the path.
 template <class Visit>
 void for_each_split(const PathView& view, int base, int s_min, int s_max, Visit&& visit) {
     WideProduct chain;
@@ -127,10 +127,11 @@ double mis_weight(const PathView& view, Technique own, const Selection& selectio
     if (own.kind == TechniqueKind::kMerge)
         if (const double f = connect(base); f > 0) ratios.add(f * inv_own, true);
     merge(base, WideProduct{}, false);
-    for_each_split(view, base, Selection::kMerges ? 0 : s_min, Selection::kMerges ? k : s_max, [&](int s, const WideProduct& chain) {
-        if (const double f = connect(s); f > 0) ratios.add(chain.value(f * inv_own), s < base);
-        merge(s, chain, s < base);
-    });
+    for_each_split(view, base, Selection::kMerges ? 0 : s_min, Selection::kMerges ? k : s_max,
+                   [&](int s, const WideProduct& chain) {
+                       if (const double f = connect(s); f > 0) ratios.add(chain.value(f * inv_own), s < base);
+                       merge(s, chain, s < base);
+                   });
     return ratios.weight();
 }
 

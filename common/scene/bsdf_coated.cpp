@@ -151,7 +151,8 @@ BsdfEval eval_coated_diffuse(const Bsdf& b, Vec3 wo, Vec3 wi) {
     if (!to_upper_side(&wo, &wi)) return {};
     const CoatSide o = coat_side(b, wo.z), i = coat_side(b, wi.z);
     const float pmf_o = diffuse_coat_pmf(b, o), pmf_i = diffuse_coat_pmf(b, i);
-    BsdfEval e{b.reflectance * (o.transmitted * i.transmitted * kInvPi), (1 - pmf_o) * wi.z * kInvPi, (1 - pmf_i) * wo.z * kInvPi};
+    BsdfEval e{b.reflectance * (o.transmitted * i.transmitted * kInvPi), (1 - pmf_o) * wi.z * kInvPi,
+               (1 - pmf_i) * wo.z * kInvPi};
     if (b.alpha_x > 0) add_coat_lobe(b, wo, wi, pmf_o, pmf_i, &e);
     return e;
 }

@@ -43,7 +43,8 @@ std::vector<double> block_brightness(const TrainingData& d) {
             double sum = 0;
             int count = 0;
             for (int j = std::max(0, y - 1); j <= std::min(h - 1, y + 1); ++j)
-                for (int i = std::max(0, x - 1); i <= std::min(w - 1, x + 1); ++i, ++count) sum += known(d.block_sum[size_t(j * w + i)]);
+                for (int i = std::max(0, x - 1); i <= std::min(w - 1, x + 1); ++i, ++count)
+                    sum += known(d.block_sum[size_t(j * w + i)]);
             out[size_t(y * w + x)] = sum / (count * per_block) + 0.1 * mean;
         }
     }
@@ -190,9 +191,10 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
     if (stop.stop_requested()) return cancelled;
     report->classifier_seconds = watch.lap();
     if (uint64_t(tables.light_count) * tables.eye_count > kMaxGammaCells)
-        return invalid_argument("Gamma would have " + std::to_string(tables.light_count) + " x " + std::to_string(tables.eye_count) +
-                                " entries and goes to every worker; ask for fewer light-subspaces or eye-subspaces (at most " +
-                                std::to_string(kMaxGammaCells) + " entries)");
+        return invalid_argument(
+            "Gamma would have " + std::to_string(tables.light_count) + " x " + std::to_string(tables.eye_count) +
+            " entries and goes to every worker; ask for fewer light-subspaces or eye-subspaces (at most " +
+            std::to_string(kMaxGammaCells) + " entries)");
     measure_energy(data, emitters, options, stop, &tables);
     report->energy_seconds = watch.lap();
     const GammaDataset dataset = gamma_dataset(data, brightness, emitters, options, stop, tables);

@@ -103,7 +103,8 @@ void order_centroids(std::vector<Point>& c, size_t begin, size_t end) {
     const size_t axis = bounds.widest();
     const size_t middle = begin + (end - begin) / 2;
     const auto less = [axis](const Point& a, const Point& b) { return a[axis] != b[axis] ? a[axis] < b[axis] : a < b; };
-    std::nth_element(c.begin() + std::ptrdiff_t(begin), c.begin() + std::ptrdiff_t(middle), c.begin() + std::ptrdiff_t(end), less);
+    std::nth_element(c.begin() + std::ptrdiff_t(begin), c.begin() + std::ptrdiff_t(middle), c.begin() + std::ptrdiff_t(end),
+                     less);
     order_centroids(c, begin, middle);
     order_centroids(c, middle, end);
 }

@@ -98,7 +98,8 @@ class LevelProblem {
         }
     }
     /// One majorise-minimise step per column: B <- sqrt(B^2 G + lambda Gbar pi^2), normalised [algorithms.md 9.2].
-    void improve(std::vector<float>* b, const std::vector<float>& prior, double lambda, const std::vector<uint32_t>& paths) const {
+    void improve(std::vector<float>* b, const std::vector<float>& prior, double lambda,
+                 const std::vector<uint32_t>& paths) const {
         std::vector<double> g(b->size());
         gradient(*b, paths.data(), paths.data() + paths.size(), &g);
         double mean = 0;
@@ -173,7 +174,8 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
             b = std::move(best_b);
             // What judged may teach as well once the choice is made.
             if (finest)
-                for (int i = 0; i < kFinalSteps && !options.stop.stop_requested(); ++i) problem->improve(&b, prior, strength, all);
+                for (int i = 0; i < kFinalSteps && !options.stop.stop_requested(); ++i)
+                    problem->improve(&b, prior, strength, all);
         } else {
             b = prior;  // finer subspaces than the data support: keep the coarser model, lifted
         }

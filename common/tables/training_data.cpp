@@ -95,7 +95,8 @@ Result<TrainingData> parse_training_data(std::string_view bytes) {
     if (bytes.size() < sizeof header) return data_loss("training data cut short");
     std::memcpy(&header, bytes.data(), sizeof header);
     bytes.remove_prefix(sizeof header);
-    if (std::memcmp(header.magic, expected.magic, sizeof header.magic) != 0) return data_loss("not training data of a known version");
+    if (std::memcmp(header.magic, expected.magic, sizeof header.magic) != 0)
+        return data_loss("not training data of a known version");
     if (header.blocks_x < 1 || header.blocks_y < 1 || header.blocks_x > 65536 || header.blocks_y > 65536)
         return data_loss("training data without a frame");
     const uint64_t blocks = uint64_t(header.blocks_x) * uint64_t(header.blocks_y);

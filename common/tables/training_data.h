@@ -7,8 +7,8 @@
 //     square   = L(f / p_own)^2 w_own              c_X p_own of algorithms.md 1.1: E[square / (F / p_own)] is the loss
 //     vertices[i].density = n p of a technique, without N Gamma / Q, over p_own: i = 0 holds the ones that tables do not change
 //                           (s = 0 and s = k), 1 <= s <= k-1 the connection of x_{s-1} and x_s; 0 where impossible
-// One path per camera sample (and one per light sub-path that reached the lens) is kept, chosen in proportion to its estimate; both
-// numbers are divided by the probability of that choice, so that sums over D stay unbiased.
+// One path per camera sample (and one per light sub-path that reached the lens) is kept, chosen in proportion to its
+// estimate; both numbers are divided by the probability of that choice, so that sums over D stay unbiased.
 
 #include <cstdint>
 #include <string>

@@ -65,7 +65,8 @@ void trace_bdpt_sample(SampleContext& context, LightDone&& light_done, Contribut
                                             light.emitter, {}}, view);
         for (int s = 2; s <= n && s + t - 1 <= context.max_edges; ++s) {
             if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
-            if (const Rgb c = connect<detail>(scene, y, s, z, t, &view, &context.counters); !c.is_black()) from_light(c, s, t, {});
+            if (const Rgb c = connect<detail>(scene, y, s, z, t, &view, &context.counters); !c.is_black())
+                from_light(c, s, t, {});
         }
     };
     const auto escape = [&](int t, const WalkRay& ray) {

@@ -1,6 +1,6 @@
 #pragma once
-// The bidirectional algorithms with a light-vertex cache, but for what tells them apart. A method says which prefixes of the cache
-// a camera vertex is connected to, and with what densities the weights reckon:
+// The bidirectional algorithms with a light-vertex cache, but for what tells them apart. A method says which prefixes of
+// the cache a camera vertex is connected to, and with what densities the weights reckon:
 //
 //   struct Method {
 //       Selection selection;                     // the MIS densities, common/path/mis.h
@@ -11,7 +11,8 @@
 //       void label_light_path(const Scene&, PathVertex* y, int n) const;
 //       void label_camera_vertex(const Scene&, PathVertex* v) const;
 //       void complete(const Scene&, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView*) const;
-//       int draw(const LightCache&, const Index&, const PathVertex& v, Stratified&& u, Rng&, int longest_prefix, LightPick*) const;
+//       int draw(const LightCache&, const Index&, const PathVertex& v, Stratified&& u, Rng&, int longest_prefix,
+//                LightPick*) const;                  // u(): a point of the vertex that is stratified where that helps
 //       float inverse_density(const LightPick&) const;                                      // see PathContribution
 //   };
 //
@@ -38,8 +39,8 @@ struct CachedAlgorithm {
         return float(mis_weight(view, {TechniqueKind::kConnect, s}, method.selection, heuristic));
     }
 
-    /// Traces a unit's light sub-paths. `contribute(contribution, view, m, chunk)` is called for every counted one, m, that reaches
-    /// the lens.
+    /// Traces a unit's light sub-paths. `contribute(contribution, view, m, chunk)` is called for every counted one, m, that
+    /// reaches the lens.
     template <class Contribute>
     State prepare(const UnitScope& scope, UnitPreparation* preparation, Contribute&& contribute) const {
         const Scene& scene = scope.scene;
@@ -92,12 +93,11 @@ struct CachedAlgorithm {
                 const int s = pick.s;
                 const Rgb c = connect_candidate<Method::kDetail>(scene, pick.y, s, z, t, &view, &context.counters);
                 if (c.is_black()) continue;
-                const PathVertex& end = pick.y[s - 1];
+                const PathVertex &start = pick.y[0], &end = pick.y[s - 1];
                 const bool direction = s == 1 && scene.emitters()[uint32_t(end.emitter)].is_infinite();
                 method.complete(scene, pick.y, s, z, t, direction ? -end.ng : normalize(end.p - v.p), &view);
                 const float scale = method.inverse_density(pick);
-                contribute(PathContribution{c * scale, scale, s, t, pick.y, z, pick.y[0].p, pick.y[0].ng, uint32_t(pick.y[0].emitter), {}},
-                           view);
+                contribute(PathContribution{c * scale, scale, s, t, pick.y, z, start.p, start.ng, uint32_t(start.emitter), {}}, view);
             }
         };
         const auto escape = [&](int t, const WalkRay& ray) {
@@ -109,8 +109,8 @@ struct CachedAlgorithm {
             contribute(PathContribution{c, 1, 0, t, nullptr, z, emitters.outside(ray.origin, ray.direction), -ray.direction,
                                         uint32_t(emitters.environment_index()), {}}, view);
         };
-        trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters, visit,
-                          escape);
+        trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
+                          visit, escape);
     }
 
     Rgb sample(SampleContext& context, const State& state) const {

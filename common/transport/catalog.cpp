@@ -45,6 +45,8 @@ constexpr ParameterInfo kSubspaces[] = {
      "of Gamma: mm (majorise-minimise with a held-out prior), adam (as the paper), contribution (its ablation)", kTrainers},
     {"windows", 1, 1, 32, true, "J_max: light-only windows that rarely hit subspaces may keep"},
     {"reuse-target", 200, 1, 1e6, false, "M0: light prefixes that a subspace should hold, as far as windows allow"},
+    {"correlation-aware", 0, 0, 1, true,
+     "weights know that the N connections of a vertex share its camera sub-path [Grittmann et al. 2021]", kSwitch},
     {"ris-aware", 0, 0, 1, true, "weights know that a cache of M paths limits what a subspace can deliver", kSwitch},
 };
 
@@ -56,7 +58,8 @@ constexpr AlgorithmInfo kCatalog[] = {
     {"bdpt", "bidirectional path tracing, every camera sample paired with one light sub-path", "Veach 1997, chapter 10",
      "unbiased; misses specular-diffuse-specular paths from lights that cannot be hit", kWeighted, true},
     {"lvcbpt", "bidirectional path tracing with a light-vertex cache, vertices drawn uniformly",
-     "Davidovic, Krivanek, Hasan and Slusallek 2014, section 4.1", "unbiased; misses what bdpt misses", kUniformCache, true, true},
+     "Davidovic, Krivanek, Hasan and Slusallek 2014, section 4.1", "unbiased; misses what bdpt misses", kUniformCache, true,
+     true},
     {"spcbpt", "subspace-based probabilistic connections: learns which light sub-paths matter to which camera sub-paths",
      "Su, Li and Wang 2022", "unbiased; misses what bdpt misses", kSubspaces, true, true},
 };
@@ -95,7 +98,8 @@ Result<AlgorithmParameters> parse_parameters(const AlgorithmInfo& algorithm, con
         if (!number || v < p.min_value || v > p.max_value || (p.integer && v != std::floor(v))) {
             std::ostringstream message;
             message << "parameter " << key << "=" << text << " of '" << algorithm.name << "' must be "
-                    << (p.integer ? "an integer" : "a number") << " from " << p.min_value << " to " << p.max_value << names << (names.empty() ? "" : ")");
+                    << (p.integer ? "an integer" : "a number") << " from " << p.min_value << " to " << p.max_value << names
+                    << (names.empty() ? "" : ")");
             return invalid_argument(message.str());
         }
         parameters.values[i] = v;

@@ -56,7 +56,8 @@ LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPr
             Chunk& chunk = chunks[c];
             for (uint64_t m = c * kChunk; m < std::min(path_count, (c + 1) * kChunk); ++m) {
                 const bool counted = m < work.light_path_count;
-                // The others are numbered within the unit, under its tile's first pixel: no other unit of the group has those keys.
+                // The others are numbered within the unit, under its tile's first pixel: no other unit of the group has
+                // those keys.
                 const uint64_t tile_key = uint64_t(scope.scene.frame().crop.index(work.owner().x0, work.owner().y0)) << 32;
                 const RngKey key{scope.seed, counted ? Stage::kLight : Stage::kLightPool, work.group_first_iteration,
                                  counted ? work.first_light_path + m : tile_key | m};

@@ -47,6 +47,7 @@ Result<TransportParameters> TransportParameters::read(const RenderSettings& sett
         return p;
     }
     p.ris_aware = value("ris-aware") != 0;
+    p.correlation_aware = value("correlation-aware") != 0;
     t.light_subspaces = uint32_t(value("light-subspaces"));
     t.eye_subspaces = uint32_t(value("eye-subspaces"));
     t.source_share = value("source-share");

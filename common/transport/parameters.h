@@ -20,7 +20,7 @@ struct TransportParameters {
     // Algorithms with a cache.
     int connections = 1;          ///< N
     uint64_t minimum_paths = 1;   ///< Of a unit's cache.
-    bool ris_aware = false;
+    bool ris_aware = false, correlation_aware = false;
     uint64_t training_samples = 0;
     uint64_t pilot_samples = 0;   ///< The first of them, traced without a guide; 0: all.
     TrainingOptions training;

@@ -31,7 +31,8 @@ struct UnitWork {
     Rect tile;
     uint64_t first_light_path = 0;
     uint64_t light_path_count = 0;
-    /// The whole unit's tile where `tile` is a part of it (replay of one sample): keys the unit's light-vertex cache. Empty: `tile`.
+    /// The whole unit's tile where `tile` is a part of it (replay of one sample): keys the unit's light-vertex cache.
+    /// Empty: `tile`.
     Rect owner_tile;
 
     const Rect& owner() const { return owner_tile.empty() ? tile : owner_tile; }

@@ -9,7 +9,7 @@
 //     s = 0          rho = A(0)
 //     1 <= s <= k-1  rho = N Gamma(i, j) L(F(s)) / Q(i) A(s)                                      [Eq. 11]: the target, not
 //                    what was really drawn; with ris_aware 1 / rho = 1 / rho + 1 / (M C(s) A(s)): a cache of M paths cannot
-//                    deliver more than that
+//                    deliver more than that; with correlation_aware N c_s stands for N (common/path/correlation.h)
 //     s = k          rho = N1 |crop| C(k)
 // Tables: kappa_L, kappa_E, Q, Gamma, J, all frozen before the unit. Bias: none, whatever the tables hold. Missing: what `bdpt`
 // misses.
@@ -19,6 +19,7 @@
 #include <span>
 #include <utility>
 
+#include "common/path/correlation.h"
 #include "common/scene/sampling.h"
 #include "common/transport/cached.h"
 #include "common/transport/parameters.h"
@@ -50,6 +51,7 @@ struct SubspaceSelection {
     double light_paths_per_iteration = 1;  ///< N1 |crop|
     double connections = 3;                ///< N
     double cache_paths = 0;                ///< M of ris_aware; 0 switches that off.
+    bool correlation_aware = false;        ///< N counts as N c_s.
 
     int s_min(int) const { return 0; }
     int s_max(int k) const { return k == 1 ? 0 : k; }
@@ -57,7 +59,8 @@ struct SubspaceSelection {
         if (s == 0) return 1;
         if (s == view.k) return light_paths_per_iteration;
         const uint32_t i = view.light_label[s];
-        const double target = connections * double(prepared->tables.column(view.eye_label[s])[i]) *
+        const double count = correlation_aware ? connections * correlation_factor(view, s, connections) : connections;
+        const double target = count * double(prepared->tables.column(view.eye_label[s])[i]) *
                               double(prepared->inv_energy[i]) * view.light_throughput[s];
         return cache_paths > 0 && target > 0 ? 1 / (1 / target + 1 / cache_paths) : target;
     }
@@ -91,7 +94,8 @@ struct SubspaceConnections {
     SubspaceLabeller labeller(const Scene& scene) const { return {selection.prepared->tables, scene.emitters()}; }
     void label_light_path(const Scene& scene, PathVertex* y, int n) const { labeller(scene).label_light_path(y, n); }
     void label_camera_vertex(const Scene& scene, PathVertex* v) const { labeller(scene).label_camera_vertex(v); }
-    void complete(const Scene& scene, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
+    void complete(const Scene& scene, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards,
+                  PathView* view) const {
         labeller(scene).complete(y, s, z, t, towards, view);
     }
     float inverse_density(const LightPick& pick) const { return pick.scale / scalar_of(pick.y[pick.s - 1].alpha); }
@@ -143,8 +147,8 @@ struct SubspaceConnections {
     /// N draws for a labelled camera vertex, stage by stage, so that the memory of all of them is fetched at once. The
     /// first stage is stratified over the draws. Returns how many of them found a prefix.
     template <class Stratified>
-    int draw(const LightCache& cache, const Index& index, const PathVertex& v, Stratified&& stratified, Rng& rng, int longest_prefix,
-             LightPick* picks) const {
+    int draw(const LightCache& cache, const Index& index, const PathVertex& v, Stratified&& stratified, Rng& rng,
+             int longest_prefix, LightPick* picks) const {
         const PreparedTables& prepared = *selection.prepared;
         const uint32_t light_count = prepared.tables.light_count;
         const AliasEntry* column = &prepared.draws[size_t(v.label) * light_count];
@@ -194,7 +198,7 @@ using SpcbptAlgorithm = CachedAlgorithm<SubspaceConnections<Selection>>;
 inline SpcbptAlgorithm<> make_spcbpt(const TransportParameters& p, std::shared_ptr<const PreparedTables> prepared,
                                      double light_paths_per_iteration) {
     SubspaceSelection selection{std::move(prepared), light_paths_per_iteration, double(p.connections),
-                                p.ris_aware ? double(p.minimum_paths) : 0};
+                                p.ris_aware ? double(p.minimum_paths) : 0, p.correlation_aware};
     return {{std::move(selection), p.connections}, p.heuristic, p.minimum_paths};
 }
 

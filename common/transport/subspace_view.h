@@ -35,16 +35,22 @@ struct SubspaceLabeller {
     /// The eye label of a camera vertex, before it is connected.
     void label_camera_vertex(PathVertex* v) const { v->label = eye(*v, v->wo); }
 
-    /// Labels and throughput of a path made with ViewDetail::kSubspace. `towards`: unit, from z_{t-1} to x_{s-1} (to the emitter of
-    /// an escaped ray); not read for s = 0 on a surface, where z_{t-1} is x_0. Vertices of z get their reverse labels on demand.
+    /// Labels and throughput of a path made with ViewDetail::kSubspace. `towards`: unit, from z_{t-1} to x_{s-1} (to the
+    /// emitter of an escaped ray); not read for s = 0 on a surface, where z_{t-1} is x_0. Vertices of z get their reverse
+    /// labels on demand.
     void complete(const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
         view_throughput(y, s, z, view);
         const int k = view->k;
+        const bool hit = s == 0 && k == t - 1;
+        const Emitter& e = emitters[uint32_t(s > 0 ? y[0].emitter : hit ? z[t - 1].emitter : emitters.environment_index())];
+        view->primary_distance2 = double(length_squared((t >= 2 ? z[1] : y[s - 1]).p - z[0].p));
+        view->source = e.is_delta()      ? PathView::Source::kDiscrete
+                       : e.is_infinite() ? PathView::Source::kDirection
+                                         : PathView::Source::kArea;
         for (int i = 0; i < s; ++i) view->light_label[i + 1] = y[i].label;
         for (int i = 1; i + 1 < s; ++i) view->eye_label[i] = y[i].reverse_label;
         if (s >= 2) view->eye_label[s - 1] = eye(y[s - 1], -towards);
         for (int j = 1; j < t; ++j) view->eye_label[k - j] = z[j].label;
-        const bool hit = s == 0 && k == t - 1;
         if (s == 0 && hit) view->light_label[1] = source(uint32_t(z[t - 1].emitter), z[t - 1].p, z[t - 1].wo);
         if (s == 0 && !hit) view->light_label[1] = source(uint32_t(emitters.environment_index()), {}, -towards);
         // Prefixes that end on the camera side, at z_j; the camera's end vertex z_{t-1} has no successor of its own unless it was

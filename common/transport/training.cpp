@@ -45,7 +45,10 @@ class Reservoir {
         const double inverse_own = double(c.inverse_density) * scale;
         const auto keep = [&](int s, double ratio) {
             if (!can_connect(view, s)) return;
-            const double density = ratio * inverse_own * (s == 0 ? 1 : s == k ? light_paths_per_iteration : view.light_throughput[s]);
+            const double density = ratio * inverse_own *
+                                   (s == 0   ? 1
+                                    : s == k ? light_paths_per_iteration
+                                             : view.light_throughput[s]);
             if (density < std::numeric_limits<float>::max()) vertices_[s == k ? 0 : size_t(s)].density += float(density);
         };
         keep(c.s, 1);
@@ -101,7 +104,8 @@ struct Blocks {
 
 }  // namespace
 
-Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const RenderSettings& settings, const SubspaceTables* guide) {
+Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const RenderSettings& settings,
+                                                    const SubspaceTables* guide) {
     Result<TransportParameters> parameters = TransportParameters::read(settings);
     if (!parameters.ok()) return parameters.status();
     TrainingGenerator generator(scene);
@@ -224,8 +228,8 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
         unit.scope(work), &preparation, [&](const PathContribution& found, PathView& view, uint64_t m, auto&) {
             Rng rng({seed_, Stage::kTraining, 1 + uint64_t(found.s), work.first_light_path + m});
             const uint32_t block = unit.blocks().at(int(found.film.x), int(found.film.y));
-            const double estimate = from_light[m].reservoir.offer(found, view, generator.weight(view, found.s), 1 / unit.pixels(), block,
-                                                                  unit.render_light_paths(), rng);
+            const double estimate = from_light[m].reservoir.offer(found, view, generator.weight(view, found.s),
+                                                                  1 / unit.pixels(), block, unit.render_light_paths(), rng);
             from_light[m].estimates.push_back({block, estimate});
         });
     TrainingData data = unit.empty();
@@ -267,7 +271,8 @@ Result<SubspaceTables> make_tables(const Scene& scene, const RenderSettings& set
         if (!generator.ok()) return generator.status();
         TrainingData data;
         for (; first < end; first += std::min(kTrainingUnitSamples, end - first)) {
-            const Result<TrainingData> unit = generator->trace({first, std::min(kTrainingUnitSamples, end - first), samples}, stop);
+            const Result<TrainingData> unit =
+                generator->trace({first, std::min(kTrainingUnitSamples, end - first), samples}, stop);
             if (!unit.ok()) return unit.status();
             LL_RETURN_IF_ERROR(data.append(*unit));
         }

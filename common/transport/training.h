@@ -27,11 +27,12 @@ struct TrainingWork {
 class TrainingGenerator {
   public:
     /// `scene` must outlive the generator. Without `guide`: a pilot.
-    static Result<TrainingGenerator> create(const Scene& scene, const RenderSettings& settings, const SubspaceTables* guide = nullptr);
+    static Result<TrainingGenerator> create(const Scene& scene, const RenderSettings& settings,
+                                            const SubspaceTables* guide = nullptr);
 
-    /// Camera samples first_sample .. of a sequence that is spread evenly over the frame, and as many light sub-paths: each sample its
-    /// own (pilot), or all of the unit's shared in a cache (guided). The result does not depend on the number of threads. kCancelled
-    /// after a stop request.
+    /// Camera samples first_sample .. of a sequence that is spread evenly over the frame, and as many light sub-paths: each
+    /// sample its own (pilot), or all of the unit's shared in a cache (guided). The result does not depend on the number of
+    /// threads. kCancelled after a stop request.
     Result<TrainingData> trace(const TrainingWork& work, std::stop_token stop) const;
 
   private:
@@ -52,8 +53,8 @@ class TrainingGenerator {
 Result<TrainingData> trace_training(const Scene& scene, const RenderSettings& settings, const TrainingWork& work,
                                     std::stop_token stop);
 
-/// Training on this machine alone: traces unit by unit, as a coordinator has it done by workers, and trains. The tables have the same
-/// bytes as that coordinator's.
+/// Training on this machine alone: traces unit by unit, as a coordinator has it done by workers, and trains. The tables
+/// have the same bytes as that coordinator's.
 Result<SubspaceTables> make_tables(const Scene& scene, const RenderSettings& settings, std::stop_token stop,
                                    TrainingReport* report);
 

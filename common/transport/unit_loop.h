@@ -65,8 +65,8 @@ concept UnitAlgorithm = requires(const A& a, SampleContext& context) {
     { a.sample(context) } -> std::same_as<Rgb>;
 };
 
-/// One that makes something for the whole unit first: `prepare` runs before the first sample, on all threads of the arena, and its
-/// result is passed to every sample.
+/// One that makes something for the whole unit first: `prepare` runs before the first sample, on all threads of the arena,
+/// and its result is passed to every sample.
 template <class A>
 concept PreparedAlgorithm = requires(const A& a, const UnitScope& scope, UnitPreparation& preparation, SampleContext& context) {
     { a.sample(context, a.prepare(scope, &preparation)) } -> std::same_as<Rgb>;

@@ -40,7 +40,8 @@ std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& t
     int64_t area = 0;
     for (const Rect& tile : tiles) area += tile.area();
     const double exact = light_paths_per_pixel * double(group.iteration_count) * double(area);
-    // At least one, however few there should be: the weights count on light paths, and a group without any would lack their share.
+    // At least one, however few there should be: the weights count on light paths, and a group without any would lack their
+    // share.
     const uint64_t total = exact > 0 ? std::max<uint64_t>(1, uint64_t(std::floor(exact + 0.5))) : 0;
     // Cumulative rounding in integers: the shares differ from the exact proportion by less than one path and sum to the
     // total whatever the tiles are.

@@ -43,7 +43,8 @@ std::vector<Inputs> make_inputs(bool transmit) {
     std::vector<Inputs> inputs;
     Rng rng({1});
     for (int n = 0; n < kCount; ++n) {
-        Inputs in{sample_cosine_hemisphere(rng.uniform2()), sample_cosine_hemisphere(rng.uniform2()), rng.uniform(), rng.uniform2()};
+        Inputs in{sample_cosine_hemisphere(rng.uniform2()), sample_cosine_hemisphere(rng.uniform2()), rng.uniform(),
+                  rng.uniform2()};
         if (rng.uniform() < 0.5f) in.wo.z = -in.wo.z, in.wi.z = -in.wi.z;
         if (transmit && rng.uniform() < 0.5f) in.wi.z = -in.wi.z;
         inputs.push_back(in);

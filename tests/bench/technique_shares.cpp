@@ -1,8 +1,9 @@
-// Where an image's light and an algorithm's noise come from: for emitter hits, next event, longer connections and light tracing, the
-// share of the mean that the weights give to them, and the share of the variance per iteration (of single pixels, relative to
-// their brightness, without the noisiest 0.1 %).
+// Where an image's light and an algorithm's noise come from: for emitter hits, next event, longer connections and light
+// tracing, the share of the mean that the weights give to them, and the share of the variance per iteration (of single
+// pixels, relative to their brightness, without the noisiest 0.1 %).
 //
-//   technique_shares SCENE [--algorithms bdpt,lvcbpt,spcbpt] [--iterations N] [--seeds N] [--resolution WxH] [--set key=value ...]
+//   technique_shares SCENE [--algorithms bdpt,lvcbpt,spcbpt] [--iterations N] [--seeds N] [--resolution WxH]
+//                    [--set key=value ...]
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -107,7 +108,8 @@ int main(int argc, char** argv) {
     for (const std::string& name : algorithms) {
         RenderSettings settings{name, {}, 1, max_depth};
         for (const std::string& item : set)
-            if (const size_t eq = item.find('='); eq != std::string::npos) settings.parameters[item.substr(0, eq)] = item.substr(eq + 1);
+            if (const size_t eq = item.find('='); eq != std::string::npos)
+                settings.parameters[item.substr(0, eq)] = item.substr(eq + 1);
         const auto parameters = TransportParameters::read(settings);
         if (!parameters.ok()) return fail(parameters.status());
         SubspaceTables tables;
@@ -131,8 +133,10 @@ int main(int argc, char** argv) {
                     const Class wanted = Class(c);
                     if (name == "bdpt") return render(ClassOfBdpt{{frame_paths}, wanted});
                     if (name == "lvcbpt") {
-                        const LvcbptAlgorithm<> whole{{{frame_paths, parameters->connections / tables.vertices_per_path},
-                                                       parameters->connections}, parameters->heuristic, parameters->minimum_paths};
+                        const LvcbptAlgorithm<> whole{
+                            {{frame_paths, parameters->connections / tables.vertices_per_path}, parameters->connections},
+                            parameters->heuristic,
+                            parameters->minimum_paths};
                         return render(ClassOfCached<LvcbptAlgorithm<>>{whole, wanted});
                     }
                     if (name != "spcbpt") return invalid_argument("no shares of techniques for '" + name + "'");
@@ -161,7 +165,8 @@ int main(int argc, char** argv) {
         }
         const double all_light = std::accumulate(light.begin(), light.end(), 0.0);
         const double all_noise = std::accumulate(noise.begin(), noise.end(), 0.0);
-        std::printf("%s, %u x %u iterations: relative variance of a pixel per iteration %.3g\n", name.c_str(), seeds, iterations, all_noise);
+        std::printf("%s, %u x %u iterations: relative variance of a pixel per iteration %.3g\n", name.c_str(), seeds,
+                    iterations, all_noise);
         std::printf("  %-14s %9s %9s\n", "", "light", "noise");
         for (size_t c = 0; c < kClasses; ++c)
             std::printf("  %-14s %8.2f%% %8.2f%%\n", kNames[c], 100 * light[c] / all_light, 100 * noise[c] / all_noise);

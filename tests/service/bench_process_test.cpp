@@ -45,8 +45,10 @@ class Bench : public ::testing::Test {
 
 TEST_F(Bench, AReferenceIsTheRenderWithAsManySamples) {
     make_reference();
-    ASSERT_EQ(run({"render", kScene, "-o", path("render.exr"), "--algorithm", "bdpt", "--spp", "48", "--resolution", "32x32", "-q"}),
-              0) << output();
+    ASSERT_EQ(run({"render", kScene, "-o", path("render.exr"), "--algorithm", "bdpt", "--spp", "48", "--resolution",
+                   "32x32", "-q"}),
+              0)
+        << output();
     EXPECT_EQ(*digest_file(path("ref.exr")), *digest_file(path("render.exr")));
     const Json json = Json::parse(*read_file(path("ref.json")));
     EXPECT_EQ(json["sha256"], digest_file(path("ref.exr"))->hex());
@@ -75,9 +77,15 @@ TEST_F(Bench, ACrossCheckIsStoredBesideTheReference) {
 
 TEST_F(Bench, RunsAreLoggedAndResumed) {
     make_reference();
-    const std::vector<std::string> arguments{"bench", kScene, "--reference", path("ref.exr"), "--algorithms", "path,bdpt:heuristic=1",
-                                             "--seeds", "2", "--time", "0.15", "--slice", "0.05", "--threads", "2", "--threshold",
-                                             "20", "--out", path("runs.jsonl")};
+    const std::vector<std::string> arguments{"bench",        kScene,
+                                             "--reference",  path("ref.exr"),
+                                             "--algorithms", "path,bdpt:heuristic=1",
+                                             "--seeds",      "2",
+                                             "--time",       "0.15",
+                                             "--slice",      "0.05",
+                                             "--threads",    "2",
+                                             "--threshold",  "20",
+                                             "--out",        path("runs.jsonl")};
     ASSERT_EQ(run(arguments), 0) << output();
     EXPECT_NE(output().find("bdpt:heuristic=1"), std::string::npos) << output();
     EXPECT_NE(output().find("warning"), std::string::npos) << "the reference is bdpt's: " << output();

@@ -21,10 +21,12 @@ class NoisyPort final : public WorkerPort {
     Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running) override {
         return port_.heartbeat(worker_id, running);
     }
-    Result<SubmitAck> submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial, double seconds) override {
+    Result<SubmitAck> submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial,
+                                    double seconds) override {
         return port_.submit_result(worker_id, lease, std::move(partial), seconds);
     }
-    Result<SubmitAck> submit_training(const std::string& worker_id, const UnitLease& lease, std::string_view payload, double seconds) override {
+    Result<SubmitAck> submit_training(const std::string& worker_id, const UnitLease& lease, std::string_view payload,
+                                      double seconds) override {
         return port_.submit_training(worker_id, lease, payload, seconds);
     }
     Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why) override {
@@ -98,7 +100,8 @@ TEST(Broadcast, ShortenedTablesAreFetchedAgain) {
     // The coordinator's copy, over the wire: what came of it is no use later, but does not stand in the way either.
     const auto server = GrpcServer::start(*service.coordinator, "127.0.0.1:0");
     ASSERT_TRUE(server.ok()) << server.status().message();
-    GrpcWorkerPort wire(grpc::CreateChannel("127.0.0.1:" + std::to_string((*server)->port()), grpc::InsecureChannelCredentials()));
+    GrpcWorkerPort wire(
+        grpc::CreateChannel("127.0.0.1:" + std::to_string((*server)->port()), grpc::InsecureChannelCredentials()));
     std::filesystem::resize_file(assets.path_of(asset.digest), bytes.size() / 2);
     SceneFetcher other(wire, elsewhere.path);
     const Status lost = other.tables(asset, {}).status();
@@ -212,8 +215,9 @@ TEST(Broadcast, AWorkerWithoutTheTablesRefusesAndOthersRender) {
     const Digest digest = alone.coordinator->get_job(stuck)->tables.asset.digest;
     for (int i = 0; i < 3; ++i) {
         LocalWorkerPort port(*alone.coordinator);
-        RendererCache cache([](const JobSpec&, std::stop_token) { return Result<std::shared_ptr<const Scene>>(golden()); },
-                            [](const AssetReference&, std::stop_token) -> Result<std::string> { return data_loss("the disk is broken"); });
+        RendererCache cache(
+            [](const JobSpec&, std::stop_token) { return Result<std::shared_ptr<const Scene>>(golden()); },
+            [](const AssetReference&, std::stop_token) -> Result<std::string> { return data_loss("the disk is broken"); });
         const std::string worker = alone.add_worker();
         const UnitLease lease = alone.lease(worker).at(0);
         const auto renderer = cache.renderer(lease, {});
@@ -272,7 +276,8 @@ TEST(TrainingBudget, ATimeLimitedJobRecordsWhatItTrainedAndCanBeRenderedAgain) {
     EXPECT_EQ(repeated.image_digest, info.image_digest);
     EXPECT_EQ(repeated.tables.asset.digest, info.tables.asset.digest);
     const std::string manifest = *service.coordinator->manifest(info.job_id);
-    for (const char* key : {"\"training_samples\"", "\"held_out_loss\"", "\"trace\"", "\"gamma\"", "\"capped_by_time_limit\": true"})
+    for (const char* key :
+         {"\"training_samples\"", "\"held_out_loss\"", "\"trace\"", "\"gamma\"", "\"capped_by_time_limit\": true"})
         EXPECT_NE(manifest.find(key), std::string::npos) << key;
     EXPECT_NE(manifest.find(info.tables.asset.digest.hex()), std::string::npos);
     // Who names the training set gets it, whatever the time limit.

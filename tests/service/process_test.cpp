@@ -188,8 +188,13 @@ TEST(Processes, TablesAreKeptForTheNextRenderAndCanBeInspected) {
     const Json statistics = Json::parse(*read_file(service.path("statistics.json")));
     EXPECT_TRUE(statistics["tables"]["from_cache"].get<bool>());
     const std::string file = service.path("tables") + "/" + statistics["tables"]["cache_key"].get<std::string>() + ".tables";
-    ASSERT_EQ(Process("lightloom", {"inspect", kScene, "--tables", file, "--draw", service.path("seen"), "--json", service.path("seen.json")},
-                      service.path("inspect.log")).wait(), 0) << service.log("inspect");
+    ASSERT_EQ(
+        Process("lightloom",
+                {"inspect", kScene, "--tables", file, "--draw", service.path("seen"), "--json", service.path("seen.json")},
+                service.path("inspect.log"))
+            .wait(),
+        0)
+        << service.log("inspect");
     EXPECT_EQ(Json::parse(*read_file(service.path("seen.json")))["tables"]["sha256"], statistics["tables"]["sha256"]);
     for (const char* picture : {"-kappa-eye.png", "-kappa-light.png", "-gamma.png", "-q.png"})
         EXPECT_TRUE(read_file(service.path("seen") + picture)->starts_with("\x89PNG")) << picture;

@@ -34,15 +34,22 @@ inline SceneFacts golden_facts() {
 
 /// A service that makes tables of the golden scene.
 struct TableService : FakeService {
-    explicit TableService(const std::function<void(CoordinatorOptions&)>& change = {}, std::optional<uint64_t> shuffle = std::nullopt)
+    explicit TableService(const std::function<void(CoordinatorOptions&)>& change = {},
+                          std::optional<uint64_t> shuffle = std::nullopt)
         : FakeService(kFrame, shuffle, [&](CoordinatorOptions& options) {
-              options.read_scene = [](const AssetStore&, const JobSpec&, std::stop_token) { return Result<SceneFacts>(golden_facts()); };
+              options.read_scene = [](const AssetStore&, const JobSpec&, std::stop_token) {
+                  return Result<SceneFacts>(golden_facts());
+              };
               if (change) change(options);
           }) {}
     JobSpec table_spec(uint32_t spp = 2) const {
         JobSpec s = spec(spp);
         s.algorithm = "spcbpt";
-        s.parameters = {{"training-paths", std::to_string(kSamples)}, {"cache", "500"}, {"light-subspaces", "40"}, {"eye-subspaces", "20"}, {"pilot", "0"}};
+        s.parameters = {{"training-paths", std::to_string(kSamples)},
+                        {"cache", "500"},
+                        {"light-subspaces", "40"},
+                        {"eye-subspaces", "20"},
+                        {"pilot", "0"}};
         return s;
     }
     /// The same, with a pilot of one unit and a guided round of two.
@@ -102,7 +109,8 @@ inline Digest tables_alone(const JobSpec& spec) {
 /// Submits and delivers all training units, in order; the job then renders.
 inline std::string train_by_hand(TableService& service, const JobSpec& spec) {
     const std::string id = service.submit_training(spec);
-    for (const auto& [worker, lease] : lease_all(service)) EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
+    for (const auto& [worker, lease] : lease_all(service))
+        EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
     service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
     return id;
 }

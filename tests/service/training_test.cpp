@@ -51,7 +51,8 @@ TEST(Tables, TrainingUnitsOfSilentWorkersGoToOthers) {
     service.now_ms += 11000;
     service.wait(id, [](const JobInfo& j) { return j.unit_leased == 0; });
     ASSERT_TRUE(service.coordinator->goodbye(lost[1].first).ok());
-    for (const auto& [worker, lease] : lease_all(service)) EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
+    for (const auto& [worker, lease] : lease_all(service))
+        EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
     const JobInfo info = service.wait(id, [](const JobInfo& j) { return j.state == JobState::kRunning; });
     EXPECT_EQ(info.tables.asset.digest, tables_alone(info.spec));
     EXPECT_EQ(info.render_seconds, 0) << "tracing is no rendering: the time limit has not begun";
@@ -73,13 +74,15 @@ TEST(Tables, DamagedTrainingDataAreRefusedAndTheUnitIsLeasedAgain) {
     std::string damaged = traced(lease);
     damaged[damaged.size() / 2] ^= 1;
     EXPECT_EQ(service.give(worker, lease, damaged, sha256(traced(lease))).outcome, SubmitOutcome::kRejected);
-    EXPECT_EQ(service.give(worker, held[1].second, traced(held[2].second)).outcome, SubmitOutcome::kRejected) << "of another size";
+    EXPECT_EQ(service.give(worker, held[1].second, traced(held[2].second)).outcome, SubmitOutcome::kRejected)
+        << "of another size";
     EXPECT_EQ(service.give(worker, lease, "nonsense").outcome, SubmitOutcome::kRejected);
     // A light that the scene does not have shows once the scene is built.
     TrainingData data = *parse_training_data(traced(lease));
     data.vertices[data.paths[0].first_vertex].emitter = 1000000;
     EXPECT_EQ(service.give(worker, lease, serialize(data)).outcome, SubmitOutcome::kAccepted);
-    for (size_t i = 1; i < 3; ++i) EXPECT_EQ(service.give(held[i].first, held[i].second, traced(held[i].second)).outcome, SubmitOutcome::kAccepted);
+    for (size_t i = 1; i < 3; ++i)
+        EXPECT_EQ(service.give(held[i].first, held[i].second, traced(held[i].second)).outcome, SubmitOutcome::kAccepted);
     std::vector<UnitLease> again;
     for (int i = 0; i < 500 && again.empty(); ++i) {
         again = service.lease(service.add_worker());
@@ -338,10 +341,11 @@ TEST(TableCache, AMalformedReportIsADamagedEntry) {
         return good.substr(0, at) + value + good.substr(good.find_first_of(",}", at));
     };
     EXPECT_TRUE(find_with(with("loss", "1.5")));
-    for (const std::string& report : {std::string("null"), std::string("[]"), std::string("{}"), std::string("7"), std::string(),
-                                      std::string("{\"loss\":"), with("loss", "null"), with("loss", "\"1\""), with("note", "null"),
-                                      with("note", "5"), with("training_samples", "-1"), with("light_subspaces", "4294967296"),
-                                      with("eye_subspaces", "1.5"), with("capped_by_time_limit", "0")}) {
+    for (const std::string& report :
+         {std::string("null"), std::string("[]"), std::string("{}"), std::string("7"), std::string(),
+          std::string("{\"loss\":"), with("loss", "null"), with("loss", "\"1\""), with("note", "null"), with("note", "5"),
+          with("training_samples", "-1"), with("light_subspaces", "4294967296"), with("eye_subspaces", "1.5"),
+          with("capped_by_time_limit", "0")}) {
         EXPECT_FALSE(find_with(report)) << report;
         EXPECT_FALSE(std::filesystem::exists(cache.path_of(key))) << report;
     }

@@ -123,7 +123,9 @@ TEST(StatusPage, AnswersGetAndSurvivesNonsense) {
     const auto status = std::move(StatusHttp::start(*service.coordinator, "127.0.0.1:0")).value();
     const std::string id = service.submit(service.spec(4));
     service.add_worker();
-    const auto get = [&](const std::string& path) { return http(status->port(), "GET " + path + " HTTP/1.1\r\nHost: x\r\n\r\n"); };
+    const auto get = [&](const std::string& path) {
+        return http(status->port(), "GET " + path + " HTTP/1.1\r\nHost: x\r\n\r\n");
+    };
     EXPECT_NE(get("/healthz").find("200 OK"), std::string::npos);
     const std::string json = get("/api/v1/status");
     EXPECT_NE(json.find(id), std::string::npos);

@@ -98,7 +98,8 @@ Status print_missing_energy(const Options& options) {
         const auto never = [](const Rendering&) { return false; };
         auto total = render_groups(*as_is->scene, *bdpt, options.seconds / 4, never);
         if (!total.ok()) return total.status();
-        auto hits = render_groups(*hittable->scene, group_of(*hittable, HitsOnly{}, options.seed), options.seconds * 3 / 4, never);
+        auto hits =
+            render_groups(*hittable->scene, group_of(*hittable, HitsOnly{}, options.seed), options.seconds * 3 / 4, never);
         if (!hits.ok()) return hits.status();
         const bool points = !as_is->scene->description().point_lights.empty();
         // Of the whole light: where the lights are points, bdpt's mean lacks what only hits can make.
@@ -107,12 +108,18 @@ Status print_missing_energy(const Options& options) {
         const double only = by_hits.mean;
         const double all = points ? own + only : own;
         const double error = student_quantile(sidak(0.05, int(names.size())), by_hits.degrees) * by_hits.standard_error();
-        std::printf("%-26s %-18s %10.5f %12.6f  %.5f [%.5f, %.5f]\n", name.c_str(), points ? "points (missing)" : "can be hit", own,
-                    only, only / all, (only - error) / all, (only + error) / all);
+        std::printf("%-26s %-18s %10.5f %12.6f  %.5f [%.5f, %.5f]\n", name.c_str(),
+                    points ? "points (missing)" : "can be hit", own, only, only / all, (only - error) / all,
+                    (only + error) / all);
         std::fflush(stdout);
         if (!options.json.empty())
-            json << nlohmann::ordered_json{{"scene", name},      {"missing", points}, {"bdpt_mean", own}, {"hits_only_mean", only},
-                                           {"share", only / all}, {"low", (only - error) / all}, {"high", (only + error) / all}}
+            json << nlohmann::ordered_json{{"scene", name},
+                                           {"missing", points},
+                                           {"bdpt_mean", own},
+                                           {"hits_only_mean", only},
+                                           {"share", only / all},
+                                           {"low", (only - error) / all},
+                                           {"high", (only + error) / all}}
                         .dump()
                  << std::endl;
     }

@@ -65,7 +65,7 @@ TEST(TableFuzz, RandomTablesKeepTheMean) {
         for (int n = 1; n <= 5; ++n) {
             CacheOptions options;
             options.connections = n;
-            options.ris_aware = n % 2 == 0;
+            options.ris_aware = n % 2 == 0, options.correlation_aware = n % 3 == 0;
             options.light_paths = n == 3 ? 0.4 : 1;  // N1 need not be one
             RandomTableOptions random;
             random.light_count = uint32_t(4 * n), random.eye_count = uint32_t(3 * n);
@@ -73,9 +73,10 @@ TEST(TableFuzz, RandomTablesKeepTheMean) {
             const SubspaceTables tables = testing::random_tables(scene->emitters(), uint64_t(100 + n), random);
             const std::string what = std::string(c.name) + ", N = " + std::to_string(n);
             ++frames;
-            tested += compare(
-                c, expected, means(scene, testing::spcbpt_image(scene, tables, options, kMaxDepth, kSamplesPerPixel), 1000 * uint64_t(n)),
-                what, &family);
+            tested += compare(c, expected,
+                              means(scene, testing::spcbpt_image(scene, tables, options, kMaxDepth, kSamplesPerPixel),
+                                    1000 * uint64_t(n)),
+                              what, &family);
             if (n % 2 == 0) continue;
             ++frames;
             tested += compare(c, expected,
@@ -176,7 +177,8 @@ TEST(TableFuzz, WindowsKeepTheMean) {
 TEST(TableFuzz, EachTechniqueAloneHasTheSameMean) {
     TestFamily family;
     int pairs = 0, tested = 0;
-    for (const auto& [name, make] : {std::pair<const char*, MakeScene>{"lamp", testing::apart_with_lamp}, {"sky", testing::apart_with_sky}}) {
+    for (const auto& [name, make] :
+         {std::pair<const char*, MakeScene>{"lamp", testing::apart_with_lamp}, {"sky", testing::apart_with_sky}}) {
         const auto scene = make();
         for (int k = 2; k <= 4; ++k) {
             testing::MaskedSelection nee{testing::bdpt_selection(*scene)};
@@ -194,8 +196,10 @@ TEST(TableFuzz, EachTechniqueAloneHasTheSameMean) {
                 MaskedCacheSelection<UniformSelection> lvc{{double(scene->frame().crop.area()), 1.7}};
                 spc.only_s = lvc.only_s = s;
                 spc.min_k = spc.max_k = lvc.min_k = lvc.max_k = k;
-                const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> subspaces{{spc, 3}, Heuristic::kBalance, options.paths};
-                const LvcbptAlgorithm<MaskedCacheSelection<UniformSelection>> uniform{{lvc, 3}, Heuristic::kBalance, options.paths};
+                const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> subspaces{
+                    {spc, 3}, Heuristic::kBalance, options.paths};
+                const LvcbptAlgorithm<MaskedCacheSelection<UniformSelection>> uniform{
+                    {lvc, 3}, Heuristic::kBalance, options.paths};
                 const std::string what = std::string(name) + ", k = " + std::to_string(k) + ", s = " + std::to_string(s);
                 pairs += 2;
                 tested += testing::compare(expected, means(scene, testing::cache_image(scene, subspaces, k - 1, 8, 1), 11000),
@@ -275,9 +279,10 @@ TEST(TableFuzz, CountedEnergyIsTheExpectedOne) {
                 const TrainingVertex* v = &data->vertices[p.first_vertex];
                 for (uint32_t i = 0; i < p.vertex_count; ++i) {
                     if (!(v[i].density > 0)) continue;
-                    const uint32_t label = i == 0 ? labeller.source(v[0].emitter, v[0].position, v[0].normal)
-                                                  : tables.light_label(sub_path_end(v[i].position, v[i].normal,
-                                                                                    normalize(v[i - 1].position - v[i].position)));
+                    const uint32_t label =
+                        i == 0 ? labeller.source(v[0].emitter, v[0].position, v[0].normal)
+                               : tables.light_label(sub_path_end(v[i].position, v[i].normal,
+                                                                 normalize(v[i - 1].position - v[i].position)));
                     sum[label] += double(v[i].density);
                     sum[n] += double(v[i].density);
                 }
@@ -309,7 +314,8 @@ TEST(TableFuzz, CountedEnergyIsTheExpectedOne) {
             // Subspaces with a prefix here and there are anything but normal.
             if (i < n && std::max(a.relative_error(), b.relative_error()) > 0.1) continue;
             EXPECT_LT(std::fabs(a.mean - b.mean), 4 * std::sqrt(a.variance + b.variance) + 1e-6 * a.mean)
-                << c.name << (i == n ? ", all subspaces" : ", subspace " + std::to_string(i)) << ": " << a.mean << " and " << b.mean;
+                << c.name << (i == n ? ", all subspaces" : ", subspace " + std::to_string(i)) << ": " << a.mean << " and "
+                << b.mean;
         }
     }
 }

@@ -1,5 +1,5 @@
-// What was learned is what helps: with other numbers in Gamma the mean stays (table_fuzz_test) and the noise grows. On door, whose
-// light comes through a gap, at equal iterations.
+// What was learned is what helps: with other numbers in Gamma the mean stays (table_fuzz_test) and the noise grows. On
+// door, whose light comes through a gap, at equal iterations.
 
 #include <gtest/gtest.h>
 

@@ -53,7 +53,8 @@ inline void for_each_path(const Scene& scene, int count, int max_edges, uint64_t
             if (labeller != nullptr) {
                 labeller->label_camera_vertex(&z[size_t(t - 1)]);
                 if (n > 0)
-                    if (const Rgb c = connect_candidate<kDetail>(scene, y.data(), 1, z.data(), t, &view, &counters); !c.is_black()) {
+                    if (const Rgb c = connect_candidate<kDetail>(scene, y.data(), 1, z.data(), t, &view, &counters);
+                        !c.is_black()) {
                         const bool infinite = scene.emitters()[uint32_t(y[0].emitter)].is_infinite();
                         complete(y.data(), 1, z.data(), t, infinite ? -y[0].ng : normalize(y[0].p - v.p));
                         visit(join(scene, y.data(), 1, z.data(), t), 1, view, c);

@@ -153,7 +153,8 @@ struct Rebuilt {
 
 /// The path as technique s would have produced it; nothing when that technique cannot. With a labeller: as a method that
 /// selects by subspaces would have, x_0 of s = 1 from a light sub-path, the view with throughput and labels.
-inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, int s, const SubspaceLabeller* labeller = nullptr) {
+inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, int s,
+                                      const SubspaceLabeller* labeller = nullptr) {
     const int k = path.k();
     const Emitter& e = scene.emitters()[uint32_t(path.x[0].emitter)];
     const auto smooth = [&](int i) { return !path.x[size_t(i)].delta && path.x[size_t(i)].bsdf.has_smooth_lobe(); };

@@ -85,7 +85,8 @@ class SceneBuilder {
 inline SceneBuilder cornell_builder(int size = 32) {
     SceneBuilder b;
     b.description().film.width = b.description().film.height = size;
-    const MaterialId white = b.diffuse({0.7f, 0.7f, 0.7f}), red = b.diffuse({0.6f, 0.1f, 0.1f}), green = b.diffuse({0.1f, 0.5f, 0.2f});
+    const MaterialId white = b.diffuse({0.7f, 0.7f, 0.7f}), red = b.diffuse({0.6f, 0.1f, 0.1f}),
+                     green = b.diffuse({0.1f, 0.5f, 0.2f});
     b.room({-1, 0, -1}, {1, 2, 1}, white);
     b.description().meshes[2].attributes.material = red;
     b.description().meshes[3].attributes.material = green;

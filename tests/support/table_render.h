@@ -14,7 +14,7 @@ struct CacheOptions {
     int connections = 3;         ///< N
     uint64_t paths = 1000;       ///< M
     double light_paths = 1;      ///< N1 per pixel and iteration.
-    bool ris_aware = false;
+    bool ris_aware = false, correlation_aware = false;
 };
 
 /// A unit over the whole frame whose plan counts N1 light paths per pixel and iteration.
@@ -44,6 +44,7 @@ inline SubspaceSelection subspace_selection(const Scene& scene, SubspaceTables t
     s.light_paths_per_iteration = o.light_paths * double(scene.frame().crop.area());
     s.connections = o.connections;
     s.cache_paths = o.ris_aware ? double(o.paths) : 0;
+    s.correlation_aware = o.correlation_aware;
     return s;
 }
 
@@ -90,6 +91,7 @@ inline std::vector<RegionMeans> lengths_with_tables(const std::shared_ptr<const 
         CacheOptions options;
         options.connections = p->connections, options.paths = p->minimum_paths;
         options.light_paths = p->light_paths, options.ris_aware = p->ris_aware;
+        options.correlation_aware = p->correlation_aware;
         const double vertices = tables->vertices_per_path, frame_paths = p->light_paths * double(scene->frame().crop.area());
         const MaskedCacheSelection<UniformSelection> uniform{{frame_paths, p->connections / vertices}};
         const MaskedCacheSelection<SubspaceSelection> subspaces{subspace_selection(*scene, *std::move(tables), options)};
@@ -100,13 +102,21 @@ inline std::vector<RegionMeans> lengths_with_tables(const std::shared_ptr<const 
         };
         for (int k = 1; k <= max_length; ++k) {
             if (name == "lvcbpt")
-                render(uniform, [&](const auto& s) {
-                    return LvcbptAlgorithm<MaskedCacheSelection<UniformSelection>>{{s, p->connections}, p->heuristic, p->minimum_paths};
-                }, k);
+                render(
+                    uniform,
+                    [&](const auto& s) {
+                        return LvcbptAlgorithm<MaskedCacheSelection<UniformSelection>>{
+                            {s, p->connections}, p->heuristic, p->minimum_paths};
+                    },
+                    k);
             else if (name == "spcbpt")
-                render(subspaces, [&](const auto& s) {
-                    return SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>>{{s, p->connections}, p->heuristic, p->minimum_paths};
-                }, k);
+                render(
+                    subspaces,
+                    [&](const auto& s) {
+                        return SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>>{
+                            {s, p->connections}, p->heuristic, p->minimum_paths};
+                    },
+                    k);
             else
                 throw std::runtime_error("no masked selection for '" + name + "' yet: add it here");
         }

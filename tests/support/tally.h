@@ -12,9 +12,9 @@
 namespace lightloom::testing {
 
 /// Weights come from float densities, recomputed along directions that differ in the last bits; grazing events and refraction
-/// near the critical angle amplify that. 1e-4 must hold for nearly all paths, one per cent for all but those. A Dirac event leaves
-/// from a point beside the surface (offset_origin(), 3e-5 of a coordinate), so that seen from its neighbours it is a mirror
-/// only up to that over their distance: 1e-3.
+/// near the critical angle amplify that. 1e-4 must hold for nearly all paths, one per cent for all but those. A Dirac event
+/// leaves from a point beside the surface (offset_origin(), 3e-5 of a coordinate), so that seen from its neighbours it is a
+/// mirror only up to that over their distance: 1e-3.
 struct Tally {
     uint64_t count = 0, loose = 0, gross = 0;
 
@@ -26,7 +26,8 @@ struct Tally {
     }
     void check(const std::string& what, double loose_share = 2e-3) const {
         EXPECT_GE(count, 500u) << what;
-        EXPECT_LT(double(loose), loose_share * double(count)) << what << ": " << loose << " of " << count << " deviate by over 1e-4";
+        EXPECT_LT(double(loose), loose_share * double(count))
+            << what << ": " << loose << " of " << count << " deviate by over 1e-4";
         EXPECT_LE(double(gross), 2e-4 * double(count)) << what << ": " << gross << " of " << count << " deviate by over 1e-2";
     }
 };

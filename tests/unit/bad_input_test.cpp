@@ -139,7 +139,10 @@ TEST(BadInput, SingleLights) {
         add(b);
         return b.build();
     };
-    expect_means_of_path(with([](SceneBuilder& b) { b.description().point_lights.push_back({{0, 1.5f, 0}, {1, 2, 1}}); }), "a point light");
+    expect_means_of_path(with([](SceneBuilder& b) {
+                             b.description().point_lights.push_back({{0, 1.5f, 0}, {1, 2, 1}});
+                         }),
+                         "a point light");
     expect_means_of_path(with([](SceneBuilder& b) {
                              SpotLight spot;
                              spot.position = {0, 1.8f, 0};

@@ -139,7 +139,8 @@ TEST(Bsdf, ReciprocityAndReverseDensities) {
             const float tolerance = c.sharpness < 0.05f ? 2e-2f : 2e-4f;
             const auto close = [&](float a, float b) { return std::fabs(a - b) <= tolerance * (std::fabs(a) + 1e-3f); };
             // A light particle and the camera ray that runs against it see the same value.
-            for (int k = 0; k < 3; ++k) ASSERT_TRUE(close(there.f[k], back.f[k])) << c.name << " " << there.f[k] << " " << back.f[k];
+            for (int k = 0; k < 3; ++k)
+                ASSERT_TRUE(close(there.f[k], back.f[k])) << c.name << " " << there.f[k] << " " << back.f[k];
             ASSERT_TRUE(close(there.pdf_fwd, back.pdf_rev)) << c.name << " " << there.pdf_fwd << " " << back.pdf_rev;
             ASSERT_TRUE(close(there.pdf_rev, back.pdf_fwd)) << c.name << " " << there.pdf_rev << " " << back.pdf_fwd;
             const BsdfEval radiance = c.bsdf.eval(wo, wi, kRadiance);
@@ -230,8 +231,8 @@ TEST(Bsdf, CoatedConductorIsCloseToTheLayeredWalk) {
     for (float base : {0.0f, 0.05f, 0.1f})
         for (float cos : {1.0f, 0.5f, 0.15f}) {
             const Rgb eta(0.2f), k(3.9f);
-            const Estimate walk = walk_through_layers(make_dielectric(1.5f, 0, 0), make_conductor(eta / 1.5f, k / 1.5f, base, base),
-                                                      0.01f, cos, 100000);
+            const Estimate walk = walk_through_layers(make_dielectric(1.5f, 0, 0),
+                                                      make_conductor(eta / 1.5f, k / 1.5f, base, base), 0.01f, cos, 100000);
             const Estimate model =
                 albedo(make_coated_conductor(eta, k, base, base, 1.5f, 0.01f, 0, 0), direction(cos, 0), kImportance);
             const double tolerance = base == 0 ? 1e-3 : 0.12 * walk.mean;

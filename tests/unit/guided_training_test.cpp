@@ -81,8 +81,9 @@ TEST(GuidedTraining, EstimatesWhatThePilotEstimates) {
                 const Sample a(pilot[i]), b(guided[i]);
                 if (a.mean == 0 && b.mean == 0) continue;
                 if (std::max(a.relative_error(), b.relative_error()) > 0.1) continue;  // would find nothing
-                family.add(testing::welch_p_value(a, b), std::string(named.name) + ", " + what + " guide, " + names[i].first + ": " +
-                                                             std::to_string(a.mean) + " and " + std::to_string(b.mean));
+                family.add(testing::welch_p_value(a, b), std::string(named.name) + ", " + what + " guide, " +
+                                                             names[i].first + ": " + std::to_string(a.mean) + " and " +
+                                                             std::to_string(b.mean));
             }
         }
     }

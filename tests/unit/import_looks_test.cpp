@@ -111,7 +111,8 @@ TEST(ImportMaterial, WhatIsNotModelledIsNamed) {
     expect_error("Material \"dielectric\" \"float roughness\" 2", {"[0, 1]"});
     expect_error("Material \"dielectric\" \"float eta\" 0", {"index"});
     expect_warning("Material \"coateddiffuse\" \"float g\" 0.1", "medium");
-    const Material coat = material_of(world("Material \"coateddiffuse\" \"float thickness\" 0.1 \"integer maxdepth\" 7" + kShape));
+    const Material coat =
+        material_of(world("Material \"coateddiffuse\" \"float thickness\" 0.1 \"integer maxdepth\" 7" + kShape));
     EXPECT_EQ(coat.thickness, 0.1f);
     EXPECT_EQ(coat.layer_events, 7);
     expect_warning("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"" + kShape, "dispersion");

@@ -39,7 +39,8 @@ TEST(SmallScenes, LeavingASurfaceNeitherHitsItNorSkipsItsNeighbour) {
             if (!below_sheet && x > -0.1f) continue;
             const bool occluded = scene->occluded(point.p, point.ng, point.reach, point.p + direction * (0.2f * s));
             SurfacePoint next;
-            const bool found = scene->intersect(offset_origin(point.p, point.ng, direction, point.reach), normalize(direction), &next);
+            const bool found =
+                scene->intersect(offset_origin(point.p, point.ng, direction, point.reach), normalize(direction), &next);
             EXPECT_EQ(occluded, found) << s;
             // The direction is steep enough to meet the sheet if it starts below it, and to miss it if not.
             EXPECT_EQ(occluded, below_sheet) << s << " " << x << " " << z;

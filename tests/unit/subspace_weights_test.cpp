@@ -48,12 +48,14 @@ class SubspaceWeights : public ::testing::TestWithParam<testing::NamedScene> {};
 TEST_P(SubspaceWeights, SumToOneWhateverTheTablesHold) {
     const auto scene = GetParam().make();
     const UniformSelection uniform{double(scene->frame().crop.area()), 0.37};
-    Tally lvc, balance, power, aware, traced;
+    Tally lvc, balance, power, aware, correlated, traced;
     std::vector<int> made(kEdges + 1, 0);
     for (uint64_t seed = 1; seed <= 3; ++seed) {
         const SubspaceSelection blind = selection_of(*scene, random_tables(scene->emitters(), seed), double(seed), 0);
         SubspaceSelection knowing = blind;
         knowing.cache_paths = 50;
+        SubspaceSelection sharing = blind;
+        sharing.correlation_aware = true;
         const SubspaceLabeller labeller{blind.prepared->tables, scene->emitters()};
         testing::for_each_path(
             *scene, can_be_hit(*scene) ? 4000 : 8000, kEdges, 40 + seed,
@@ -61,7 +63,7 @@ TEST_P(SubspaceWeights, SumToOneWhateverTheTablesHold) {
                 ++made[size_t(own)];
                 const int k = path.k();
                 if (k < 2) return;
-                double sums[5] = {};
+                double sums[6] = {};
                 for (int s = 0; s <= k; ++s) {
                     const auto r = rebuild(*scene, path, s, &labeller);
                     if (!r) continue;
@@ -71,10 +73,11 @@ TEST_P(SubspaceWeights, SumToOneWhateverTheTablesHold) {
                     sums[1] += w;
                     sums[2] += mis_weight(r->view, technique, blind, Heuristic::kPower);
                     sums[3] += mis_weight(r->view, technique, knowing);
-                    sums[4] += s == own ? mis_weight(view, technique, blind) : w;
+                    sums[4] += mis_weight(r->view, technique, sharing);
+                    sums[5] += s == own ? mis_weight(view, technique, blind) : w;
                 }
-                Tally* tallies[] = {&lvc, &balance, &power, &aware, &traced};
-                for (int i = 0; i < 5; ++i) tallies[i]->add(sums[i] - 1, path);
+                Tally* tallies[] = {&lvc, &balance, &power, &aware, &correlated, &traced};
+                for (int i = 0; i < 6; ++i) tallies[i]->add(sums[i] - 1, path);
             },
             &labeller);
     }
@@ -82,9 +85,37 @@ TEST_P(SubspaceWeights, SumToOneWhateverTheTablesHold) {
     balance.check("spcbpt balance");
     power.check("spcbpt power");
     aware.check("spcbpt, ris_aware");
+    correlated.check("spcbpt, correlation_aware");
     traced.check("spcbpt, own view as traced", kLooseTraced);
     for (int s = can_be_hit(*scene) ? 0 : 1; s <= 4; ++s)
         EXPECT_GT(made[size_t(s)], 20) << "technique s = " << s << " was hardly exercised";
+}
+
+/// c_s lies in [1/n, 1], and both ends occur: a camera sub-path that had to be this one, and one that is a rare choice of many.
+TEST(CorrelationFactor, LiesBetweenOneOverTheConnectionsAndOne) {
+    PathView view;
+    view.k = 4;
+    view.primary_distance2 = 1;
+    const auto factor = [&](double camera, double light, int s, double n) {
+        for (int i = 0; i < view.k; ++i) view.rev[i] = camera, view.fwd[i] = light, view.delta[i] = false;
+        return correlation_factor(view, s, n);
+    };
+    EXPECT_EQ(factor(1e9, 1e-3, 2, 3), 1);
+    EXPECT_EQ(factor(1e-3, 1e9, 2, 3), 1.0 / 3);
+    EXPECT_EQ(factor(1e-200, 1e-200, 2, 3), 1) << "nothing is known";
+    for (const double camera : {1e-2, 1.0, 1e2, 1e3, 1e4})
+        for (const double light : {1e-2, 1.0, 1e2, 1e3, 1e4})
+            for (const int s : {1, 2, 3}) {
+                const double c = factor(camera, light, s, 8);
+                EXPECT_GE(c, 1.0 / 8);
+                EXPECT_LE(c, 1);
+            }
+    // Dirac events and discrete lights do not dilute: only what spreads counts.
+    factor(1e-3, 1e-3, 2, 1e9);
+    view.delta[3] = view.delta[0] = true;
+    view.rev[3] = 1e9;
+    view.source = PathView::Source::kDiscrete;
+    EXPECT_EQ(correlation_factor(view, 2, 1e9), 1);
 }
 
 TEST_P(SubspaceWeights, EveryTechniqueSeesTheSameLabelsAndThroughput) {

@@ -89,13 +89,17 @@ TEST(Tables, EveryBadTableIsRefusedByName) {
         {"too many subspaces", [](SubspaceTables& t) { t.light_count = SubspaceTables::kMaxSubspaces + 1; }},
         {"division of no scene", [](SubspaceTables& t) { t.division = LightDivision(); }},
         {"division of another scene",
-         [](SubspaceTables& t) { t.division = LightDivision(std::vector<LightDivision::Cells>(t.division.cells().size() + 1)); }},
-        {"cells beyond", [](SubspaceTables& t) {
+         [](SubspaceTables& t) {
+             t.division = LightDivision(std::vector<LightDivision::Cells>(t.division.cells().size() + 1));
+         }},
+        {"cells beyond",
+         [](SubspaceTables& t) {
              auto cells = t.division.cells();
              cells.back() = {uint16_t(t.light_count - 1), 2};
              t.division = LightDivision(cells);
          }},
-        {"cells without a side", [](SubspaceTables& t) {
+        {"cells without a side",
+         [](SubspaceTables& t) {
              auto cells = t.division.cells();
              cells.back().side = 0;
              t.division = LightDivision(cells);
@@ -103,18 +107,23 @@ TEST(Tables, EveryBadTableIsRefusedByName) {
         {"light label beyond", [&](SubspaceTables& t) { t.light_tree = leaf(t.light_count); }},
         {"eye label beyond", [&](SubspaceTables& t) { t.eye_tree = leaf(t.eye_count); }},
         {"tree without nodes", [](SubspaceTables& t) { t.eye_tree = SubspaceTree(std::vector<SubspaceTree::Node>()); }},
-        {"tree with a loop", [](SubspaceTables& t) {
+        {"tree with a loop",
+         [](SubspaceTables& t) {
              t.eye_tree = SubspaceTree({SubspaceTree::make_inner(0, 0, 0), SubspaceTree::make_leaf(0)});
          }},
-        {"tree with a missing child", [](SubspaceTables& t) {
+        {"tree with a missing child",
+         [](SubspaceTables& t) {
              t.eye_tree = SubspaceTree({SubspaceTree::make_inner(0, 0, 1), SubspaceTree::make_leaf(0)});
          }},
-        {"tree with an unknown axis", [](SubspaceTables& t) {
+        {"tree with an unknown axis",
+         [](SubspaceTables& t) {
              t.light_tree = SubspaceTree({SubspaceTree::make_inner(SubspaceTree::kAxes, 0, 1), SubspaceTree::make_leaf(0),
                                           SubspaceTree::make_leaf(0)});
          }},
-        {"tree with a threshold that is no number", [](SubspaceTables& t) {
-             t.light_tree = SubspaceTree({SubspaceTree::make_inner(0, kNan, 1), SubspaceTree::make_leaf(0), SubspaceTree::make_leaf(0)});
+        {"tree with a threshold that is no number",
+         [](SubspaceTables& t) {
+             t.light_tree = SubspaceTree(
+                 {SubspaceTree::make_inner(0, kNan, 1), SubspaceTree::make_leaf(0), SubspaceTree::make_leaf(0)});
          }},
         {"Q too short", [](SubspaceTables& t) { t.energy.pop_back(); }},
         {"Q zero", [](SubspaceTables& t) { t.energy[1] = 0; }},
@@ -379,7 +388,8 @@ TEST(Classifier, LabelsAreNested) {
     ClassifierOptions options;
     options.subspaces = 64, options.seed = 4;
     const SubspaceTree tree = train_classifier(ends, options);
-    std::sort(ends.begin(), ends.end(), [](const WeightedEnd& a, const WeightedEnd& b) { return a.end.position.x < b.end.position.x; });
+    std::sort(ends.begin(), ends.end(),
+              [](const WeightedEnd& a, const WeightedEnd& b) { return a.end.position.x < b.end.position.x; });
     uint32_t previous = 0;
     for (const WeightedEnd& e : ends) {
         const uint32_t label = tree.label(e.end);

@@ -163,7 +163,8 @@ TEST(JobSpec, DigestChangesWithEverythingThatChangesTheImageAndOnlyThat) {
 }
 
 TEST(AssetPath, OnlyPlainRelativePathsTravel) {
-    for (const char* good : {"a", "a/b.ply", "a b/c", "..a/b..", "\xc3\xa4/x"}) EXPECT_TRUE(validate_asset_path(good).ok()) << good;
+    for (const char* good : {"a", "a/b.ply", "a b/c", "..a/b..", "\xc3\xa4/x"})
+        EXPECT_TRUE(validate_asset_path(good).ok()) << good;
     for (const char* bad : {"", "/a", "../a", "a/../b", "a/./b", "a//b", "a/", ".", "..", "a\\b", "a\nb", "a\x7f", "caf\xe9.pbrt",
                             "\xc3", "\xc0\xaf", "\xed\xa0\x80", "\xf5\x80\x80\x80"})
         EXPECT_FALSE(validate_asset_path(bad).ok()) << bad;
