@@ -70,7 +70,17 @@ Coordinator::~Coordinator() {
     work_changed_.notify_all();
     job_changed_.notify_all();
     ticker_ = {};
-    jobs_.clear();  // joins their tasks; these may still take the mutex
+    // Jobs join their tasks when they go, and these still take the mutex and look through the lists: they find them empty.
+    for (;;) {
+        std::vector<std::shared_ptr<JobRecord>> jobs;
+        std::vector<std::shared_ptr<void>> garbage;
+        {
+            const std::lock_guard lock(mutex_);
+            jobs.swap(jobs_);
+            garbage.swap(discarded_);
+        }
+        if (jobs.empty() && garbage.empty()) break;
+    }
 }
 
 TimePoint Coordinator::after(double seconds) const {
@@ -304,8 +314,10 @@ void Coordinator::end_job(JobRecord& job, JobState state) {
         job.units.reset();
     }
     discard_training(job);
-    if (job.maker) discarded_.push_back(std::move(job.maker));
-    job.maker.reset();
+    if (const auto maker = std::exchange(job.maker, nullptr)) {
+        if (is_terminal(maker->state)) drop_tables(maker->tables_asset);  // kept for this job
+        discarded_.push_back(maker);
+    }
     drop_tables(job.tables_asset);
     drop_tables(job.guide.digest);
     job.guide_bytes.reset();

@@ -276,6 +276,8 @@ bool Coordinator::repair_tables(const std::string& job_id) {
                                    : data_loss("no other copy is left; submit the job again");
     if (stored.ok() || stored.code() == StatusCode::kAborted) {
         spdlog::warn("{}: tables {} were damaged on disk and are restored", job_id, digest.hex().substr(0, 12));
+        const std::lock_guard lock(mutex_);
+        if (is_terminal(job->state)) drop_tables(digest);  // it ended meanwhile
         return true;
     }
     const std::lock_guard lock(mutex_);

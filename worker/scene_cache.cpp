@@ -174,6 +174,7 @@ Result<std::shared_ptr<const Renderer>> RendererCache::renderer(const UnitLease&
     if (!renderer.ok()) return renderer.status();
     std::shared_ptr<const Renderer> shared = std::move(renderer).value();
     renderer_entries_.push_front({image, lease.tables.digest, shared});
+    tracer_ = {};  // it keeps a scene and tables, and whoever renders has traced
     if (renderer_entries_.size() > kMaxRenderers) renderer_entries_.pop_back();
     return shared;
 }

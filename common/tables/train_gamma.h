@@ -26,6 +26,7 @@ struct GammaPath {
     float weight = 0;        ///< w_X, see TrainingPath::square over the squared brightness of its block.
     float fixed = 0;         ///< Techniques that Gamma does not change.
     float contribution = 0;  ///< Relative to the block's brightness.
+    uint32_t batch = 0;      ///< Paths of a batch are not independent of one another: they share light sub-paths.
 };
 
 struct GammaDataset {
@@ -41,7 +42,7 @@ enum class GammaTrainer : uint8_t { kMm, kAdam, kContribution };
 struct GammaOptions {
     GammaTrainer trainer = GammaTrainer::kMm;
     double mix = 0.1;
-    double held_out = 0.2;  ///< Share of the paths that only judge (mm).
+    double held_out = 0.2;  ///< Share of the batches that only judge (mm); of the paths where there are few batches.
     uint64_t seed = 0;
     std::stop_token stop;   ///< Requested: returns soon, with a matrix of no use.
 };

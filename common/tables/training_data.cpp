@@ -49,6 +49,7 @@ Status TrainingData::append(const TrainingData& other, uint64_t max_vertices) {
     join(paths, other.paths);
     join(light_paths, other.light_paths);
     vertices.insert(vertices.end(), other.vertices.begin(), other.vertices.end());
+    part_ends.push_back(uint32_t(paths.size()));
     return {};
 }
 

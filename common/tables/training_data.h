@@ -40,6 +40,7 @@ struct TrainingData {
     uint64_t samples = 0;            ///< Camera samples traced, uniform over the frame; as many light sub-paths.
     std::vector<TrainingPath> paths;
     std::vector<TrainingPath> light_paths;
+    std::vector<uint32_t> part_ends; ///< In `paths`, of what append() has joined; not serialized.
     std::vector<TrainingVertex> vertices;
 
     static constexpr uint64_t kMaxVertices = UINT32_MAX;  ///< TrainingPath::first_vertex has 32 bits.

@@ -97,7 +97,9 @@ struct CachedAlgorithm {
                 const bool direction = s == 1 && scene.emitters()[uint32_t(end.emitter)].is_infinite();
                 method.complete(scene, pick.y, s, z, t, direction ? -end.ng : normalize(end.p - v.p), &view);
                 const float scale = method.inverse_density(pick);
-                contribute(PathContribution{c * scale, scale, s, t, pick.y, z, start.p, start.ng, uint32_t(start.emitter), {}}, view);
+                // Where a light sub-path from an infinite light began says nothing about this one: x_0 is a direction.
+                const Vec3 x0 = direction ? scene.emitters().outside(v.p, -end.ng) : start.p;
+                contribute(PathContribution{c * scale, scale, s, t, pick.y, z, x0, start.ng, uint32_t(start.emitter), {}}, view);
             }
         };
         const auto escape = [&](int t, const WalkRay& ray) {

@@ -49,7 +49,7 @@ class Reservoir {
                                    (s == 0   ? 1
                                     : s == k ? light_paths_per_iteration
                                              : view.light_throughput[s]);
-            if (density < std::numeric_limits<float>::max()) vertices_[s == k ? 0 : size_t(s)].density += float(density);
+            vertices_[s == k ? 0 : size_t(s)].density += single(density);
         };
         keep(c.s, 1);
         for_each_split(view, c.s, 0, k, [&](int s, const WideProduct& chain) { keep(s, chain.value(1)); });
@@ -57,19 +57,19 @@ class Reservoir {
     }
     /// Adds what was kept to `data`, and is empty again.
     void move_to(TrainingData* data) {
-        const double square = contribution_ * sum_;  // c^2 w / ((c w) / sum)
-        if (sum_ > 0 && square < std::numeric_limits<float>::max()) keep(square, data);
+        if (sum_ > 0) {
+            path_.first_vertex = uint32_t(data->vertices.size());
+            path_.estimate = single(sum_);
+            path_.square = single(contribution_ * sum_);  // c^2 w / ((c w) / sum)
+            data->paths.push_back(path_);
+            data->vertices.insert(data->vertices.end(), vertices_.begin(), vertices_.end());
+        }
         path_ = {}, sum_ = 0, contribution_ = 0;
     }
 
   private:
-    void keep(double square, TrainingData* data) {
-        path_.first_vertex = uint32_t(data->vertices.size());
-        path_.estimate = float(sum_);
-        path_.square = float(square);
-        data->paths.push_back(path_);
-        data->vertices.insert(data->vertices.end(), vertices_.begin(), vertices_.end());
-    }
+    /// Infinity beyond single precision: training leaves the path out and says so (TrainingData::in_range).
+    static float single(double v) { return v > double(std::numeric_limits<float>::max()) ? HUGE_VALF : float(v); }
 
     TrainingPath path_;
     double sum_ = 0, contribution_ = 0;
@@ -111,7 +111,12 @@ Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const Re
     TrainingGenerator generator(scene);
     if (guide) {
         LL_RETURN_IF_ERROR(guide->validate(scene.emitters()));
-        generator.guide_ = std::make_shared<const PreparedTables>(*guide);
+        // One light sub-path per camera sample, however large the caches of the render will be.
+        SubspaceTables tables = *guide;
+        std::fill(tables.window.begin(), tables.window.end(), uint16_t(1));
+        generator.guide_ = std::make_shared<const PreparedTables>(std::move(tables));
+        parameters->minimum_paths = 1;
+        parameters->ris_aware = false;
     }
     generator.parameters_ = *std::move(parameters);
     generator.seed_ = settings.seed ^ kTrainingSeed;
@@ -139,6 +144,7 @@ class TrainingGenerator::Unit {
         UnitWork work;
         work.tile = crop();
         work.first_light_path = work_.first_sample, work.light_path_count = work_.sample_count;
+        work.group_first_iteration = work_.first_sample;  // no two units share a light sub-path
         return work;
     }
     UnitScope scope(const UnitWork& work) const {
@@ -236,7 +242,7 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
     if (!unit.scope(work).stop.stop_requested()) {
         for (uint64_t m = 0; m < work.light_path_count; ++m) {
             const uint32_t first = state.cache.first_vertex[m];
-            keep_light_path(&state.cache.vertices[first], int(state.cache.first_vertex[m + 1] - first), max_depth_ + 1, &data);
+            keep_light_path(state.cache.vertices.data() + first, int(state.cache.first_vertex[m + 1] - first), max_depth_ + 1, &data);
             for (const auto& [block, estimate] : from_light[m].estimates) data.block_sum[block] += estimate;
             from_light[m].reservoir.move_to(&data);
         }

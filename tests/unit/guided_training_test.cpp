@@ -6,6 +6,8 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <set>
+#include <tuple>
 
 #include "common/transport/training.h"
 #include "tests/support/random_tables.h"
@@ -89,6 +91,51 @@ TEST(GuidedTraining, EstimatesWhatThePilotEstimates) {
     }
     EXPECT_GE(family.size(), 80);
     family.check();
+}
+
+/// Labels are learned from these points: x_0 of a sun or a sky must lie where its light comes from, whoever made the path.
+TEST(GuidedTraining, InfiniteLightsLieInTheDirectionOfTheirLight) {
+    int seen = 0;
+    for (const auto& scene : {testing::environment_lit(), testing::delta_lights()}) {
+        const SubspaceTables guide = testing::random_tables(scene->emitters(), 9);
+        for (const SubspaceTables* g : {static_cast<const SubspaceTables*>(nullptr), &guide}) {
+            const auto generator = TrainingGenerator::create(*scene, settings_of(4), g);
+            ASSERT_TRUE(generator.ok());
+            const Result<TrainingData> data = generator->trace({0, 4000, 4000}, {});
+            ASSERT_TRUE(data.ok());
+            for (const TrainingPath& p : data->paths) {
+                const TrainingVertex* v = &data->vertices[p.first_vertex];
+                // Light tracing starts from where its path started, which is the right place for it.
+                if (!scene->emitters()[v[0].emitter].is_infinite()) continue;
+                const Vec3 d = normalize(v[0].position - v[1].position);
+                EXPECT_NEAR(dot(d, v[0].normal), -1, 1e-4);
+                ++seen;
+            }
+        }
+    }
+    EXPECT_GT(seen, 2000);
+}
+
+/// Units are held out against one another: what they share would confirm itself. Paths on a lamp are told apart by where they begin.
+TEST(GuidedTraining, UnitsShareNoLightSubPath) {
+    const auto scene = testing::diffuse_box();
+    testing::RandomTableOptions random;
+    random.max_window = 4;
+    const SubspaceTables guide = testing::random_tables(scene->emitters(), 5, random);
+    const auto generator = TrainingGenerator::create(*scene, settings_of(2), &guide);
+    ASSERT_TRUE(generator.ok());
+    std::set<std::tuple<float, float, float>> starts;
+    size_t paths = 0;
+    for (const uint64_t first : {0, 3000}) {
+        const Result<TrainingData> data = generator->trace({first, 3000, 6000}, {});
+        ASSERT_TRUE(data.ok());
+        paths += data->light_paths.size();
+        for (const TrainingPath& p : data->light_paths) {
+            const Vec3& x = data->vertices[p.first_vertex].position;
+            starts.insert({x.x, x.y, x.z});
+        }
+    }
+    EXPECT_EQ(starts.size(), paths);
 }
 
 TEST(GuidedTraining, DoesNotDependOnThreads) {
