@@ -13,7 +13,7 @@
 namespace lightloom {
 namespace {
 
-constexpr int kSeeds = 6;
+constexpr int kSeeds = 10;
 constexpr uint32_t kIterations = 16;
 
 /// relMSE (epsilon 0.01) of one of `images`, from their differences among each other; `reference` is only in the denominator.
@@ -38,7 +38,8 @@ TEST(TablesMatter, OnDoorUniformAndPermutedGammaAreNoisier) {
     ASSERT_TRUE(built.ok()) << built.status().message();
     const std::shared_ptr<const Scene> scene = std::move(built).value();
 
-    RenderSettings settings{"spcbpt", {}, 5, max_depth};
+    // As many training paths as the paper traces light sub-paths.
+    RenderSettings settings{"spcbpt", {{"training-paths", "2000000"}}, 5, max_depth};
     TrainingReport report;
     const Result<SubspaceTables> learned = make_tables(*scene, settings, {}, &report);
     ASSERT_TRUE(learned.ok()) << learned.status().message();
