@@ -90,5 +90,21 @@ TEST(GuidedTables, AGuideThatTheDiskHasLostIsRestored) {
     ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
 }
 
+/// Tasks of jobs look through the list of all jobs; one that is being taken apart is not theirs to see.
+TEST(GuidedTables, ACoordinatorMayGoAtAnyMomentOfThem) {
+    for (int pause = 0; pause < 40; pause += 4) {
+        TableService service;
+        const std::string over = service.submit_training(service.guided_spec(3));
+        ASSERT_TRUE(service.coordinator->cancel_job(over).ok());
+        service.submit_training(service.guided_spec());
+        const auto units = deliver_pilot(service);
+        ASSERT_EQ(units.size(), 2u);
+        for (const auto& [worker, lease] : units)
+            EXPECT_EQ(service.give(worker, lease, guided(service, lease)).outcome, SubmitOutcome::kAccepted);
+        std::this_thread::sleep_for(std::chrono::milliseconds(pause));
+        service.coordinator.reset();
+    }
+}
+
 }  // namespace
 }  // namespace lightloom::testing
