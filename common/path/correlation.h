@@ -22,7 +22,7 @@ inline double correlation_factor(const PathView& view, int s, double n) {
     if (view.source == PathView::Source::kDirection) light *= std::min(kDisc * view.fwd[0], 1.0);
     for (int i = 1; i < s; ++i)
         if (!view.delta[i - 1]) light *= std::min(area * view.fwd[i], 1.0);
-    const double either = camera + light - camera * light;
+    const double either = camera + light * (1 - camera);  // rounds to no less than `camera`
     return either > 0 ? std::max(camera / either, 1 / n) : 1;
 }
 
