@@ -14,7 +14,7 @@
 
 #include "common/film/exr_io.h"
 #include "common/film/partial_exr.h"
-#include "common/tables/training_data.h"
+#include "common/tables/train.h"
 #include "common/work/service.h"
 #include "server/reducer.h"
 #include "server/table_cache.h"
@@ -125,6 +125,8 @@ class Coordinator {
     void resume_waiting(const std::shared_ptr<JobRecord>& job);
     Status take_over_tables(JobRecord& job);
     void open_training(JobRecord& job, UnitKind kind, const TrainingWork& work);
+    Status finish_tables(JobRecord& job, const JobSpec& spec, const SubspaceTables& tables, const TrainingReport& report,
+                         TablesInfo info);
     void open_first_round(JobRecord& job);
     Status open_guided_round(JobRecord& job, const SubspaceTables& pilot);
     Status learn(JobRecord& job, std::stop_token stop);

@@ -22,6 +22,8 @@ double seconds_since(Clock::time_point begin) { return std::chrono::duration<dou
 
 Status over() { return {StatusCode::kCancelled, "the job ended while its tables were made"}; }
 
+double learning_seconds(const TablesInfo& info) { return info.classifier_seconds + info.energy_seconds + info.gamma_seconds; }
+
 /// The spec with another size of the training set, in canonical text.
 JobSpec with_training_samples(const JobSpec& spec, uint64_t samples) {
     JobSpec out = spec;
@@ -62,23 +64,18 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
             if (job.state != JobState::kPreparing) return over();
             spec = job.spec;
             kind = job.training_kind;
+            if (kind != UnitKind::kProbe) {
+                info.trace_seconds = seconds_between(job.training_begin, options_.clock()) - learning_seconds(info);
+                info.capped_by_time_limit = job.capped_by_time_limit;
+                job.phase = PreparePhase::kLearning;
+                changed(job);
+            }
         }
         if (kind == UnitKind::kProbe) {
             LL_RETURN_IF_ERROR(choose_training_samples(job, *data, **scene, stop));
             const std::lock_guard lock(mutex_);
             if (job.state != JobState::kPreparing) return {};  // it found tables in the cache, or was cancelled
             continue;
-        }
-        SceneFacts facts;
-        {
-            const std::lock_guard lock(mutex_);
-            if (job.state != JobState::kPreparing) return over();
-            if (kind == UnitKind::kTraining) facts = std::move(job.facts);
-            info.trace_seconds = seconds_between(job.training_begin, options_.clock()) - info.classifier_seconds -
-                                 info.energy_seconds - info.gamma_seconds;
-            info.capped_by_time_limit = job.capped_by_time_limit;
-            job.phase = PreparePhase::kLearning;
-            changed(job);
         }
         const auto parameters = TransportParameters::read(render_settings(spec));
         if (!parameters.ok()) return parameters.status();
@@ -89,25 +86,32 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
         info.classifier_seconds += report.classifier_seconds;
         info.energy_seconds += report.energy_seconds;
         info.gamma_seconds += report.gamma_seconds;
-        if (kind == UnitKind::kPilot) {
-            LL_RETURN_IF_ERROR(open_guided_round(job, *tables));
-            continue;
-        }
-        info.light_subspaces = tables->light_count;
-        info.eye_subspaces = tables->eye_count;
-        info.uniform_loss = report.gamma.uniform_loss;
-        info.loss = report.gamma.loss;
-        info.prior_strength = report.gamma.prior_strength;
-        info.note = report.note;
-        info.cache_key = table_key(options_.identity, spec);
-        const std::string bytes = serialize(*tables);
-        table_cache_.store(info.cache_key, bytes, info);
-        spdlog::info("{}: tables of {} x {} subspaces from {} samples; {:.2f} s traced, {:.2f} s learned{}{}", job.id,
-                     info.light_subspaces, info.eye_subspaces, info.training_samples, info.trace_seconds,
-                     info.classifier_seconds + info.energy_seconds + info.gamma_seconds,
-                     info.note.empty() ? "" : "; ", info.note);
-        return adopt_tables(job, spec, facts, bytes, std::move(info));
+        if (kind == UnitKind::kTraining) return finish_tables(job, spec, *tables, report, std::move(info));
+        LL_RETURN_IF_ERROR(open_guided_round(job, *tables));
     }
+}
+
+Status Coordinator::finish_tables(JobRecord& job, const JobSpec& spec, const SubspaceTables& tables, const TrainingReport& report,
+                                  TablesInfo info) {
+    info.light_subspaces = tables.light_count;
+    info.eye_subspaces = tables.eye_count;
+    info.uniform_loss = report.gamma.uniform_loss;
+    info.loss = report.gamma.loss;
+    info.prior_strength = report.gamma.prior_strength;
+    info.note = report.note;
+    info.cache_key = table_key(options_.identity, spec);
+    const std::string bytes = serialize(tables);
+    table_cache_.store(info.cache_key, bytes, info);
+    spdlog::info("{}: tables of {} x {} subspaces from {} samples; {:.2f} s traced, {:.2f} s learned{}{}", job.id,
+                 info.light_subspaces, info.eye_subspaces, info.training_samples, info.trace_seconds, learning_seconds(info),
+                 info.note.empty() ? "" : "; ", info.note);
+    SceneFacts facts;
+    {
+        const std::lock_guard lock(mutex_);
+        if (job.state != JobState::kPreparing) return over();
+        facts = std::move(job.facts);
+    }
+    return adopt_tables(job, spec, facts, bytes, std::move(info));
 }
 
 void Coordinator::open_first_round(JobRecord& job) {

@@ -1,39 +1,22 @@
 #pragma once
 // The camera sub-path: where samples of a pixel are placed, and the walk from the lens.
 
-#include "common/core/low_discrepancy.h"
 #include "common/path/connect.h"
+#include "common/path/walk_sampler.h"
 
 namespace lightloom {
 
 /// Random numbers of one camera sample: keyed by (seed, iteration, pixel). The film position, the lens and the first
 /// scattering and next event come from low-discrepancy sequences over the iterations of a pixel; the rest is independent.
-class CameraSampler {
+class CameraSampler : public WalkSampler {
   public:
     CameraSampler(uint64_t seed, uint64_t iteration, uint64_t pixel)
-        : rng_({seed, Stage::kCamera, iteration, pixel}),
-          scramble_(Rng({seed, Stage::kPixelScramble, 0, pixel}).next_u64()),
-          index_(uint32_t(iteration)) {}
+        : WalkSampler({seed, Stage::kCamera, iteration, pixel}, Rng({seed, Stage::kPixelScramble, 0, pixel}).next_u64(),
+                      uint32_t(iteration), 2) {}
 
-    Vec2 film() { return low_discrepancy_point(index_, scramble_); }
-    Vec2 lens() { return low_discrepancy_point(index_, scramble_ + 1); }
-    /// For the scattering at z_{t-1}.
-    ScatterSample scattering(int t) {
-        const Vec2 u = rng_.uniform2();
-        lobe_rest_ = u.y;
-        if (t == 2) return {u.x, low_discrepancy_point(index_, scramble_ + 2)};
-        return {u.x, rng_.uniform2()};
-    }
-    /// A uniform that comes for free with scattering().
-    float roulette() const { return lobe_rest_; }
-    Vec2 next_event(int t) { return t == 2 ? low_discrepancy_point(index_, scramble_ + 3) : rng_.uniform2(); }
-    Rng& rng() { return rng_; }
-
-  private:
-    Rng rng_;
-    uint64_t scramble_;
-    uint32_t index_;
-    float lobe_rest_ = 0;
+    Vec2 film() { return point(0); }
+    Vec2 lens() { return point(1); }
+    Vec2 next_event(int t) { return t == 2 ? point(3) : rng().uniform2(); }
 };
 
 /// Walks from the lens through the film position (px, py) + sampler.film(). `z` has room for max_edges + 2 vertices.

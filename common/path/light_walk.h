@@ -1,41 +1,23 @@
 #pragma once
 // The light sub-path: where its random numbers come from, and the walk from the light.
 
-#include "common/core/low_discrepancy.h"
-#include "common/path/random_walk.h"
+#include "common/path/walk_sampler.h"
 
 namespace lightloom {
 
 /// Random numbers of one light sub-path, keyed by (seed, stage, iteration, path). The light, the emission and the first
 /// scattering come from low-discrepancy sequences over the paths of an iteration or group; the rest is independent.
-class LightSampler {
+class LightSampler : public WalkSampler {
   public:
     /// `key.index` is the number of the path; numbers that differ above 32 bits belong to different sequences.
     explicit LightSampler(const RngKey& key)
-        : rng_(key),
-          scramble_(Rng({key.seed, Stage::kLightScramble, key.iteration, uint64_t(key.stage) << 56 | key.index >> 32})
-                        .next_u64()),
-          index_(uint32_t(key.index)) {}
+        : WalkSampler(key, Rng({key.seed, Stage::kLightScramble, key.iteration, uint64_t(key.stage) << 56 | key.index >> 32}).next_u64(),
+                      uint32_t(key.index), 3) {}
 
     /// In [0, 1): which light. A point of the sequence has 24 bits, too few to tell a million lights apart.
-    double pick() { return double(low_discrepancy_point(index_, scramble_).x) + rng_.uniform_double() * 0x1p-24; }
-    Vec2 position() { return low_discrepancy_point(index_, scramble_ + 1); }
-    Vec2 direction() { return low_discrepancy_point(index_, scramble_ + 2); }
-    /// For the scattering at y_{s-1}.
-    ScatterSample scattering(int s) {
-        const Vec2 u = rng_.uniform2();
-        lobe_rest_ = u.y;
-        return {u.x, s == 2 ? low_discrepancy_point(index_, scramble_ + 3) : rng_.uniform2()};
-    }
-    /// A uniform that comes for free with scattering().
-    float roulette() const { return lobe_rest_; }
-    Rng& rng() { return rng_; }
-
-  private:
-    Rng rng_;
-    uint64_t scramble_;
-    uint32_t index_;
-    float lobe_rest_ = 0;
+    double pick() { return double(point(0).x) + rng().uniform_double() * 0x1p-24; }
+    Vec2 position() { return point(1); }
+    Vec2 direction() { return point(2); }
 };
 
 /// Start of a light sub-path at path[0] and the ray that leaves it. False when nothing is emitted. y_0's alpha is F(1) / C(1),

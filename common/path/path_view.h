@@ -20,7 +20,7 @@ struct PathView {
     double rev[kMaxEdges + 1];
     /// x_i's scattering event is a Dirac lobe (0 < i < k); false at both ends.
     bool delta[kMaxEdges + 1];
-    /// What follows is filled in by ViewDetail::kSubspace only (connect.h) and, where marked *, by the method's own tables.
+    /// What follows is filled in by ViewDetail::kSubspace only (connect.h) and, where marked *, by SubspaceLabeller::complete().
     /// F(1) / C(1) and F(2) / C(2) of the light prefixes of one and two vertices: throughput without Russian roulette.
     Rgb start[2];
     /// step[i], 1 <= i <= k-2: F(i+2) / C(i+2) = step[i] * F(i+1) / C(i+1), channel by channel.

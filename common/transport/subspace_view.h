@@ -35,7 +35,7 @@ struct SubspaceLabeller {
     /// The eye label of a camera vertex, before it is connected.
     void label_camera_vertex(PathVertex* v) const { v->label = eye(*v, v->wo); }
 
-    /// Labels and throughput of a path made with ViewDetail::kSubspace. `towards`: unit, from z_{t-1} to x_{s-1} (to the
+    /// Labels, throughput and what correlation_factor() reads, of a path made with ViewDetail::kSubspace. `towards`: unit, from z_{t-1} to x_{s-1} (to the
     /// emitter of an escaped ray); not read for s = 0 on a surface, where z_{t-1} is x_0. Vertices of z get their reverse
     /// labels on demand.
     void complete(const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
