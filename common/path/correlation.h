@@ -5,12 +5,22 @@
 
 #include <algorithm>
 
-#include "common/path/path_view.h"
+#include "common/path/vertex.h"
+#include "common/scene/emitter.h"
 
 namespace lightloom {
 
+/// What correlation_factor() reads of a path that starts on `e` and was made from light prefix y[0 .. s-1] and camera suffix
+/// z[0 .. t-1].
+inline void view_footprint(const Emitter& e, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view) {
+    view->primary_distance2 = double(length_squared((t >= 2 ? z[1] : y[s - 1]).p - z[0].p));
+    view->source = e.is_delta()      ? PathView::Source::kDiscrete
+                   : e.is_infinite() ? PathView::Source::kDirection
+                                     : PathView::Source::kArea;
+}
+
 /// c_s in [1/n, 1]: of n connections that split the path after s light vertices, n c_s count. A function of the path and n. Reads
-/// the view's primary_distance2 and source.
+/// what view_footprint() wrote.
 inline double correlation_factor(const PathView& view, int s, double n) {
     constexpr double kDisc = 3.14159265358979323846 * 0.017455064928217585 * 0.017455064928217585;  // pi tan^2(1 degree)
     const double area = kDisc * view.primary_distance2;

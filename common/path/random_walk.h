@@ -12,7 +12,7 @@ namespace lightloom {
 
 struct RouletteRule {
     int first_vertex = 4;                 ///< Sub-path vertices with a smaller index always go on.
-    float min_survival = 0.05f, max_survival = 0.95f;
+    float min_survival = 0.5f, max_survival = 0.95f;
 };
 
 /// Uniforms that one scattering event consumes.

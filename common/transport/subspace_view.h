@@ -2,6 +2,7 @@
 // Labels of full paths: which light subspace every hypothetical light prefix falls into, and which eye subspace every camera
 // suffix. A label depends on the end of a sub-path as its own predecessor sees it, so all techniques agree on it.
 
+#include "common/path/correlation.h"
 #include "common/path/throughput.h"
 #include "common/tables/subspace_tables.h"
 
@@ -35,7 +36,7 @@ struct SubspaceLabeller {
     /// The eye label of a camera vertex, before it is connected.
     void label_camera_vertex(PathVertex* v) const { v->label = eye(*v, v->wo); }
 
-    /// Labels, throughput and what correlation_factor() reads, of a path made with ViewDetail::kSubspace. `towards`: unit, from z_{t-1} to x_{s-1} (to the
+    /// Labels, throughput and footprint of a path made with ViewDetail::kSubspace. `towards`: unit, from z_{t-1} to x_{s-1} (to the
     /// emitter of an escaped ray); not read for s = 0 on a surface, where z_{t-1} is x_0. Vertices of z get their reverse
     /// labels on demand.
     void complete(const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
@@ -43,10 +44,7 @@ struct SubspaceLabeller {
         const int k = view->k;
         const bool hit = s == 0 && k == t - 1;
         const Emitter& e = emitters[uint32_t(s > 0 ? y[0].emitter : hit ? z[t - 1].emitter : emitters.environment_index())];
-        view->primary_distance2 = double(length_squared((t >= 2 ? z[1] : y[s - 1]).p - z[0].p));
-        view->source = e.is_delta()      ? PathView::Source::kDiscrete
-                       : e.is_infinite() ? PathView::Source::kDirection
-                                         : PathView::Source::kArea;
+        view_footprint(e, y, s, z, t, view);
         for (int i = 0; i < s; ++i) view->light_label[i + 1] = y[i].label;
         for (int i = 1; i + 1 < s; ++i) view->eye_label[i] = y[i].reverse_label;
         if (s >= 2) view->eye_label[s - 1] = eye(y[s - 1], -towards);

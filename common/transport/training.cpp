@@ -19,12 +19,19 @@ constexpr uint64_t kTrainingSeed = 0x7472'6169'6e69'6e67ull;
 constexpr uint64_t kChunk = 512;
 constexpr double kSamplesPerBlock = 200;
 
+/// How the weights of the render to come will count, as far as no table decides that.
+struct RenderCounts {
+    const EmitterSet& emitters;
+    double light_paths_per_iteration = 1;  ///< N1 |crop|
+    double correlated_connections = 1;     ///< N with correlation_aware, otherwise 1: nothing to correlate.
+};
+
 /// Keeps one of the contributions of a sub-path, in proportion to their estimates.
 class Reservoir {
   public:
-    /// `weight`, of the generator's techniques; `scale` of what it found; N1 |crop| of the render to come. Returns the estimate.
+    /// `weight`, of the generator's techniques; `scale` of what it found. Returns the estimate.
     double offer(const PathContribution& c, PathView& view, double weight, double scale, uint32_t block,
-                 double light_paths_per_iteration, Rng& rng) {
+                 const RenderCounts& render, Rng& rng) {
         const double contribution = double(scalar_of(c.value)) * scale, estimate = weight * contribution;
         if (!(estimate > 0) || !std::isfinite(estimate)) return 0;
         const int k = view.k;
@@ -42,13 +49,15 @@ class Reservoir {
         }
         vertices_[size_t(k)] = {c.z[0].p, {}, 0, 0};
         view_throughput(c.y, c.s, c.z, &view);
+        view_footprint(render.emitters[c.emitter], c.y, c.s, c.z, c.t, &view);
         const double inverse_own = double(c.inverse_density) * scale;
         const auto keep = [&](int s, double ratio) {
             if (!can_connect(view, s)) return;
             const double density = ratio * inverse_own *
                                    (s == 0   ? 1
-                                    : s == k ? light_paths_per_iteration
-                                             : view.light_throughput[s]);
+                                    : s == k ? render.light_paths_per_iteration
+                                             : view.light_throughput[s] *
+                                                   correlation_factor(view, s, render.correlated_connections));
             vertices_[s == k ? 0 : size_t(s)].density += single(density);
         };
         keep(c.s, 1);
@@ -133,7 +142,10 @@ class TrainingGenerator::Unit {
     Rect crop() const { return generator_.scene_->frame().crop; }
     double pixels() const { return double(crop().area()); }
     const Blocks& blocks() const { return blocks_; }
-    double render_light_paths() const { return generator_.parameters_.light_paths * pixels(); }
+    RenderCounts render() const {
+        const TransportParameters& p = generator_.parameters_;
+        return {generator_.scene_->emitters(), p.light_paths * pixels(), p.correlation_aware ? double(p.connections) : 1};
+    }
     TrainingData empty() const {
         TrainingData data;
         data.blocks_x = blocks_.columns(), data.blocks_y = blocks_.rows();
@@ -213,7 +225,7 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
                 const double weight = mis_weight(view, {TechniqueKind::kConnect, found.s}, generator);
                 data.block_sum[block] += (splat ? from_light : from_camera)
                                              .offer(found, view, weight, splat ? 1 / unit.pixels() : 1, block,
-                                                    unit.render_light_paths(), rng);
+                                                    unit.render(), rng);
             });
         from_camera.move_to(&data);
         from_light.move_to(&data);
@@ -235,7 +247,7 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
             Rng rng({seed_, Stage::kTraining, 1 + uint64_t(found.s), work.first_light_path + m});
             const uint32_t block = unit.blocks().at(int(found.film.x), int(found.film.y));
             const double estimate = from_light[m].reservoir.offer(found, view, generator.weight(view, found.s),
-                                                                  1 / unit.pixels(), block, unit.render_light_paths(), rng);
+                                                                  1 / unit.pixels(), block, unit.render(), rng);
             from_light[m].estimates.push_back({block, estimate});
         });
     TrainingData data = unit.empty();
@@ -251,7 +263,7 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
         Reservoir from_camera;
         generator.trace(context, state, [&](const PathContribution& found, PathView& view) {
             chunk.block_sum[block] +=
-                from_camera.offer(found, view, generator.weight(view, found.s), 1, block, unit.render_light_paths(), rng);
+                from_camera.offer(found, view, generator.weight(view, found.s), 1, block, unit.render(), rng);
         });
         from_camera.move_to(&chunk);
     });

@@ -119,7 +119,7 @@ struct FakeService {
     }
     JobInfo wait(const std::string& id, const std::function<bool(const JobInfo&)>& until) {
         JobInfo info;
-        for (int i = 0; i < 1000; ++i) {
+        for (int i = 0; i < 12000; ++i) {  // a minute: sanitizers on a busy machine take their time
             info = *coordinator->get_job(id);
             if (until(info)) return info;
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
