@@ -124,7 +124,7 @@ void measure_energy(const TrainingData& d, const EmitterSet& emitters, const Tra
             vertices += 1;
         }
     }
-    const double paths = double(std::max<uint64_t>(1, d.samples));
+    const double paths = double(std::max<uint64_t>(1, d.light_samples));
     double total = 0;
     for (const double s : sum) total += s / paths;
     // The floor keeps every subspace reachable: a zero would lose the light that only a delta light's prefix carries.

@@ -8,9 +8,9 @@ namespace lightloom {
 namespace {
 
 struct Header {
-    char magic[8] = {'L', 'L', 'T', 'R', 'A', 'I', 'N', '1'};
+    char magic[8] = {'L', 'L', 'T', 'R', 'A', 'I', 'N', '2'};
     int32_t blocks_x = 0, blocks_y = 0;
-    uint64_t samples = 0, path_count = 0, light_path_count = 0, vertex_count = 0;
+    uint64_t samples = 0, light_samples = 0, path_count = 0, light_path_count = 0, vertex_count = 0;
 };
 
 template <class T>
@@ -38,7 +38,7 @@ Status TrainingData::append(const TrainingData& other, uint64_t max_vertices) {
     if (blocks_x != other.blocks_x || blocks_y != other.blocks_y || block_sum.size() != other.block_sum.size())
         return invalid_argument("training data of another frame");
     for (size_t i = 0; i < block_sum.size(); ++i) block_sum[i] += other.block_sum[i];
-    samples += other.samples;
+    samples += other.samples, light_samples += other.light_samples;
     const uint32_t offset = uint32_t(vertices.size());
     const auto join = [offset](std::vector<TrainingPath>& into, const std::vector<TrainingPath>& from) {
         for (TrainingPath p : from) {
@@ -80,7 +80,7 @@ bool TrainingData::in_range(const TrainingPath& path) const {
 std::string serialize(const TrainingData& d) {
     Header header;
     header.blocks_x = d.blocks_x, header.blocks_y = d.blocks_y;
-    header.samples = d.samples;
+    header.samples = d.samples, header.light_samples = d.light_samples;
     header.path_count = d.paths.size(), header.light_path_count = d.light_paths.size(), header.vertex_count = d.vertices.size();
     std::string out(reinterpret_cast<const char*>(&header), sizeof header);
     put(out, d.block_sum);
@@ -108,7 +108,7 @@ Result<TrainingData> parse_training_data(std::string_view bytes) {
         return data_loss("training data of the wrong size");
     TrainingData d;
     d.blocks_x = header.blocks_x, d.blocks_y = header.blocks_y;
-    d.samples = header.samples;
+    d.samples = header.samples, d.light_samples = header.light_samples;
     take(bytes, blocks, &d.block_sum);
     take(bytes, header.path_count, &d.paths);
     take(bytes, header.light_path_count, &d.light_paths);

@@ -5,7 +5,7 @@
 // A path X of technique `own` with density p_own and effective generator density sum_s n_s p_s = p_own / w_own:
 //     estimate = L(w_own f / p_own)                a sample of the image, in expectation
 //     square   = L(f / p_own)^2 w_own              c_X p_own of algorithms.md 1.1: E[square / (F / p_own)] is the loss
-//     vertices[i].density = n p of a technique, without N Gamma / Q, over p_own: i = 0 holds the ones that tables do not change
+//     vertices[i].density = n p of a technique, without N Gamma / Q (with correlation_aware: c_s n p), over p_own: i = 0 holds the ones that tables do not change
 //                           (s = 0 and s = k), 1 <= s <= k-1 the connection of x_{s-1} and x_s; 0 where impossible
 // One path per camera sample (and one per light sub-path that reached the lens) is kept, chosen in proportion to its
 // estimate; both numbers are divided by the probability of that choice, so that sums over D stay unbiased.
@@ -37,7 +37,8 @@ struct TrainingPath {
 struct TrainingData {
     int32_t blocks_x = 0, blocks_y = 0;
     std::vector<double> block_sum;   ///< Of all estimates, kept or not; blocks_x * blocks_y.
-    uint64_t samples = 0;            ///< Camera samples traced, uniform over the frame; as many light sub-paths.
+    uint64_t samples = 0;            ///< D: camera samples traced, uniform over the frame.
+    uint64_t light_samples = 0;      ///< M': light sub-paths traced to measure Q, those included that left nothing to keep.
     std::vector<TrainingPath> paths;
     std::vector<TrainingPath> light_paths;
     std::vector<uint32_t> part_ends; ///< In `paths`, of what append() has joined; not serialized.

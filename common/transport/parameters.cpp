@@ -54,6 +54,7 @@ Result<TransportParameters> TransportParameters::read(const RenderSettings& sett
     t.direction_weight = value("direction-weight");
     t.mix = value("mix");
     t.trainer = GammaTrainer(int(value("trainer")));
+    p.energy_paths = value("energy-paths");
     p.pilot_samples = pilot_of(p.training_samples, value("pilot"));
     t.reuse_windows = int(value("windows"));
     t.reuse_target = value("reuse-target");

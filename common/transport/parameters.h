@@ -22,6 +22,7 @@ struct TransportParameters {
     uint64_t minimum_paths = 1;   ///< Of a unit's cache.
     bool ris_aware = false, correlation_aware = false;
     uint64_t training_samples = 0;
+    double energy_paths = 1;      ///< Light sub-paths that measure Q, per training sample.
     uint64_t pilot_samples = 0;   ///< The first of them, traced without a guide; 0: all.
     TrainingOptions training;
 

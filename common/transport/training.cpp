@@ -159,6 +159,8 @@ class TrainingGenerator::Unit {
         work.group_first_iteration = work_.first_sample;  // no two units share a light sub-path
         return work;
     }
+    /// How many light sub-paths measure Q for sample n.
+    uint64_t energy_share(uint64_t n) const { return energy_paths_before(n + 1) - energy_paths_before(n); }
     UnitScope scope(const UnitWork& work) const {
         return {*generator_.scene_, generator_.seed_, generator_.max_depth_ + 1, generator_.parameters_.roulette, work, stop_};
     }
@@ -175,6 +177,7 @@ class TrainingGenerator::Unit {
                 const uint64_t begin = work_.first_sample + c * kChunk;
                 const uint64_t end = work_.first_sample + std::min(work_.sample_count, (c + 1) * kChunk);
                 data.samples = end - begin;
+                data.light_samples = energy_paths_before(end) - energy_paths_before(begin);
                 for (uint64_t n = begin; n < end; ++n) {
                     SampleContext context{.scene = *generator_.scene_,
                                           .seed = generator_.seed_,
@@ -192,6 +195,8 @@ class TrainingGenerator::Unit {
                     context.light_path = n;
                     Rng rng({generator_.seed_, Stage::kTraining, 0, n});
                     sample(context, blocks_.at(context.px, context.py), data, rng);
+                    for (uint64_t extra = 1; extra < energy_share(n); ++extra)
+                        trace_for_energy(context, energy_paths_before(n) + extra, &data);
                 }
             }
         });
@@ -201,6 +206,14 @@ class TrainingGenerator::Unit {
     }
 
   private:
+    uint64_t energy_paths_before(uint64_t sample) const { return uint64_t(double(sample) * generator_.parameters_.energy_paths); }
+    void trace_for_energy(SampleContext& context, uint64_t number, TrainingData* data) const {
+        LightSampler sampler({generator_.seed_, Stage::kLightPool, 0, number});
+        PathVertex* y = context.light_path_vertices;
+        const int n = trace_light_path(context.scene, sampler, context.max_edges, context.roulette, y, &context.counters);
+        keep_light_path(y, n, context.max_edges, data);
+    }
+
     const TrainingGenerator& generator_;
     const TrainingWork& work_;
     std::stop_token stop_;
@@ -217,7 +230,10 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
     return unit.trace(unit.empty(), [&](SampleContext& context, uint32_t camera_block, TrainingData& data, Rng& rng) {
         Reservoir from_camera, from_light;
         trace_bdpt_sample<ViewDetail::kSubspace>(
-            context, [&](const PathVertex* y, int count) { keep_light_path(y, count, context.max_edges, &data); },
+            context,
+            [&](const PathVertex* y, int count) {
+                if (unit.energy_share(context.light_path) > 0) keep_light_path(y, count, context.max_edges, &data);
+            },
             [&](const PathContribution& found, PathView& view) {
                 // A light path may land in any pixel, a camera sample in one: the scale of algorithms.md 0, N1.
                 const bool splat = found.to_lens();
@@ -254,7 +270,9 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
     if (!unit.scope(work).stop.stop_requested()) {
         for (uint64_t m = 0; m < work.light_path_count; ++m) {
             const uint32_t first = state.cache.first_vertex[m];
-            keep_light_path(state.cache.vertices.data() + first, int(state.cache.first_vertex[m + 1] - first), max_depth_ + 1, &data);
+            if (unit.energy_share(work.first_light_path + m) > 0)
+                keep_light_path(state.cache.vertices.data() + first, int(state.cache.first_vertex[m + 1] - first), max_depth_ + 1,
+                                &data);
             for (const auto& [block, estimate] : from_light[m].estimates) data.block_sum[block] += estimate;
             from_light[m].reservoir.move_to(&data);
         }

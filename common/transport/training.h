@@ -31,7 +31,8 @@ class TrainingGenerator {
                                             const SubspaceTables* guide = nullptr);
 
     /// Camera samples first_sample .. of a sequence that is spread evenly over the frame, and as many light sub-paths: each
-    /// sample its own (pilot), or all of the unit's shared in a cache (guided). The result does not depend on the number of
+    /// sample its own (pilot), or all of the unit's shared in a cache (guided). Of these, and of more where they are not enough,
+    /// energy_paths per sample are kept for Q. The result does not depend on the number of
     /// threads. kCancelled after a stop request.
     Result<TrainingData> trace(const TrainingWork& work, std::stop_token stop) const;
 

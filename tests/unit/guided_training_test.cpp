@@ -37,7 +37,8 @@ std::vector<std::pair<std::string, double>> estimates(const TrainingData& data) 
     const double n = double(data.samples);
     for (const double b : data.block_sum) out[0].second += b / n;
     for (const TrainingPath& p : data.light_paths)
-        for (uint32_t i = 0; i < p.vertex_count; ++i) out[1].second += double(data.vertices[p.first_vertex + i].density) / n;
+        for (uint32_t i = 0; i < p.vertex_count; ++i) 
+            out[1].second += double(data.vertices[p.first_vertex + i].density) / double(data.light_samples);
     for (const TrainingPath& p : data.paths) {
         out[p.vertex_count].second += double(p.estimate) / n;  // k = vertex_count - 1 stands at 3 + k - 2
         double density = 0;  // of a renderer with N Gamma / Q = 1
@@ -47,10 +48,13 @@ std::vector<std::pair<std::string, double>> estimates(const TrainingData& data) 
     return out;
 }
 
-std::vector<std::vector<double>> replicate(const Scene& scene, const SubspaceTables* guide, uint64_t first_seed) {
+std::vector<std::vector<double>> replicate(const Scene& scene, const SubspaceTables* guide, uint64_t first_seed,
+                                           const std::string& energy_paths = "1") {
     std::vector<std::vector<double>> values;
     for (uint64_t r = 0; r < kReplications; ++r) {
-        const auto generator = TrainingGenerator::create(scene, settings_of(first_seed + r), guide);
+        RenderSettings settings = settings_of(first_seed + r);
+        settings.parameters["energy-paths"] = energy_paths;
+        const auto generator = TrainingGenerator::create(scene, settings, guide);
         if (!generator.ok()) throw std::runtime_error(generator.status().message());
         const Result<TrainingData> data = generator->trace({r * kSamples, kSamples, kReplications * kSamples}, {});
         if (!data.ok()) throw std::runtime_error(data.status().message());
@@ -90,6 +94,42 @@ TEST(GuidedTraining, EstimatesWhatThePilotEstimates) {
         }
     }
     EXPECT_GE(family.size(), 80);
+    family.check();
+}
+
+/// M' is an option of its own: fewer are left out, more are traced beside the samples.
+TEST(GuidedTraining, EnergyIsMeasuredWithAsManyLightSubPathsAsAskedFor) {
+    testing::TestFamily family;
+    const auto scene = testing::diffuse_box();
+    const SubspaceTables table = testing::random_tables(scene->emitters(), 3);
+    const Sample plain(replicate(*scene, nullptr, 1)[1]);
+    uint64_t seed = 100;
+    for (const SubspaceTables* guide : {static_cast<const SubspaceTables*>(nullptr), &table}) {
+        for (const double ratio : {0.25, 1.0, 2.5}) {
+            RenderSettings settings = settings_of(1);
+            settings.parameters["energy-paths"] = std::to_string(ratio);
+            const auto generator = TrainingGenerator::create(*scene, settings, guide);
+            ASSERT_TRUE(generator.ok());
+            uint64_t traced = 0;
+            std::set<std::tuple<float, float, float>> starts;
+            size_t kept = 0;
+            for (const auto& [first, count] : {std::pair{0, 1001}, std::pair{1001, 999}}) {
+                const Result<TrainingData> data = generator->trace({uint64_t(first), uint64_t(count), 2000}, {});
+                ASSERT_TRUE(data.ok());
+                traced += data->light_samples;
+                kept += data->light_paths.size();
+                for (const TrainingPath& p : data->light_paths) {
+                    const Vec3& x = data->vertices[p.first_vertex].position;
+                    starts.insert({x.x, x.y, x.z});
+                }
+            }
+            EXPECT_EQ(traced, uint64_t(2000 * ratio));
+            EXPECT_LE(kept, traced);
+            EXPECT_EQ(starts.size(), kept) << "units or samples share light sub-paths";
+            const Sample energy(replicate(*scene, guide, seed += 1000, std::to_string(ratio))[1]);
+            family.add(testing::welch_p_value(plain, energy), "energy-paths=" + std::to_string(ratio));
+        }
+    }
     family.check();
 }
 

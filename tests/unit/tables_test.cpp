@@ -191,7 +191,7 @@ TEST(TrainingData, DamageIsRefusedOrHarmless) {
     const size_t emitters = scene->emitters().all().size();
     const TrainingData data = small_data(scene, 60);
     const std::string bytes = serialize(data);
-    const size_t header = 48, block_sums = data.block_sum.size() * sizeof(double);
+    const size_t header = 56, block_sums = data.block_sum.size() * sizeof(double);
     Rng rng({5, Stage::kTraining, 0, 0});
     for (int round = 0; round < 3000; ++round) {
         std::string damaged = bytes;
@@ -199,7 +199,7 @@ TEST(TrainingData, DamageIsRefusedOrHarmless) {
         const size_t at = round < int(header) ? size_t(round) : rng.below(uint32_t(bytes.size()));
         damaged[at] = char(damaged[at] ^ char(1 + rng.below(255)));
         const Result<TrainingData> parsed = parse_training_data(damaged);
-        if (at < 16 || (at >= 24 && at < header)) {
+        if (at < 16 || (at >= 32 && at < header)) {  // between them: how many samples there were
             EXPECT_FALSE(parsed.ok()) << "byte " << at;
         }
         if (at >= header + block_sums) {
