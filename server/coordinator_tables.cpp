@@ -21,13 +21,20 @@ uint64_t training_samples(const JobSpec& spec) {
     return uint64_t(parameter_value(**algorithm, *parse_parameters(**algorithm, spec.parameters), kTrainingPaths));
 }
 
-/// Above any data that the unit can have: a few paths per sample, each of the greatest length, and a sum per block of the frame.
+/// Light sub-paths with which a unit measures Q. The job's parameters have been read before: they are valid.
+uint64_t energy_paths(const JobSpec& spec, const TrainingWork& work) {
+    const auto p = TransportParameters::read(render_settings(spec));
+    return p->energy_paths_before(work.first_sample + work.sample_count) - p->energy_paths_before(work.first_sample);
+}
+
+/// Above any data that the unit can have: two paths per sample and the light sub-paths, each of the greatest length, and a sum
+/// per block of the frame.
 uint64_t largest_training_payload(const JobSpec& spec, const TrainingWork& work) {
     const FrameLayout& frame = spec.frame;
     const uint64_t most_blocks = work.total_samples + uint64_t(frame.crop.width() + frame.crop.height() + 1);
     const uint64_t blocks = std::min(uint64_t(frame.crop.area()), most_blocks);
     const uint64_t path = sizeof(TrainingPath) + uint64_t(spec.max_depth + 3) * sizeof(TrainingVertex);
-    return 256 + blocks * sizeof(double) + work.sample_count * 4 * path;
+    return 256 + blocks * sizeof(double) + (2 * work.sample_count + energy_paths(spec, work)) * path;
 }
 
 }  // namespace
@@ -225,7 +232,8 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
     const auto unit = units->find(reference.key);
     if (!unit) return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};
     Status problem = data.status();
-    if (problem.ok() && data->samples != unit->training.sample_count)
+    if (problem.ok() &&
+        (data->samples != unit->training.sample_count || data->light_samples != energy_paths(job->spec, unit->training)))
         problem = data_loss("the training data are those of another unit");
     // What needs the scene's lights to be checked waits for the task that has built it.
     if (problem.ok()) problem = data->validate(SIZE_MAX);
@@ -241,7 +249,7 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
     if (job->training_bytes > options_.training_bytes || projected > 1.25 * double(options_.training_bytes)) {
         fail_job(*job, {StatusCode::kResourceExhausted,
                         "the training data need more than the " + std::to_string(options_.training_bytes >> 20) +
-                            " MiB that a job may have; choose fewer training-paths"});
+                            " MiB that a job may have; choose fewer training-paths or energy-paths"});
         return SubmitAck{SubmitOutcome::kRejected, job->message};
     }
     job->training_parts[reference.key.group] = {*std::move(data), payload.size(), trace_seconds};

@@ -67,7 +67,7 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
             ++job->running_tasks;
             JobRecord& record = *job;
             job->train_task = std::jthread([this, &record](std::stop_token stop) {
-                run_task(record, "to learn the tables of this job; choose fewer training-paths or subspaces",
+                run_task(record, "to learn the tables of this job; choose fewer training-paths, energy-paths or subspaces",
                          [&] { return learn(record, stop); });
             });
         }

@@ -30,7 +30,7 @@ void take(std::string_view& rest, uint64_t count, std::vector<T>* values) {
 Status TrainingData::append(const TrainingData& other, uint64_t max_vertices) {
     if (vertices.size() + other.vertices.size() > max_vertices)
         return {StatusCode::kResourceExhausted, "the training data have more than " + std::to_string(max_vertices) +
-                                                    " path vertices; choose fewer training-paths"};
+                                                    " path vertices; choose fewer training-paths or energy-paths"};
     if (blocks_x == 0) {
         blocks_x = other.blocks_x, blocks_y = other.blocks_y;
         block_sum.assign(other.block_sum.size(), 0.0);
@@ -56,6 +56,7 @@ Status TrainingData::append(const TrainingData& other, uint64_t max_vertices) {
 Status TrainingData::validate(size_t emitter_count) const {
     if (blocks_x < 1 || blocks_y < 1 || block_sum.size() != size_t(blocks_x) * size_t(blocks_y))
         return data_loss("training data without a frame");
+    if (light_paths.size() > light_samples) return data_loss("training data with more light sub-paths than were traced");
     for (const std::vector<TrainingPath>* list : {&paths, &light_paths}) {
         for (const TrainingPath& p : *list) {
             if (p.vertex_count < 1 || uint64_t(p.first_vertex) + p.vertex_count > vertices.size() ||

@@ -206,7 +206,7 @@ class TrainingGenerator::Unit {
     }
 
   private:
-    uint64_t energy_paths_before(uint64_t sample) const { return uint64_t(double(sample) * generator_.parameters_.energy_paths); }
+    uint64_t energy_paths_before(uint64_t sample) const { return generator_.parameters_.energy_paths_before(sample); }
     void trace_for_energy(SampleContext& context, uint64_t number, TrainingData* data) const {
         LightSampler sampler({generator_.seed_, Stage::kLightPool, 0, number});
         PathVertex* y = context.light_path_vertices;

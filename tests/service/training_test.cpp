@@ -104,6 +104,15 @@ TEST(Tables, TrainingDataHaveABound) {
     const auto limit = service.coordinator->expected_training_bytes(held[0].second.reference());
     ASSERT_TRUE(limit.ok());
     EXPECT_GE(*limit, traced(held[0].second).size());
+    TableService plenty;
+    JobSpec spec = plenty.table_spec();
+    spec.parameters["energy-paths"] = "16";
+    plenty.submit_training(spec);
+    const auto large = lease_all(plenty);
+    ASSERT_FALSE(large.empty());
+    const std::string most = traced(large[0].second);
+    EXPECT_GT(most.size(), 3 * traced(held[0].second).size());
+    EXPECT_EQ(plenty.give(large[0].first, large[0].second, most).outcome, SubmitOutcome::kAccepted);
     EXPECT_EQ(service.give(held[0].first, held[0].second, traced(held[0].second)).outcome, SubmitOutcome::kRejected);
     EXPECT_NE(service.wait_end(id).message.find("training-paths"), std::string::npos);
 }

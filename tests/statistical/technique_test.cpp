@@ -118,7 +118,7 @@ TEST(Techniques, RouletteAndHeuristicsKeepTheMean) {
     const Rect& crop = scene->frame().crop;
     const std::map<std::string, std::string> variants[] = {{{"rr-min", "1"}},
                                                            {},
-                                                           {{"rr-start", "2"}},
+                                                           {{"rr-start", "2"}, {"rr-min", "0.05"}},
                                                            {{"rr-start", "2"}, {"rr-min", "0.3"}},
                                                            {{"rr-start", "2"}, {"rr-min", "0.6"}},
                                                            {{"heuristic", "1"}},
