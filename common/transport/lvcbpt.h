@@ -7,8 +7,10 @@
 //   1 <= s <= k-1  rho = N / v  C(s) A(s)       v: expected number of prefixes per light path, a table. The estimator divides by
 //                                               what was really done, V / (M N): the weight must not know the realised V
 //   s = k          rho = N1 |crop| C(k)
+// each times the share of light sub-paths of s vertices and of camera sub-paths of t that roulette leaves (common/path/survival.h).
 // Tables: v (vertices_per_path). Bias: none. Missing: what `bdpt` misses.
 
+#include "common/path/survival.h"
 #include "common/transport/cached.h"
 
 namespace lightloom {
@@ -17,11 +19,13 @@ struct UniformSelection {
     static constexpr bool kMerges = false;
     double light_paths_per_iteration = 1;  ///< N1 |crop|
     double connection_density = 1;         ///< N / v
+    TypicalSurvival survival;
 
     int s_min(int) const { return 0; }
     int s_max(int k) const { return k == 1 ? 0 : k; }
     double connect_factor(const PathView& view, int s) const {
-        return s == 0 ? 1 : s == view.k ? light_paths_per_iteration : connection_density;
+        const double paths = survival(s) * survival(view.k + 1 - s);
+        return paths * (s == 0 ? 1 : s == view.k ? light_paths_per_iteration : connection_density);
     }
 };
 

@@ -11,6 +11,8 @@
 //                    what was really drawn; with ris_aware 1 / rho = 1 / rho + 1 / (M C(s) A(s)): a cache of M paths cannot
 //                    deliver more than that; with correlation_aware N c_s stands for N (common/path/correlation.h)
 //     s = k          rho = N1 |crop| C(k)
+// each times the share of camera sub-paths of t vertices that roulette leaves, s = k also of light sub-paths of s
+// (common/path/survival.h); the draws among prefixes make up for roulette, a survivor has that much more throughput.
 // Tables: kappa_L, kappa_E, Q, Gamma, J, all frozen before the unit. Bias: none, whatever the tables hold. Missing: what `bdpt`
 // misses.
 
@@ -20,6 +22,8 @@
 #include <utility>
 
 #include "common/path/correlation.h"
+#include "common/path/survival.h"
+#include "common/core/inverse_cdf.h"
 #include "common/scene/sampling.h"
 #include "common/transport/cached.h"
 #include "common/transport/parameters.h"
@@ -30,16 +34,12 @@ namespace lightloom {
 /// The tables and what every unit derives from them once.
 struct PreparedTables {
     SubspaceTables tables;
-    std::vector<AliasEntry, HugePageAllocator<AliasEntry>> draws;  ///< Gamma(. | j), column by column like gamma.
-    std::vector<float> inv_energy;                                 ///< 1 / Q
-    int windows = 1;                                               ///< Largest J.
+    InverseCdfTable draws;           ///< Gamma(. | j)
+    std::vector<float> inv_energy;   ///< 1 / Q
+    int windows = 1;                 ///< Largest J.
 
-    explicit PreparedTables(SubspaceTables t) : tables(std::move(t)), draws(tables.gamma.size()) {
-        std::vector<double> weights(tables.light_count);
-        for (uint32_t j = 0; j < tables.eye_count; ++j) {
-            std::copy_n(tables.column(j), tables.light_count, weights.begin());
-            make_alias(weights, &draws[size_t(j) * tables.light_count]);
-        }
+    explicit PreparedTables(SubspaceTables t) : tables(std::move(t)), draws(tables.light_count, tables.eye_count) {
+        for (uint32_t j = 0; j < tables.eye_count; ++j) draws.set(j, {tables.column(j), tables.light_count});
         for (const float q : tables.energy) inv_energy.push_back(1 / q);
         for (const uint16_t w : tables.window) windows = std::max(windows, int(w));
     }
@@ -52,15 +52,17 @@ struct SubspaceSelection {
     double connections = 3;                ///< N
     double cache_paths = 0;                ///< M of ris_aware; 0 switches that off.
     bool correlation_aware = false;        ///< N counts as N c_s.
+    TypicalSurvival survival;
 
     int s_min(int) const { return 0; }
     int s_max(int k) const { return k == 1 ? 0 : k; }
     double connect_factor(const PathView& view, int s) const {
-        if (s == 0) return 1;
-        if (s == view.k) return light_paths_per_iteration;
+        const double camera_paths = survival(view.k + 1 - s);
+        if (s == 0) return camera_paths;
+        if (s == view.k) return light_paths_per_iteration * survival(s);
         const uint32_t i = view.light_label[s];
         const double count = correlation_aware ? connections * correlation_factor(view, s, connections) : connections;
-        const double target = count * double(prepared->tables.column(view.eye_label[s])[i]) *
+        const double target = camera_paths * count * double(prepared->tables.column(view.eye_label[s])[i]) *
                               double(prepared->inv_energy[i]) * view.light_throughput[s];
         return cache_paths > 0 && target > 0 ? 1 / (1 / target + 1 / cache_paths) : target;
     }
@@ -150,14 +152,10 @@ struct SubspaceConnections {
     int draw(const LightCache& cache, const Index& index, const PathVertex& v, Stratified&& stratified, Rng& rng,
              int longest_prefix, LightPick* picks) const {
         const PreparedTables& prepared = *selection.prepared;
-        const uint32_t light_count = prepared.tables.light_count;
-        const AliasEntry* column = &prepared.draws[size_t(v.label) * light_count];
-        // u has 24 bits, a subspace of a large cache more candidates than that can tell apart: their rare ones would be drawn too
-        // often. The bits below come from the stream.
+        const InverseCdfTable::Column column = prepared.draws.column(v.label);
         const Vec2 u = stratified(), below = rng.uniform2();
-        const double ux = double(u.x) + double(below.x) * 0x1p-24, uy = double(u.y) + double(below.y) * 0x1p-24;
-        const auto first = [&](int n) { return (ux + n) / connections; };
-        for (int n = 0; n < connections; ++n) __builtin_prefetch(&column[alias_part(light_count, first(n))]);
+        // u has 24 bits; the bits below come from the stream.
+        const double base = double(u.x) + double(below.x) * 0x1p-24;
         struct Draw {
             const Candidate* candidates;
             uint32_t count, part;
@@ -166,14 +164,12 @@ struct SubspaceConnections {
         } draws[kMaxConnections];
         int found = 0;
         for (int n = 0; n < connections; ++n) {
-            const uint32_t part = alias_part(light_count, first(n));
-            const uint32_t i = draw_alias(column[part], light_count, part, first(n));
-            const Subspace& subspace = index.subspaces[i];
-            const double second = n == 0 ? uy : rng.uniform_double();
+            const InverseCdfTable::Draw first = column.draw((base + n) / connections);
+            const Subspace& subspace = index.subspaces[first.outcome];
             if (subspace.count == 0) continue;  // nothing there: its share of the estimate is zero
             Draw& d = draws[found++];
-            d = {&index.candidates[subspace.begin], subspace.count, alias_part(subspace.count, second), second,
-                 subspace.scale / column[i].pmf};
+            d = {&index.candidates[subspace.begin], subspace.count, alias_part(subspace.count, first.rest), first.rest,
+                 subspace.scale / first.probability};
             __builtin_prefetch(&d.candidates[d.part]);
         }
         int count = 0;
@@ -198,7 +194,8 @@ using SpcbptAlgorithm = CachedAlgorithm<SubspaceConnections<Selection>>;
 inline SpcbptAlgorithm<> make_spcbpt(const TransportParameters& p, std::shared_ptr<const PreparedTables> prepared,
                                      double light_paths_per_iteration) {
     SubspaceSelection selection{std::move(prepared), light_paths_per_iteration, double(p.connections),
-                                p.ris_aware ? double(p.minimum_paths) : 0, p.correlation_aware};
+                                p.ris_aware ? double(p.minimum_paths) : 0, p.correlation_aware,
+                                TypicalSurvival(p.roulette)};
     return {{std::move(selection), p.connections}, p.heuristic, p.minimum_paths};
 }
 

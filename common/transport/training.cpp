@@ -19,11 +19,12 @@ constexpr uint64_t kTrainingSeed = 0x7472'6169'6e69'6e67ull;
 constexpr uint64_t kChunk = 512;
 constexpr double kSamplesPerBlock = 200;
 
-/// How the weights of the render to come will count, as far as no table decides that.
+/// How the weights of the render to come will count (spcbpt.h), as far as no table decides that.
 struct RenderCounts {
     const EmitterSet& emitters;
     double light_paths_per_iteration = 1;  ///< N1 |crop|
     double correlated_connections = 1;     ///< N with correlation_aware, otherwise 1: nothing to correlate.
+    TypicalSurvival survival;
 };
 
 /// Keeps one of the contributions of a sub-path, in proportion to their estimates.
@@ -54,6 +55,7 @@ class Reservoir {
         const auto keep = [&](int s, double ratio) {
             if (!can_connect(view, s)) return;
             const double density = ratio * inverse_own *
+                                   render.survival(s == k ? k : k + 1 - s) *
                                    (s == 0   ? 1
                                     : s == k ? render.light_paths_per_iteration
                                              : view.light_throughput[s] *
@@ -144,7 +146,8 @@ class TrainingGenerator::Unit {
     const Blocks& blocks() const { return blocks_; }
     RenderCounts render() const {
         const TransportParameters& p = generator_.parameters_;
-        return {generator_.scene_->emitters(), p.light_paths * pixels(), p.correlation_aware ? double(p.connections) : 1};
+        return {generator_.scene_->emitters(), p.light_paths * pixels(), p.correlation_aware ? double(p.connections) : 1,
+                TypicalSurvival(p.roulette)};
     }
     TrainingData empty() const {
         TrainingData data;

@@ -45,6 +45,7 @@ inline SubspaceSelection subspace_selection(const Scene& scene, SubspaceTables t
     s.connections = o.connections;
     s.cache_paths = o.ris_aware ? double(o.paths) : 0;
     s.correlation_aware = o.correlation_aware;
+    s.survival = TypicalSurvival(RouletteRule{});
     return s;
 }
 
@@ -72,7 +73,8 @@ inline ImageOfSeed spcbpt_image(const std::shared_ptr<const Scene>& scene, Subsp
 
 inline ImageOfSeed lvcbpt_image(const std::shared_ptr<const Scene>& scene, double vertices_per_path, const CacheOptions& o,
                                 int max_depth, uint32_t samples_per_pixel) {
-    const UniformSelection selection{o.light_paths * double(scene->frame().crop.area()), o.connections / vertices_per_path};
+    const UniformSelection selection{o.light_paths * double(scene->frame().crop.area()), o.connections / vertices_per_path,
+                                     TypicalSurvival(RouletteRule{})};
     const LvcbptAlgorithm<> algorithm{{selection, o.connections}, Heuristic::kBalance, o.paths};
     return cache_image(scene, algorithm, max_depth, samples_per_pixel, o.light_paths);
 }
@@ -93,7 +95,8 @@ inline std::vector<RegionMeans> lengths_with_tables(const std::shared_ptr<const 
         options.light_paths = p->light_paths, options.ris_aware = p->ris_aware;
         options.correlation_aware = p->correlation_aware;
         const double vertices = tables->vertices_per_path, frame_paths = p->light_paths * double(scene->frame().crop.area());
-        const MaskedCacheSelection<UniformSelection> uniform{{frame_paths, p->connections / vertices}};
+        const MaskedCacheSelection<UniformSelection> uniform{
+            {frame_paths, p->connections / vertices, TypicalSurvival(RouletteRule{})}};
         const MaskedCacheSelection<SubspaceSelection> subspaces{subspace_selection(*scene, *std::move(tables), options)};
         const auto render = [&](auto selection, auto make, int k) {
             selection.min_k = selection.max_k = k;

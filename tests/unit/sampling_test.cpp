@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "common/core/inverse_cdf.h"
 #include "common/core/low_discrepancy.h"
 #include "tests/support/statistics.h"
 
@@ -73,6 +74,47 @@ TEST(AliasTable, DrawsItsOwnPmfAndLeavesFreshUniforms) {
                    "table of " + std::to_string(weights.size()));
     }
     family.check();
+}
+
+TEST(InverseCdfTable, EveryOutcomeHasExactlyItsPartOfTheUnitInterval) {
+    std::vector<float> spiky(1000, 1e-12f);
+    spiky[0] = spiky[617] = 0.4f, spiky[999] = 0.2f;
+    std::vector<float> gaps(1000, 0.0f);
+    gaps[3] = gaps[4] = gaps[998] = 7;
+    std::vector<float> slope;
+    for (int i = 0; i < 1000; ++i) slope.push_back(float(i + 1));
+    const std::vector<std::vector<float>> columns = {spiky, gaps, slope};
+    InverseCdfTable table(1000, uint32_t(columns.size()));
+    for (uint32_t c = 0; c < columns.size(); ++c) table.set(c, columns[c]);
+    constexpr uint64_t one = uint64_t(1) << 31;
+    std::vector<std::vector<uint32_t>> drawn(columns.size());
+    for (uint32_t c = 0; c < columns.size(); ++c) {
+        const InverseCdfTable::Column column = table.column(c);
+        double total = 0;
+        for (const float w : columns[c]) total += double(w);
+        for (uint64_t begin = 0; begin < one;) {
+            const InverseCdfTable::Draw first = column.draw(double(begin) / double(one));
+            // Where the next outcome begins, by bisection.
+            uint64_t inside = begin, end = one;
+            while (end - inside > 1) {
+                const uint64_t middle = (inside + end) / 2;
+                (column.draw(double(middle) / double(one)).outcome > first.outcome ? end : inside) = middle;
+            }
+            EXPECT_EQ(first.rest, 0);
+            EXPECT_LT(column.draw(std::nextafter(double(end) / double(one), 0.0)).rest, 1);
+            EXPECT_FLOAT_EQ(first.probability, float(double(end - begin) / double(one)));
+            EXPECT_NEAR(double(first.probability), double(columns[c][first.outcome]) / total, 1001 / double(one));
+            drawn[c].push_back(first.outcome);
+            begin = end;
+        }
+        std::vector<uint32_t> positive;
+        for (uint32_t i = 0; i < 1000; ++i)
+            if (columns[c][i] > 0) positive.push_back(i);
+        EXPECT_EQ(drawn[c], positive);
+    }
+    InverseCdfTable single(1, 1);
+    single.set(0, std::vector<float>{3});
+    EXPECT_EQ(single.column(0).draw(0.75).rest, 0.75);
 }
 
 /// 2^m consecutive points from a multiple of 2^m on: one in every elementary interval of area 2^-m.

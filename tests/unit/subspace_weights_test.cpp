@@ -39,6 +39,7 @@ SubspaceSelection selection_of(const Scene& scene, SubspaceTables tables, double
     s.light_paths_per_iteration = 0.7 * double(scene.frame().crop.area());
     s.connections = connections;
     s.cache_paths = cache_paths;
+    s.survival = TypicalSurvival(RouletteRule{});
     return s;
 }
 
@@ -47,7 +48,7 @@ class SubspaceWeights : public ::testing::TestWithParam<testing::NamedScene> {};
 /// As the technique itself filled its view in while it was traced (with Russian roulette), and as all others would.
 TEST_P(SubspaceWeights, SumToOneWhateverTheTablesHold) {
     const auto scene = GetParam().make();
-    const UniformSelection uniform{double(scene->frame().crop.area()), 0.37};
+    const UniformSelection uniform{double(scene->frame().crop.area()), 0.37, TypicalSurvival(RouletteRule{})};
     Tally lvc, balance, power, aware, correlated, traced;
     std::vector<int> made(kEdges + 1, 0);
     for (uint64_t seed = 1; seed <= 3; ++seed) {

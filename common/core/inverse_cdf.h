@@ -1,0 +1,74 @@
+#pragma once
+// Many discrete distributions over the same outcomes, drawn by inversion with cutpoints [Chen and Asau 1974]. Neighbouring
+// numbers give neighbouring outcomes, so points that are stratified over [0, 1) are stratified over the outcomes, which an alias
+// table would scatter.
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/core/huge_pages.h"
+
+namespace lightloom {
+
+class InverseCdfTable {
+  public:
+    struct Draw {
+        uint32_t outcome = 0;
+        float probability = 0;  ///< What the table really gives the outcome.
+        double rest = 0;        ///< Where in the outcome's part of [0, 1) the number lies: uniform in [0, 1).
+    };
+
+    class Column {
+      public:
+        Draw draw(double u) const {
+            const double scaled = u * kOne;
+            const uint32_t v = uint32_t(scaled);
+            uint32_t i = cutpoints_[v >> kCutShift];
+            while (first_[i + 1] <= v) ++i;
+            const double width = double(first_[i + 1] - first_[i]);
+            return {i, float(width * (1 / kOne)), (scaled - double(first_[i])) / width};
+        }
+
+      private:
+        friend class InverseCdfTable;
+        Column(const uint32_t* first, const uint32_t* cutpoints) : first_(first), cutpoints_(cutpoints) {}
+        const uint32_t *first_, *cutpoints_;
+    };
+
+    InverseCdfTable(uint32_t outcomes, uint32_t columns)
+        : outcomes_(outcomes), first_(size_t(outcomes + 1) * columns), cutpoints_(size_t(kCuts) * columns) {}
+
+    /// `weights`: finite, non-negative, with a positive sum. Each positive one gets at least 2^-31.
+    void set(uint32_t column, std::span<const float> weights) {
+        uint32_t* first = &first_[size_t(column) * (outcomes_ + 1)];
+        double total = 0, sum = 0;
+        for (const float w : weights) total += double(w);
+        first[0] = 0;
+        for (uint32_t i = 0; i < outcomes_; ++i) {
+            sum += double(weights[i]);
+            first[i + 1] = std::max(uint32_t(sum / total * kOne + 0.5), first[i] + (weights[i] > 0 ? 1 : 0));
+        }
+        first[outcomes_] = uint32_t(kOne);
+        for (uint32_t i = outcomes_; i-- > 1;) first[i] = std::min(first[i], first[i + 1] - (weights[i] > 0 ? 1 : 0));
+        uint32_t i = 0;
+        for (uint32_t c = 0; c < kCuts; ++c) {
+            while (first[i + 1] <= c << kCutShift) ++i;
+            cutpoints_[size_t(column) * kCuts + c] = i;
+        }
+    }
+    Column column(uint32_t c) const { return {&first_[size_t(c) * (outcomes_ + 1)], &cutpoints_[size_t(c) * kCuts]}; }
+
+  private:
+    static constexpr double kOne = 0x1p31;
+    static constexpr uint32_t kCuts = 256, kCutShift = 31 - 8;
+
+    uint32_t outcomes_;
+    /// Of each column, where in units of 2^-31 its outcomes begin, and one more.
+    std::vector<uint32_t, HugePageAllocator<uint32_t>> first_;
+    /// The outcome at each 256th of the unit interval.
+    std::vector<uint32_t, HugePageAllocator<uint32_t>> cutpoints_;
+};
+
+}  // namespace lightloom
