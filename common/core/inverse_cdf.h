@@ -23,7 +23,7 @@ class InverseCdfTable {
     class Column {
       public:
         Draw draw(double u) const {
-            const double scaled = u * kOne;
+            const double scaled = std::min(u * kOne, kOne - 0x1p-21);  // u may have been rounded to 1
             const uint32_t v = uint32_t(scaled);
             uint32_t i = cutpoints_[v >> kCutShift];
             while (first_[i + 1] <= v) ++i;

@@ -2,7 +2,8 @@
 // The random walk of both sub-paths.
 //
 // Russian roulette divides the throughput by the true survival probability and stays out of every density: the weights
-// are a function of the path alone, and roulette is the same function of a sub-path's own throughput for every technique.
+// are a function of the path alone, and roulette is the same function of a sub-path's own throughput for every technique. What
+// weights may know of it: common/path/survival.h.
 
 #include "common/core/rng.h"
 #include "common/path/path_view.h"

@@ -20,18 +20,18 @@ class TypicalSurvival {
     /// Without roulette.
     TypicalSurvival() { shares_.fill(1); }
     explicit TypicalSurvival(const RouletteRule& rule) {
-        const float q = std::max(rule.min_survival, kPerEvent);
-        float share = 1;
+        const double q = double(std::max(rule.min_survival, kPerEvent));
+        double share = 1;
         for (size_t n = 0; n < shares_.size(); ++n) {
             if (int(n) > rule.first_vertex) share *= q;
             shares_[n] = share;
         }
     }
-    /// n >= 0. The last one holds for all longer ones, too.
-    double operator()(int n) const { return double(shares_[std::min(size_t(n), shares_.size() - 1)]); }
+    /// 0 <= n <= kMaxEdges + 1.
+    double operator()(int n) const { return shares_[size_t(n)]; }
 
   private:
-    std::array<float, 24> shares_;
+    std::array<double, kMaxEdges + 2> shares_;
 };
 
 }  // namespace lightloom

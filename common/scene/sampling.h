@@ -17,16 +17,12 @@ struct AliasEntry {
     uint32_t alias = 0;
 };
 
-/// Fills in `entries` (weights.size() of them) for draw_alias(). Weights as in AliasTable.
+/// Fills in `entries`, weights.size() of them. Weights as in AliasTable.
 void make_alias(std::span<const double> weights, AliasEntry* entries);
 /// The part that `u` in [0, 1) falls into.
 inline uint32_t alias_part(uint32_t count, double u) {
     const uint32_t i = uint32_t(u * double(count));
     return i < count ? i : count - 1;
-}
-/// `part` = alias_part(count, u).
-inline uint32_t draw_alias(const AliasEntry& entry, uint32_t count, uint32_t part, double u) {
-    return u * double(count) - double(part) < double(entry.keep) ? part : entry.alias;
 }
 
 /// Discrete distribution with O(1) sampling [Walker 1974; Vose 1991]. pmf() is exactly what sample() does up to the

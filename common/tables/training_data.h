@@ -2,10 +2,11 @@
 // What training units bring home: full paths (the dataset D), light sub-paths (for Q), and the brightness of the frame by blocks.
 // Everything is a plain array, so that parts from many units are simply joined in the order of their sample numbers.
 //
-// A path X of technique `own` with density p_own and effective generator density sum_s n_s p_s = p_own / w_own:
+// A path X of technique `own` with density p_own (as traced, roulette included) and weight w_own:
 //     estimate = L(w_own f / p_own)                a sample of the image, in expectation
 //     square   = L(f / p_own)^2 w_own              c_X p_own of algorithms.md 1.1: E[square / (F / p_own)] is the loss
-//     vertices[i].density = n p of a technique, without N Gamma / Q (with correlation_aware: c_s n p), over p_own: i = 0 holds the ones that tables do not change
+//     vertices[i].density = n p of a technique, without N Gamma / Q (with correlation_aware: c_s n p; with the
+//                           typical survival of roulette), over p_own: i = 0 holds the ones that tables do not change
 //                           (s = 0 and s = k), 1 <= s <= k-1 the connection of x_{s-1} and x_s; 0 where impossible
 // One path per camera sample (and one per light sub-path that reached the lens) is kept, chosen in proportion to its
 // estimate; both numbers are divided by the probability of that choice, so that sums over D stay unbiased.

@@ -54,7 +54,8 @@ struct CachedAlgorithm {
             const Rgb c = connect_to_camera(scene, y, s, z0.p, &film, &view, &chunk.counters);
             if (c.is_black()) return;
             method.complete(scene, y, s, &z0, 1, normalize(y[s - 1].p - z0.p), &view);
-            contribute(PathContribution{c, 1, s, 1, y, &z0, y[0].p, y[0].ng, uint32_t(y[0].emitter), film}, view, m, chunk);
+            contribute(PathContribution{c, 1, s, 1, y, &z0, y[0].p, y[0].ng, uint32_t(y[0].emitter), film, y[s - 1].survival},
+                       view, m, chunk);
         };
         state.cache = trace_light_cache(scope, window * method.windows(), preparation,
                                         [&](PathVertex* y, int n) { method.label_light_path(scene, y, n); }, splat);
@@ -80,7 +81,7 @@ struct CachedAlgorithm {
             if (v.emitter != kNone)
                 if (const Rgb c = emitter_hit<Method::kDetail>(scene, z, t, &view); !c.is_black()) {
                     if (view.k >= 2) method.complete(scene, nullptr, 0, z, t, {}, &view);
-                    contribute(PathContribution{c, 1, 0, t, nullptr, z, v.p, v.ng, uint32_t(v.emitter), {}}, view);
+                    contribute(PathContribution{c, 1, 0, t, nullptr, z, v.p, v.ng, uint32_t(v.emitter), {}, v.survival}, view);
                 }
             if (t > context.max_edges || !v.bsdf.has_smooth_lobe()) return;
             method.label_camera_vertex(scene, &v);
@@ -99,7 +100,8 @@ struct CachedAlgorithm {
                 const float scale = method.inverse_density(pick);
                 // Where a light sub-path from an infinite light began says nothing about this one: x_0 is a direction.
                 const Vec3 x0 = direction ? scene.emitters().outside(v.p, -end.ng) : start.p;
-                contribute(PathContribution{c * scale, scale, s, t, pick.y, z, x0, start.ng, uint32_t(start.emitter), {}}, view);
+                contribute(PathContribution{c * scale, scale, s, t, pick.y, z, x0, start.ng, uint32_t(start.emitter), {},
+                                            end.survival * v.survival}, view);
             }
         };
         const auto escape = [&](int t, const WalkRay& ray) {
@@ -109,7 +111,7 @@ struct CachedAlgorithm {
             if (view.k >= 2) method.complete(scene, nullptr, 0, z, t, ray.direction, &view);
             const EmitterSet& emitters = scene.emitters();
             contribute(PathContribution{c, 1, 0, t, nullptr, z, emitters.outside(ray.origin, ray.direction), -ray.direction,
-                                        uint32_t(emitters.environment_index()), {}}, view);
+                                        uint32_t(emitters.environment_index()), {}, ray.survival}, view);
         };
         trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
                           visit, escape);

@@ -9,8 +9,9 @@ namespace {
 
 constexpr ParameterInfo kRouletteStart{"rr-start", 4, 2, 256, true,
                                        "sub-path vertices below this index never end by Russian roulette"};
-// The weights do not know roulette, so that a technique whose sub-path rarely survives is trusted too much: at 0.05, door needs 1.4
-// (spcbpt), 1.7 (bdpt) and 2.5 (path) times the processor time for the same relMSE; at 1 the walks cost more than they save.
+// The weights know a typical survival at best, so that a technique whose sub-path rarely survives is trusted too much: at 0.05,
+// door needs 1.4 (spcbpt), 1.7 (bdpt) and 2.5 (path) times the processor time for the same relMSE; at 1 the walks cost more than
+// they save.
 constexpr ParameterInfo kRouletteMin{"rr-min", 0.5, 0.01, 1, false,
                                      "smallest survival probability of Russian roulette; 1 switches roulette off"};
 constexpr std::string_view kHeuristics[] = {"balance", "power", "maximum"};

@@ -62,9 +62,10 @@ struct SubspaceSelection {
         if (s == view.k) return light_paths_per_iteration * survival(s);
         const uint32_t i = view.light_label[s];
         const double count = correlation_aware ? connections * correlation_factor(view, s, connections) : connections;
-        const double target = camera_paths * count * double(prepared->tables.column(view.eye_label[s])[i]) *
+        const double target = count * double(prepared->tables.column(view.eye_label[s])[i]) *
                               double(prepared->inv_energy[i]) * view.light_throughput[s];
-        return cache_paths > 0 && target > 0 ? 1 / (1 / target + 1 / cache_paths) : target;
+        const bool limited = cache_paths > 0 && target > 0;
+        return camera_paths * (limited ? 1 / (1 / target + 1 / (cache_paths * survival(s))) : target);
     }
 };
 
@@ -146,8 +147,8 @@ struct SubspaceConnections {
         return index;
     }
 
-    /// N draws for a labelled camera vertex, stage by stage, so that the memory of all of them is fetched at once. The
-    /// first stage is stratified over the draws. Returns how many of them found a prefix.
+    /// N draws for a labelled camera vertex, stage by stage, so that the candidates of all of them are fetched at once. One number
+    /// serves both stages and is stratified over the draws. Returns how many of them found a prefix.
     template <class Stratified>
     int draw(const LightCache& cache, const Index& index, const PathVertex& v, Stratified&& stratified, Rng& rng,
              int longest_prefix, LightPick* picks) const {

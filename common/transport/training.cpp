@@ -51,7 +51,7 @@ class Reservoir {
         vertices_[size_t(k)] = {c.z[0].p, {}, 0, 0};
         view_throughput(c.y, c.s, c.z, &view);
         view_footprint(render.emitters[c.emitter], c.y, c.s, c.z, c.t, &view);
-        const double inverse_own = double(c.inverse_density) * scale;
+        const double inverse_own = double(c.inverse_density) * scale / double(c.survival);
         const auto keep = [&](int s, double ratio) {
             if (!can_connect(view, s)) return;
             const double density = ratio * inverse_own *
@@ -230,6 +230,7 @@ Result<TrainingData> TrainingGenerator::trace(const TrainingWork& work, std::sto
 
 Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
     const BdptSelection generator{unit.pixels()};
+    const RenderCounts render = unit.render();
     return unit.trace(unit.empty(), [&](SampleContext& context, uint32_t camera_block, TrainingData& data, Rng& rng) {
         Reservoir from_camera, from_light;
         trace_bdpt_sample<ViewDetail::kSubspace>(
@@ -244,7 +245,7 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
                 const double weight = mis_weight(view, {TechniqueKind::kConnect, found.s}, generator);
                 data.block_sum[block] += (splat ? from_light : from_camera)
                                              .offer(found, view, weight, splat ? 1 / unit.pixels() : 1, block,
-                                                    unit.render(), rng);
+                                                    render, rng);
             });
         from_camera.move_to(&data);
         from_light.move_to(&data);
@@ -254,6 +255,7 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
 Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
     const auto generator = make_spcbpt(parameters_, guide_, unit.pixels());
     const UnitWork work = unit.light_work();
+    const RenderCounts render = unit.render();
     // Light sub-paths are traced in parallel; what they bring is joined in their order.
     struct FromLight {
         Reservoir reservoir;
@@ -266,7 +268,7 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
             Rng rng({seed_, Stage::kTraining, 1 + uint64_t(found.s), work.first_light_path + m});
             const uint32_t block = unit.blocks().at(int(found.film.x), int(found.film.y));
             const double estimate = from_light[m].reservoir.offer(found, view, generator.weight(view, found.s),
-                                                                  1 / unit.pixels(), block, unit.render(), rng);
+                                                                  1 / unit.pixels(), block, render, rng);
             from_light[m].estimates.push_back({block, estimate});
         });
     TrainingData data = unit.empty();
@@ -284,7 +286,7 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
         Reservoir from_camera;
         generator.trace(context, state, [&](const PathContribution& found, PathView& view) {
             chunk.block_sum[block] +=
-                from_camera.offer(found, view, generator.weight(view, found.s), 1, block, unit.render(), rng);
+                from_camera.offer(found, view, generator.weight(view, found.s), 1, block, render, rng);
         });
         from_camera.move_to(&chunk);
     });

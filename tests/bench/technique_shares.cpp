@@ -134,7 +134,8 @@ int main(int argc, char** argv) {
                     if (name == "bdpt") return render(ClassOfBdpt{{frame_paths}, wanted});
                     if (name == "lvcbpt") {
                         const LvcbptAlgorithm<> whole{
-                            {{frame_paths, parameters->connections / tables.vertices_per_path}, parameters->connections},
+                            {{frame_paths, parameters->connections / tables.vertices_per_path, TypicalSurvival(parameters->roulette)},
+                             parameters->connections},
                             parameters->heuristic,
                             parameters->minimum_paths};
                         return render(ClassOfCached<LvcbptAlgorithm<>>{whole, wanted});

@@ -109,7 +109,8 @@ TEST(TableFuzz, TinyCachesKeepTheMean) {
             // One light path in a unit splats too rarely for a test, so light tracing is switched off. A whole unit shares its
             // few paths, so that a replication is many units, here rows of the frame.
             MaskedCacheSelection<SubspaceSelection> spc{testing::subspace_selection(*scene, tables, options)};
-            MaskedCacheSelection<UniformSelection> lvc{{1, options.connections / tables.vertices_per_path}};
+            MaskedCacheSelection<UniformSelection> lvc{
+                {1, options.connections / tables.vertices_per_path, TypicalSurvival(RouletteRule{})}};
             spc.light_tracing = lvc.light_tracing = false;
             const auto in_rows = [&](const auto& algorithm) {
                 return [&scene, algorithm](uint64_t seed) {
@@ -193,7 +194,8 @@ TEST(TableFuzz, EachTechniqueAloneHasTheSameMean) {
             const SubspaceTables tables = testing::random_tables(scene->emitters(), 500 + uint64_t(k), random);
             for (int s = 1; s <= k; ++s) {
                 MaskedCacheSelection<SubspaceSelection> spc{testing::subspace_selection(*scene, tables, options)};
-                MaskedCacheSelection<UniformSelection> lvc{{double(scene->frame().crop.area()), 1.7}};
+                MaskedCacheSelection<UniformSelection> lvc{
+                    {double(scene->frame().crop.area()), 1.7, TypicalSurvival(RouletteRule{})}};
                 spc.only_s = lvc.only_s = s;
                 spc.min_k = spc.max_k = lvc.min_k = lvc.max_k = k;
                 const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> subspaces{

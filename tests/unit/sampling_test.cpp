@@ -112,6 +112,10 @@ TEST(InverseCdfTable, EveryOutcomeHasExactlyItsPartOfTheUnitInterval) {
             if (columns[c][i] > 0) positive.push_back(i);
         EXPECT_EQ(drawn[c], positive);
     }
+    for (uint32_t c = 0; c < columns.size(); ++c) {  // (u + n) / N may round to 1
+        EXPECT_EQ(table.column(c).draw(1.0).outcome, drawn[c].back());
+        EXPECT_LT(table.column(c).draw(1.0).rest, 1);
+    }
     InverseCdfTable single(1, 1);
     single.set(0, std::vector<float>{3});
     EXPECT_EQ(single.column(0).draw(0.75).rest, 0.75);

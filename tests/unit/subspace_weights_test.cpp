@@ -43,6 +43,22 @@ SubspaceSelection selection_of(const Scene& scene, SubspaceTables tables, double
     return s;
 }
 
+TEST(TypicalSurvival, CountsTheEventsThatASubPathWentThrough) {
+    const TypicalSurvival none, off(RouletteRule{.min_survival = 1, .max_survival = 1}), late(RouletteRule{.first_vertex = 256});
+    const TypicalSurvival usual(RouletteRule{.first_vertex = 4, .min_survival = 0.5f});
+    for (const int n : {0, 1, 4, 256, kMaxEdges + 1}) {
+        EXPECT_EQ(none(n), 1);
+        EXPECT_EQ(off(n), 1);
+    }
+    EXPECT_EQ(late(256), 1);
+    EXPECT_LT(late(257), 1);
+    // The walk plays when it leaves vertex 4 and every later one, on its way to the fifth.
+    EXPECT_EQ(usual(4), 1);
+    EXPECT_FLOAT_EQ(float(usual(5)), TypicalSurvival::kPerEvent);
+    EXPECT_FLOAT_EQ(float(usual(7)), float(std::pow(TypicalSurvival::kPerEvent, 3)));
+    EXPECT_FLOAT_EQ(float(TypicalSurvival(RouletteRule{.min_survival = 0.9f})(5)), 0.9f);
+}
+
 class SubspaceWeights : public ::testing::TestWithParam<testing::NamedScene> {};
 
 /// As the technique itself filled its view in while it was traced (with Russian roulette), and as all others would.
