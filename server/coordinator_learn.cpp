@@ -197,13 +197,16 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
     const auto tables = train_tables(probe, scene.emitters(), parameters->training, stop, &report);
     if (!tables.ok()) return tables.status();
     const double learned = seconds_since(begin), samples = double(std::max<uint64_t>(1, probe.samples));
-    const double budget = kTrainingShare * spec.time_limit_seconds - traced - learned;
+    const bool guided = parameters->pilot_samples > 0;
+    // Every round learns once more what the probe's learning cost.
+    const double budget = kTrainingShare * spec.time_limit_seconds - traced - (guided ? 3 : 2) * learned;
     const uint64_t wanted = parameters->training_samples;
-    const double rounds = parameters->pilot_samples > 0 ? kGuidedCost : 1;
-    const TrainingRate rate{rounds * traced / samples / double(std::max<size_t>(1, crew)), rounds * learned / samples};
+    const double per_sample = (guided ? kGuidedCost : 1) * traced / samples;
+    const TrainingRate rate{per_sample / double(std::max<size_t>(1, crew)), kLearningOverTracing * per_sample};
     const uint64_t chosen = affordable_training_samples(rate, budget, wanted);
     spec = with_training_samples(spec, chosen);
-    spdlog::info("{}: the time limit has room for {} of {} training samples", job.id, chosen, wanted);
+    spdlog::info("{}: the time limit has room for {} of {} training samples; {} traced in {:.3f} s, learned in {:.3f} s", job.id,
+                 chosen, wanted, probe.samples, traced, learned);
     {
         const std::lock_guard lock(mutex_);
         if (job.state != JobState::kPreparing) return over();

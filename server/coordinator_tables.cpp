@@ -90,7 +90,8 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
     }
     job.makes_tables = true;
     if (open_size && samples > kMinTrainingSamples) {
-        const uint64_t probe = std::min(kProbeSamples, samples);
+        const auto roomy = uint64_t(std::min(job.spec.time_limit_seconds * kProbeSamplesPerSecond, double(kTrainingUnitSamples)));
+        const uint64_t probe = std::min(std::max(kProbeSamples, roomy), samples);
         open_training(job, UnitKind::kProbe, {0, probe, probe});
     } else {
         open_first_round(job);

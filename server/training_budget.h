@@ -8,13 +8,18 @@ namespace lightloom {
 
 /// Share of a time limit that preparation may take unless the user chose the training set.
 inline constexpr double kTrainingShare = 0.1;
-/// Samples of the unit that measures; thrown away afterwards.
+/// Samples of the unit that measures, thrown away afterwards: at least so many, and more where the limit has room. A cold worker
+/// spends a tenth of a second before its first sample, which makes a small probe call every sample ten times too dear.
 inline constexpr uint64_t kProbeSamples = 2048;
+inline constexpr double kProbeSamplesPerSecond = 300;  ///< Of the time limit.
 /// Below this, tables are worth less than what they cost to learn.
 inline constexpr uint64_t kMinTrainingSamples = 1024;
 /// What a sample of a set that is traced in two rounds costs, over one of the probe: subspace connections find more paths,
 /// and all of them are learned from.
 inline constexpr double kGuidedCost = 2;
+/// What learning from a sample costs, over tracing it. The probe cannot tell: most of its own learning does not depend on the number
+/// of samples, and counts as such. (Hard interiors: a quarter.)
+inline constexpr double kLearningOverTracing = 0.5;
 /// The catalog's parameter for the size of the set.
 inline constexpr const char* kTrainingPaths = "training-paths";
 
