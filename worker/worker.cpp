@@ -28,6 +28,7 @@ class Backoff {
 
 constexpr double kLeaseWaitSeconds = 1;
 constexpr int kSubmitAttempts = 40;
+constexpr uint64_t kWarmUpShare = 8;  ///< A probe's samples over those that are traced before it is timed.
 
 std::string name_of(const UnitReference& unit) {
     if (unit.key.kind != UnitKind::kRender) return unit.job_id + " training unit " + std::to_string(unit.key.group);
@@ -198,6 +199,15 @@ Status Worker::trace_unit(const UnitLease& lease, std::stop_token unit_stop, std
     const auto tracer = tracers_(lease, unit_stop);
     if (!tracer.ok()) return tracer.status();
     Result<TrainingData> data = internal_error("not traced");
+    if (lease.unit.key.kind == UnitKind::kProbe) {
+        // A probe measures what a sample costs. The first ones also pay for threads, page faults and cold caches, a tenth of
+        // a second that the job pays once and that would make a short probe call every sample several times too dear.
+        TrainingWork first = lease.unit.training;
+        first.sample_count = std::max<uint64_t>(1, first.sample_count / kWarmUpShare);
+        const auto warm = in_turn(lease, unit_stop, drain, [&] { data = (*tracer)(first, unit_stop); });
+        if (!warm.ok()) return warm.status();
+        if (!data.ok()) return data.status();
+    }
     const auto seconds = in_turn(lease, unit_stop, drain, [&] { data = (*tracer)(lease.unit.training, unit_stop); });
     if (!seconds.ok()) return seconds.status();
     if (!data.ok()) return data.status();

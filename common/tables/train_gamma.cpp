@@ -5,6 +5,7 @@
 #include <numeric>
 #include <optional>
 
+#include "common/core/fork_join.h"
 #include "common/core/math.h"
 #include "common/core/rng.h"
 
@@ -23,102 +24,132 @@ struct Level {
     uint32_t eye(uint32_t j) const { return j >> bits; }
 };
 
-/// The dataset as a level sees it, with Gamma's matrix B (column-major) and what is needed to improve it.
+/// The dataset as a level sees it: what a matrix B (column-major) is worth and how to improve it. Columns that no path names are
+/// left alone: their share of the loss is the floor's, and the prior is what is known of them.
 class LevelProblem {
   public:
     LevelProblem(const GammaDataset& data, uint32_t bits, double mix) : data_(data), level_(data, bits), mix_(mix) {
         energy_.assign(level_.light_count, 0.0);
         for (uint32_t i = 0; i < data.light_count; ++i) energy_[level_.light(i)] += double(data.energy[i]);
-        total_energy_ = std::accumulate(energy_.begin(), energy_.end(), 0.0);
+        const double total = std::accumulate(energy_.begin(), energy_.end(), 0.0);
+        floor_.reserve(energy_.size());
+        for (const double q : energy_) floor_.push_back(0.5 / level_.light_count + 0.5 * q / total);
         cells_.reserve(data.nodes.size());
         gains_.reserve(data.nodes.size());
+        std::vector<bool> named(level_.eye_count);
         for (const GammaNode& n : data.nodes) {
-            const uint32_t i = level_.light(n.light);
-            cells_.push_back(level_.eye(n.eye) * level_.light_count + i);
+            const uint32_t i = level_.light(n.light), j = level_.eye(n.eye);
+            named[j] = true;
+            cells_.push_back(j * level_.light_count + i);
             // g holds 1 / Q of the finest subspace; Gamma_IJ Q_i / Q_I is its lifted entry [algorithms.md 9.1].
             gains_.push_back(float(double(n.g) * double(data.energy[n.light]) / energy_[i]));
         }
+        for (uint32_t j = 0; j < level_.eye_count; ++j)
+            if (named[j]) columns_.push_back(j);
+        fixed_.reserve(data.paths.size());
+        for (const GammaPath& p : data.paths) {
+            double floor_share = 0;
+            for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n)
+                floor_share += double(gains_[n]) * floor_[level_.light(data.nodes[n].light)];
+            fixed_.push_back(double(p.fixed) + mix * floor_share);
+        }
+        for (float& gain : gains_) gain *= float(1 - mix);
     }
     const Level& level() const { return level_; }
     size_t size() const { return size_t(level_.light_count) * level_.eye_count; }
-    double share(uint32_t i) const { return energy_[i] / total_energy_; }
-    double floor_of(uint32_t i) const { return 0.5 / level_.light_count + 0.5 * share(i); }
 
     std::vector<float> flat_prior() const {
         std::vector<float> prior(size());
-        for (size_t c = 0; c < prior.size(); ++c) prior[c] = float(floor_of(uint32_t(c % level_.light_count)));
+        for_columns(level_.eye_count, [&](size_t j) {
+            for (uint32_t i = 0; i < level_.light_count; ++i) prior[j * level_.light_count + i] = float(floor_[i]);
+        });
         return prior;
     }
     /// B of a coarser level as this one's prior: mass goes to the parts of a subspace in proportion to their energy.
     std::vector<float> lifted(const LevelProblem& coarse, const std::vector<float>& b) const {
-        std::vector<float> out(size());
-        for (uint32_t j = 0; j < level_.eye_count; ++j) {
-            for (uint32_t i = 0; i < level_.light_count; ++i) {
-                const uint32_t fine_i = finest_light(i), fine_j = j << level_.bits;
-                const uint32_t ci = coarse.level_.light(fine_i), cj = coarse.level_.eye(fine_j);
-                out[size_t(j) * level_.light_count + i] =
-                    float(double(b[size_t(cj) * coarse.level_.light_count + ci]) * energy_[i] / coarse.energy_[ci]);
-            }
+        std::vector<std::pair<uint32_t, double>> from(level_.light_count);  // the coarse label, and this part's share of it
+        for (uint32_t i = 0; i < level_.light_count; ++i) {
+            const uint32_t c = coarse.level_.light(finest_light(i));
+            from[i] = {c, energy_[i] / coarse.energy_[c]};
         }
+        std::vector<float> out(size());
+        for_columns(level_.eye_count, [&](size_t j) {
+            const float* parent = &b[size_t(coarse.level_.eye(uint32_t(j) << level_.bits)) * coarse.level_.light_count];
+            float* column = &out[j * level_.light_count];
+            for (uint32_t i = 0; i < level_.light_count; ++i) column[i] = float(double(parent[from[i].first]) * from[i].second);
+        });
         return out;
-    }
-    double gamma_at(const std::vector<float>& b, uint32_t cell) const {
-        return (1 - mix_) * double(b[cell]) + mix_ * floor_of(cell % level_.light_count);
-    }
-    double density(const GammaPath& p, const std::vector<float>& gamma) const {
-        double f = double(p.fixed);
-        for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n) f += double(gains_[n]) * double(gamma[cells_[n]]);
-        return f;
     }
     std::vector<float> mixed(const std::vector<float>& b) const {
         std::vector<float> gamma(b.size());
-        for (size_t c = 0; c < b.size(); ++c) gamma[c] = float(gamma_at(b, uint32_t(c)));
+        for_columns(level_.eye_count, [&](size_t j) {
+            for (uint32_t i = 0; i < level_.light_count; ++i) {
+                const size_t c = j * level_.light_count + i;
+                gamma[c] = float((1 - mix_) * double(b[c]) + mix_ * floor_[i]);
+            }
+        });
         return gamma;
     }
     double loss(const std::vector<float>& b, const std::vector<uint32_t>& paths) const {
-        const std::vector<float> gamma = mixed(b);
         double sum = 0;
         for (const uint32_t x : paths) {
-            const GammaPath& p = data_.paths[x];
-            const double f = density(p, gamma);
-            if (f > 0) sum += double(p.weight) / f;
+            const double f = density(x, b);
+            if (f > 0) sum += double(data_.paths[x].weight) / f;
         }
         return paths.empty() ? 0 : sum / double(paths.size());
     }
-    /// Negative gradient of the loss with respect to B, up to the factor (1 - mix).
+    /// Negative gradient of the loss' sum with respect to B, in the columns that paths name; the others of `out` are not touched.
     void gradient(const std::vector<float>& b, const uint32_t* begin, const uint32_t* end, std::vector<double>* out) const {
-        const std::vector<float> gamma = mixed(b);
-        std::fill(out->begin(), out->end(), 0.0);
+        for_columns(columns_.size(), [&](size_t k) {
+            double* column = &(*out)[size_t(columns_[k]) * level_.light_count];
+            std::fill(column, column + level_.light_count, 0.0);
+        });
         for (const uint32_t* x = begin; x != end; ++x) {
             const GammaPath& p = data_.paths[*x];
-            const double f = density(p, gamma);
+            const double f = density(*x, b);
             if (!(f > 0)) continue;
             const double scale = double(p.weight) / (f * f);
             for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n) (*out)[cells_[n]] += scale * double(gains_[n]);
         }
     }
     /// One majorise-minimise step per column: B <- sqrt(B^2 G + lambda Gbar pi^2), normalised [algorithms.md 9.2].
-    void improve(std::vector<float>* b, const std::vector<float>& prior, double lambda,
-                 const std::vector<uint32_t>& paths) const {
-        std::vector<double> g(b->size());
-        gradient(*b, paths.data(), paths.data() + paths.size(), &g);
-        double mean = 0;
-        for (size_t c = 0; c < g.size(); ++c) mean += double((*b)[c]) * g[c];
-        mean /= level_.eye_count;
-        for (uint32_t j = 0; j < level_.eye_count; ++j) {
-            const size_t column = size_t(j) * level_.light_count;
+    /// `g` is room for a gradient.
+    void improve(std::vector<float>* b, const std::vector<float>& prior, double lambda, const std::vector<uint32_t>& paths,
+                 std::vector<double>* g) const {
+        g->resize(b->size());
+        gradient(*b, paths.data(), paths.data() + paths.size(), g);
+        std::vector<double> sums(columns_.size());
+        for_columns(columns_.size(), [&](size_t k) {
+            const size_t column = size_t(columns_[k]) * level_.light_count;
+            for (size_t c = column; c < column + level_.light_count; ++c) sums[k] += double((*b)[c]) * (*g)[c];
+        });
+        const double mean = std::accumulate(sums.begin(), sums.end(), 0.0) / level_.eye_count;
+        for_columns(columns_.size(), [&](size_t k) {
+            const size_t column = size_t(columns_[k]) * level_.light_count;
             double sum = 0;
             for (size_t c = column; c < column + level_.light_count; ++c) {
                 const double old = double((*b)[c]), pi = double(prior[c]);
-                g[c] = std::sqrt(old * old * g[c] + lambda * mean * pi * pi);
-                sum += g[c];
+                (*g)[c] = std::sqrt(old * old * (*g)[c] + lambda * mean * pi * pi);
+                sum += (*g)[c];
             }
-            if (!(sum > 0)) continue;  // no path came here: the prior stays
-            for (size_t c = column; c < column + level_.light_count; ++c) (*b)[c] = float(g[c] / sum);
-        }
+            if (!(sum > 0)) return;  // none of its paths are among these: the prior stays
+            for (size_t c = column; c < column + level_.light_count; ++c) (*b)[c] = float((*g)[c] / sum);
+        });
     }
 
   private:
+    template <class Body>
+    static void for_columns(size_t count, const Body& body) {
+        fork_join(count, [&](size_t first, size_t last) {
+            for (size_t j = first; j < last; ++j) body(j);
+        });
+    }
+    double density(uint32_t path, const std::vector<float>& b) const {
+        const GammaPath& p = data_.paths[path];
+        double f = fixed_[path];
+        for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n) f += double(gains_[n]) * double(b[cells_[n]]);
+        return f;
+    }
     uint32_t finest_light(uint32_t i) const {
         return i < level_.coarse_sources ? i << level_.bits : data_.source_count + ((i - level_.coarse_sources) << level_.bits);
     }
@@ -127,9 +158,11 @@ class LevelProblem {
     const Level level_;
     const double mix_;
     std::vector<double> energy_;
-    double total_energy_ = 1;
-    std::vector<uint32_t> cells_;
-    std::vector<float> gains_;
+    std::vector<double> floor_;      ///< What the mix adds to an entry, by light label.
+    std::vector<uint32_t> columns_;  ///< That a path names, ascending.
+    std::vector<uint32_t> cells_;    ///< By node.
+    std::vector<float> gains_;       ///< By node: dF / dB.
+    std::vector<double> fixed_;      ///< By path: F for B = 0.
 };
 
 constexpr double kStrengths[] = {0.01, 0.1, 1, 10};
@@ -159,6 +192,7 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
     std::vector<float> prior = problem->flat_prior(), b = prior;
     report->uniform_loss = problem->loss(prior, judge);
     double best_loss = report->uniform_loss;
+    std::vector<double> room;
     while (true) {
         const bool finest = bits == 0;
         // The prior's strength matters where data are thin, which is at the fine end.
@@ -169,7 +203,7 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
             std::vector<float> candidate = b;
             for (int i = 0; i < (bits > 2 ? kCoarseSteps : kStepsPerStrength); ++i) {
                 if (options.stop.stop_requested()) return b;
-                problem->improve(&candidate, prior, lambda, train);
+                problem->improve(&candidate, prior, lambda, train, &room);
             }
             const double loss = problem->loss(candidate, judge);
             if (loss < level_loss) level_loss = loss, strength = lambda, best_b = std::move(candidate);
@@ -183,7 +217,7 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
             // What judged may teach as well once the choice is made.
             if (finest)
                 for (int i = 0; i < kFinalSteps && !options.stop.stop_requested(); ++i)
-                    problem->improve(&b, prior, strength, all);
+                    problem->improve(&b, prior, strength, all, &room);
         } else {
             b = prior;  // finer subspaces than the data support: keep the coarser model, lifted
         }
@@ -216,7 +250,7 @@ std::vector<float> train_adam(const GammaDataset& data, const GammaOptions& opti
             const size_t end = std::min(order.size(), begin + kBatch);
             problem.gradient(b, &order[begin], order.data() + end, &g);
             power1 *= kBeta1, power2 *= kBeta2;
-            const double scale = (1 - options.mix) / double(end - begin);
+            const double scale = 1 / double(end - begin);
             for (uint32_t j = 0; j < data.eye_count; ++j) {
                 const size_t column = size_t(j) * data.light_count;
                 double mean = 0;

@@ -258,6 +258,31 @@ TEST(TrainingBudget, IsTheLargestPowerOfTwoThatFits) {
     EXPECT_EQ(affordable_training_samples(rate, -1, 700), 700u);
 }
 
+/// The training set that a job of twenty seconds settles for, with a worker whose first call of a tracer takes longer.
+uint64_t chosen_samples(double cold_seconds) {
+    TableService service([](CoordinatorOptions& o) { o.clock = [] { return std::chrono::steady_clock::now(); }; });
+    LocalWorkerPort port(*service.coordinator);
+    std::atomic<bool> cold{true};
+    const auto tracers = [&](const UnitLease& lease, std::stop_token) -> Result<TrainingTracer> {
+        return TrainingTracer([&cold, cold_seconds, settings = render_settings(lease.spec)](const TrainingWork& work, std::stop_token stop) {
+            if (cold.exchange(false)) std::this_thread::sleep_for(std::chrono::duration<double>(cold_seconds));
+            return trace_training(*golden(), settings, work, stop);
+        });
+    };
+    Worker worker(port, {.identity = service.identity, .thread_count = 1, .host = "h"}, testing::fake_renderers(0.001), tracers);
+    std::jthread thread([&](std::stop_token stop) { EXPECT_TRUE(worker.run(stop).ok()); });
+    JobSpec timed = service.table_spec(0);
+    timed.time_limit_seconds = 20;
+    timed.parameters.erase("training-paths");
+    const std::string id = service.submit_now(timed);
+    const JobInfo info = service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing; });
+    EXPECT_TRUE(service.coordinator->cancel_job(id).ok());
+    return std::stoull(info.spec.parameters.at("training-paths"));
+}
+
+/// What a worker spends once, on its threads and its first look at the scene, is no price of a sample.
+TEST(TrainingBudget, AColdWorkerIsNotTakenForASlowOne) { EXPECT_GE(16 * chosen_samples(1), chosen_samples(0)); }
+
 TEST(TrainingBudget, ATimeLimitedJobRecordsWhatItTrainedAndCanBeRenderedAgain) {
     TableService service([](CoordinatorOptions& o) { o.clock = [] { return std::chrono::steady_clock::now(); }; });
     LightCrew crew;

@@ -1,5 +1,6 @@
 lightloom_test(subspace_weights_test LINK lt_transport)
 lightloom_test(tables_test LINK lt_transport)
-lightloom_test(gamma_test LINK lt_core)
+find_package(TBB REQUIRED)
+lightloom_test(gamma_test LINK lt_core TBB::tbb)
 lightloom_test(bad_input_test LINK lt_transport)
 lightloom_test(guided_training_test LINK lt_transport)
