@@ -15,28 +15,46 @@ namespace lightloom {
 class InverseCdfTable {
   public:
     struct Draw {
-        uint32_t outcome = 0;
-        float probability = 0;  ///< What the table really gives the outcome.
-        double rest = 0;        ///< Where in the outcome's part of [0, 1) the number lies: uniform in [0, 1).
+        uint32_t outcome;
+        float probability;  ///< What the table really gives the outcome.
+        double rest;        ///< Where in the outcome's part of [0, 1) the number lies: uniform in [0, 1).
     };
 
     class Column {
       public:
         Draw draw(double u) const {
-            const double scaled = std::min(u * kOne, kOne - 0x1p-21);  // u may have been rounded to 1
-            const uint32_t v = uint32_t(scaled);
-            uint32_t i = cutpoints_[v >> kCutShift];
-            while (first_[i + 1] <= v) ++i;
-            const double width = double(first_[i + 1] - first_[i]);
-            return {i, float(width * (1 / kOne)), (scaled - double(first_[i])) / width};
+            Draw draw;
+            draw_strata(u, 1, &draw);
+            return draw;
+        }
+        /// (u + n) / count for n = 0 .. count - 1, count <= kMaxStrata. A large table lies far from the processor, and the draws wait
+        /// for it together.
+        void draw_strata(double u, int count, Draw* out) const {
+            double scaled[kMaxStrata];
+            uint32_t cut[kMaxStrata];
+            for (int n = 0; n < count; ++n) {
+                scaled[n] = std::min((u + n) / count * kOne, kOne - 0x1p-21);  // u may have been rounded to 1
+                cut[n] = cutpoints_[uint32_t(scaled[n]) >> kCutShift];
+                __builtin_prefetch(&first_[cut[n] + 1]);
+            }
+            for (int n = 0; n < count; ++n) {
+                uint32_t i = cut[n];
+                while (first_[i + 1] <= uint32_t(scaled[n])) ++i;
+                const double width = double(first_[i + 1] - first_[i]);
+                out[n] = {i, float(width * (1 / kOne)), (scaled[n] - double(first_[i])) / width};
+            }
         }
 
       private:
         friend class InverseCdfTable;
-        Column(const uint32_t* first, const uint32_t* cutpoints) : first_(first), cutpoints_(cutpoints) {}
-        const uint32_t *first_, *cutpoints_;
+        Column(const uint32_t* first, const uint16_t* cutpoints) : first_(first), cutpoints_(cutpoints) {}
+        const uint32_t* first_;
+        const uint16_t* cutpoints_;
     };
 
+    static constexpr int kMaxStrata = 64;
+
+    /// At most 65536 outcomes.
     InverseCdfTable(uint32_t outcomes, uint32_t columns)
         : outcomes_(outcomes), first_(size_t(outcomes + 1) * columns), cutpoints_(size_t(kCuts) * columns) {}
 
@@ -55,7 +73,7 @@ class InverseCdfTable {
         uint32_t i = 0;
         for (uint32_t c = 0; c < kCuts; ++c) {
             while (first[i + 1] <= c << kCutShift) ++i;
-            cutpoints_[size_t(column) * kCuts + c] = i;
+            cutpoints_[size_t(column) * kCuts + c] = uint16_t(i);
         }
     }
     Column column(uint32_t c) const { return {&first_[size_t(c) * (outcomes_ + 1)], &cutpoints_[size_t(c) * kCuts]}; }
@@ -68,7 +86,7 @@ class InverseCdfTable {
     /// Of each column, where in units of 2^-31 its outcomes begin, and one more.
     std::vector<uint32_t, HugePageAllocator<uint32_t>> first_;
     /// The outcome at each 256th of the unit interval.
-    std::vector<uint32_t, HugePageAllocator<uint32_t>> cutpoints_;
+    std::vector<uint16_t, HugePageAllocator<uint16_t>> cutpoints_;
 };
 
 }  // namespace lightloom

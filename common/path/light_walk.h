@@ -32,6 +32,7 @@ inline bool start_light_path(const Scene& scene, LightSampler& sampler, PathVert
     y0->alpha = scene.emitters().strength(e, s.direction) / s.pdf_position;
     y0->survival = 1;
     y0->label = y0->reverse_label = kNoLabel;
+    y0->reverse_branch = 0;
     y0->fwd = s.pdf_position;
     y0->rev = 0;
     y0->delta = false;

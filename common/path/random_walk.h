@@ -52,6 +52,7 @@ void arrive(const WalkRay& ray, const Vec3& previous_p, const Vec3& previous_ng,
     v->rev = 0;
     v->survival = ray.survival;
     v->label = v->reverse_label = kNoLabel;
+    v->reverse_branch = 0;
     const float cosine = abs_dot(v->ng, v->wo);
     if (ray.from_infinite) {
         v->fwd = ray.pdf * cosine;

@@ -1,8 +1,58 @@
 #include "common/tables/classifier.h"
 
 #include <cmath>
+#include <utility>
 
 namespace lightloom {
+namespace {
+
+using Node = SubspaceTree::Node;
+
+/// Reorders a tree: the upper half of its levels first, then the trees below, each of them likewise.
+class Layout {
+  public:
+    explicit Layout(const std::vector<Node>& from) : from_(from), out_{from[0]} {}
+
+    std::vector<Node> run() {
+        std::vector<uint32_t> rest{0};
+        while (!rest.empty()) rest = place(rest, SubspaceTree::kMaxDepth);
+        return std::move(out_);
+    }
+
+  private:
+    /// Gives the nodes below `tops` (positions in out_) their places, tree by tree; returns what lies `height` levels deeper.
+    std::vector<uint32_t> place(const std::vector<uint32_t>& tops, uint32_t height) {
+        std::vector<uint32_t> bottoms;
+        for (const uint32_t top : tops) {
+            if (out_[top].axis() == SubspaceTree::kLeaf) continue;
+            if (height == 1) {
+                const uint32_t child = uint32_t(out_.size()), was = out_[top].child();
+                out_[top] = SubspaceTree::make_inner(out_[top].axis(), out_[top].threshold, child);
+                out_.push_back(from_[was]), out_.push_back(from_[was + 1]);
+                bottoms.push_back(child), bottoms.push_back(child + 1);
+            } else {
+                const std::vector<uint32_t> below = place(place({top}, height / 2), height - height / 2);
+                bottoms.insert(bottoms.end(), below.begin(), below.end());
+            }
+        }
+        return bottoms;
+    }
+
+    const std::vector<Node>& from_;
+    std::vector<Node> out_;  ///< Its inner nodes point into from_ until their children have places.
+};
+
+}  // namespace
+
+SubspaceTree SubspaceTree::compacted() const {
+    std::vector<Node> nodes = nodes_;
+    for (size_t i = nodes.size(); i-- > 0;) {  // children follow their parents
+        if (nodes[i].axis() == kLeaf) continue;
+        const Node &left = nodes[nodes[i].child()], &right = nodes[nodes[i].child() + 1];
+        if (left.axis() == kLeaf && right.axis() == kLeaf && left.child() == right.child()) nodes[i] = left;
+    }
+    return SubspaceTree(Layout(nodes).run());
+}
 
 Status SubspaceTree::validate(uint32_t label_count) const {
     if (nodes_.empty()) return data_loss("a classifier without nodes");

@@ -176,7 +176,7 @@ class TreeBuilder {
             tasks.push_back({left, task.begin, split, task.depth + 1});
             tasks.push_back({left + 1, split, task.end, task.depth + 1});
         }
-        return SubspaceTree(std::move(nodes_));
+        return SubspaceTree(std::move(nodes_)).compacted();
     }
 
   private:

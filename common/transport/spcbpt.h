@@ -163,9 +163,11 @@ struct SubspaceConnections {
             double second;
             float scale;
         } draws[kMaxConnections];
+        InverseCdfTable::Draw firsts[kMaxConnections];
+        column.draw_strata(base, connections, firsts);
         int found = 0;
         for (int n = 0; n < connections; ++n) {
-            const InverseCdfTable::Draw first = column.draw((base + n) / connections);
+            const InverseCdfTable::Draw& first = firsts[n];
             const Subspace& subspace = index.subspaces[first.outcome];
             if (subspace.count == 0) continue;  // nothing there: its share of the estimate is zero
             Draw& d = draws[found++];

@@ -12,11 +12,17 @@ struct SubspaceLabeller {
     const SubspaceTables& tables;
     const EmitterSet& emitters;
 
-    uint16_t light(const PathVertex& v, const Vec3& to_predecessor) const {
-        return uint16_t(tables.light_label(sub_path_end(v.p, v.ng, to_predecessor)));
+    /// The label of a vertex under `tree`: of the sub-path that ends there as traced...
+    static uint16_t label(const SubspaceTree& tree, const PathVertex& v) {
+        return uint16_t(tree.label(sub_path_end(v.p, v.ng, v.wo)));
     }
-    uint16_t eye(const PathVertex& v, const Vec3& to_predecessor) const {
-        return uint16_t(tables.eye_label(sub_path_end(v.p, v.ng, to_predecessor)));
+    /// ...and of the other kind's, that reaches it from `to_predecessor`.
+    static uint16_t reverse_label(const SubspaceTree& tree, const PathVertex& v, const Vec3& to_predecessor) {
+        const bool same_side = (dot(v.ng, to_predecessor) < 0) == (dot(v.ng, v.wo) < 0);
+        return uint16_t(tree.label(sub_path_end(v.p, v.ng, to_predecessor), same_side ? v.reverse_branch : 0));
+    }
+    static void settle(const SubspaceTree& tree, PathVertex* v) {
+        v->reverse_branch = tree.settle(v->p, face_forward(v->ng, v->wo));
     }
     /// Point x_0 on `emitter`; `travel` is the emission's direction for the environment.
     uint16_t source(uint32_t emitter, const Vec3& position, const Vec3& travel) const {
@@ -29,12 +35,16 @@ struct SubspaceLabeller {
         y[0].label = source(uint32_t(y[0].emitter), y[0].p, y[0].ng);
         for (int i = 1; i < n; ++i) {
             if (!y[i].bsdf.has_smooth_lobe()) continue;
-            y[i].label = light(y[i], y[i].wo);
-            if (i + 1 < n) y[i].reverse_label = eye(y[i], -y[i + 1].wo);
+            y[i].label = label(tables.light_tree, y[i]);
+            settle(tables.eye_tree, &y[i]);
+            if (i + 1 < n) y[i].reverse_label = reverse_label(tables.eye_tree, y[i], -y[i + 1].wo);
         }
     }
     /// The eye label of a camera vertex, before it is connected.
-    void label_camera_vertex(PathVertex* v) const { v->label = eye(*v, v->wo); }
+    void label_camera_vertex(PathVertex* v) const {
+        v->label = label(tables.eye_tree, *v);
+        settle(tables.light_tree, v);
+    }
 
     /// Labels, throughput and footprint of a path made with ViewDetail::kSubspace. `towards`: unit, from z_{t-1} to x_{s-1} (to the
     /// emitter of an escaped ray); not read for s = 0 on a surface, where z_{t-1} is x_0. Vertices of z get their reverse
@@ -47,7 +57,7 @@ struct SubspaceLabeller {
         view_footprint(e, y, s, z, t, view);
         for (int i = 0; i < s; ++i) view->light_label[i + 1] = y[i].label;
         for (int i = 1; i + 1 < s; ++i) view->eye_label[i] = y[i].reverse_label;
-        if (s >= 2) view->eye_label[s - 1] = eye(y[s - 1], -towards);
+        if (s >= 2) view->eye_label[s - 1] = reverse_label(tables.eye_tree, y[s - 1], -towards);
         for (int j = 1; j < t; ++j) view->eye_label[k - j] = z[j].label;
         if (s == 0 && hit) view->light_label[1] = source(uint32_t(z[t - 1].emitter), z[t - 1].p, z[t - 1].wo);
         if (s == 0 && !hit) view->light_label[1] = source(uint32_t(emitters.environment_index()), {}, -towards);
@@ -57,13 +67,17 @@ struct SubspaceLabeller {
             const bool end = j == t - 1;
             if (end && hit) break;
             if (end) {
-                view->light_label[k - j + 1] = z[j].bsdf.has_smooth_lobe() ? light(z[j], towards) : kNoLabel;
+                view->light_label[k - j + 1] = z[j].bsdf.has_smooth_lobe() ? reverse_label(tables.light_tree, z[j], towards) : kNoLabel;
             } else {
                 if (z[j].reverse_label == kNoLabel && z[j].bsdf.has_smooth_lobe())
-                    z[j].reverse_label = light(z[j], -z[j + 1].wo);
+                    z[j].reverse_label = reverse_label(tables.light_tree, z[j], -z[j + 1].wo);
                 view->light_label[k - j + 1] = z[j].reverse_label;
             }
         }
+        // The weight reads Gamma once per technique, each time in a column of its own.
+        for (int i = 1; i < k; ++i)
+            if (view->light_label[i] != kNoLabel && view->eye_label[i] != kNoLabel)
+                __builtin_prefetch(tables.column(view->eye_label[i]) + view->light_label[i]);
     }
 };
 

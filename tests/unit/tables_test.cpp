@@ -382,6 +382,39 @@ TEST(Classifier, LabelsStayBelowTheirCountAndItsSizeIsBounded) {
     }
 }
 
+/// Breadth first, with splits that decide nothing, as a trainer leaves them.
+SubspaceTree random_tree(uint64_t seed) {
+    Rng rng({seed, Stage::kTraining, 0, 0});
+    std::vector<SubspaceTree::Node> nodes{SubspaceTree::make_leaf(0)};
+    for (uint32_t i = 0; i < nodes.size() && nodes.size() < 4000; ++i) {
+        if (i > 20 && rng.uniform() < 0.3f) continue;
+        const uint32_t axis = i == 0 ? 0 : uint32_t(rng.next_u64() % SubspaceTree::kAxes), left = uint32_t(nodes.size());
+        nodes[i] = SubspaceTree::make_inner(axis, 2 * rng.uniform() - 1, left);
+        for (int child = 0; child < 2; ++child) nodes.push_back(SubspaceTree::make_leaf(uint32_t(rng.next_u64() % 5)));
+    }
+    return SubspaceTree(std::move(nodes));
+}
+
+TEST(Classifier, CompactingAndSettlingChangeNoLabel) {
+    for (const uint64_t seed : {1, 2, 3}) {
+        const SubspaceTree tree = random_tree(seed), compact = tree.compacted();
+        EXPECT_TRUE(compact.validate(5).ok());
+        EXPECT_LT(compact.nodes().size(), tree.nodes().size() - 200);
+        Rng rng({seed, Stage::kTraining, 1, 0});
+        const auto vector = [&] { return Vec3{2 * rng.uniform() - 1, 2 * rng.uniform() - 1, 2 * rng.uniform() - 1}; };
+        uint32_t settled_below_root = 0;
+        for (int i = 0; i < 20000; ++i) {
+            const SubPathEnd end{vector(), vector(), vector()};
+            const uint32_t label = tree.label(end), branch = compact.settle(end.position, end.normal);
+            ASSERT_EQ(compact.label(end), label);
+            ASSERT_EQ(compact.label(end, branch), label);
+            settled_below_root += branch > 0;
+        }
+        EXPECT_GT(settled_below_root, 0u);
+    }
+    EXPECT_EQ(SubspaceTree().compacted().nodes().size(), 1u);
+}
+
 /// Neighbouring numbers are neighbours in space: on a line they ascend with it, and dropping lower bits coarsens.
 TEST(Classifier, LabelsAreNested) {
     auto ends = random_ends(5000, 3, true);
