@@ -29,12 +29,21 @@ class SubspaceTree {
     static constexpr uint32_t kLeaf = 15;
     static constexpr uint32_t kMaxDepth = 24;
 
+    /// By axis; room for any four bits, because a descent may look at a leaf's before it knows that it is one.
+    using Scalars = std::array<float, 16>;
+    static Scalars scalars_of(const SubPathEnd& e) {
+        return {e.position.x, e.position.y,  e.position.z,  e.normal.x, e.normal.y,
+                e.normal.z,   e.direction.x, e.direction.y, e.direction.z};
+    }
+
     /// Axis in the upper four bits; below them the index of the left child (the right one follows it), or the label of a leaf.
     struct Node {
         float threshold = 0;
         uint32_t axis_and_child = kLeaf << 28;
         uint32_t axis() const { return axis_and_child >> 28; }
         uint32_t child() const { return axis_and_child & 0x0fffffffu; }
+        /// The child on the side of the scalars; of an inner node.
+        uint32_t next(const Scalars& scalars) const { return child() + (scalars[axis()] >= threshold ? 1 : 0); }
     };
     static Node make_leaf(uint32_t label) { return {0, (kLeaf << 28) | label}; }
     static Node make_inner(uint32_t axis, float threshold, uint32_t left) { return {threshold, (axis << 28) | left}; }
@@ -48,14 +57,27 @@ class SubspaceTree {
     SubspaceTree compacted() const;
 
     uint32_t label(const SubPathEnd& end) const { return label(end, 0); }
-    /// The same, from a node on the way that settle() returned for an end with this position and normal.
+    /// The same, from a node on the way that label_and_settle() returned for an end with this position and normal.
     uint32_t label(const SubPathEnd& end, uint32_t from) const {
-        return nodes_[descend(end, from, [](const Node& n) { return n.axis() == kLeaf; })].child();
+        const Scalars scalars = scalars_of(end);
+        while (nodes_[from].axis() != kLeaf) from = nodes_[from].next(scalars);
+        return nodes_[from].child();
     }
-    /// As far as position and normal alone lead. A vertex is asked for labels from many directions, and two thirds of the way are
-    /// the same for all of them.
-    uint32_t settle(const Vec3& position, const Vec3& normal) const {
-        return descend({position, normal, {}}, 0, [](const Node& n) { return n.axis() >= kFirstDirectionAxis; });
+    /// This tree's label, and how far position and normal alone lead in `other`: a vertex is asked for labels from many directions,
+    /// and two thirds of the way are the same for all of them. Every step of a descent waits for the one before; two descents wait
+    /// together.
+    struct Settled {
+        uint32_t label, other_branch;
+    };
+    Settled label_and_settle(const SubPathEnd& end, const SubspaceTree& other) const {
+        const Scalars scalars = scalars_of(end);
+        for (uint32_t i = 0, j = 0;;) {
+            const Node a = nodes_[i], b = other.nodes_[j];
+            const bool leaf = a.axis() == kLeaf, settled = b.axis() >= kFirstDirectionAxis;
+            if (leaf && settled) return {a.child(), j};
+            i = leaf ? i : a.next(scalars);
+            j = settled ? j : b.next(scalars);
+        }
     }
     const std::vector<Node>& nodes() const { return nodes_; }
     /// Children follow their parents (no loop can exist), every index is inside, every label below `label_count`, thresholds
@@ -64,14 +86,6 @@ class SubspaceTree {
 
   private:
     static constexpr uint32_t kFirstDirectionAxis = 6;
-
-    template <class Stop>
-    uint32_t descend(const SubPathEnd& end, uint32_t i, Stop&& stop) const {
-        const float scalars[kAxes] = {end.position.x, end.position.y,  end.position.z,  end.normal.x, end.normal.y,
-                                      end.normal.z,   end.direction.x, end.direction.y, end.direction.z};
-        while (!stop(nodes_[i])) i = nodes_[i].child() + (scalars[nodes_[i].axis()] >= nodes_[i].threshold ? 1 : 0);
-        return i;
-    }
 
     std::vector<Node> nodes_;
 };

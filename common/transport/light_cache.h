@@ -6,6 +6,10 @@
 // lens (t = 1) and they are candidates. Further ones, where that would be too few or where rare subspaces keep a longer
 // window, are candidates only. The bytes do not depend on the number of threads: chunks are fixed and joined in order.
 
+#include <memory>
+#include <mutex>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "common/core/huge_pages.h"
@@ -15,10 +19,86 @@
 
 namespace lightloom {
 
-struct LightCache {
-    std::vector<PathVertex, HugePageAllocator<PathVertex>> vertices;  ///< Path after path.
-    std::vector<uint32_t> first_vertex;                               ///< Of every path; one more at the end.
-    uint64_t path_count() const { return first_vertex.size() - 1; }
+/// A prefix y_0 ... y_{s-1} that can be connected to a camera sub-path: y_0, or one that ends at a vertex with a smooth lobe; never
+/// so long that no connection could take it.
+struct LightPrefix {
+    uint32_t first_vertex = 0;  ///< See LightCache::at().
+    uint32_t path = 0;
+    uint16_t s = 0;
+    uint16_t label = kNoLabel;  ///< Of y_{s-1}.
+    float throughput = 0;       ///< Scalar of alpha of y_{s-1}.
+};
+
+/// The sub-paths of a unit. Where a vertex lies depends on the threads that traced it; everything else is in the order of the
+/// paths, and nothing that is computed may depend on anything but that order.
+class LightCache {
+  public:
+    struct Path {
+        uint32_t first_vertex = 0, length = 0;
+    };
+    std::vector<Path> paths;
+    std::vector<std::vector<LightPrefix>> prefixes;  ///< By chunk of paths.
+
+    uint64_t path_count() const { return paths.size(); }
+    /// y_0 of the path or prefix with this `first_vertex`; the others follow it.
+    const PathVertex* at(uint32_t first_vertex) const { return page(first_vertex >> kPageBits) + (first_vertex & kInPage); }
+    template <class Visit>
+    void for_each_prefix(Visit&& visit) const {
+        for (const auto& chunk : prefixes)
+            for (const LightPrefix& p : chunk) visit(p);
+    }
+
+    /// Where one thread puts its paths, one after the other. Several may write at a time; what is left of a page is given back.
+    class Writer {
+      public:
+        explicit Writer(LightCache& cache) : cache_(cache) {}
+        ~Writer() { cache_.give_back(next_); }
+        Writer(const Writer&) = delete;
+        Writer& operator=(const Writer&) = delete;
+        Path append(const PathVertex* y, int n) {
+            if (next_.end - next_.begin < uint32_t(n)) next_ = cache_.take();
+            std::uninitialized_copy(y, y + n, next_.data);
+            next_.data += n;
+            return {std::exchange(next_.begin, next_.begin + uint32_t(n)), uint32_t(n)};
+        }
+
+      private:
+        friend class LightCache;
+        struct Place {
+            PathVertex* data = nullptr;
+            uint32_t begin = 0, end = 0;
+        };
+        LightCache& cache_;
+        Place next_;
+    };
+
+  private:
+    static constexpr uint32_t kPageBits = 13, kInPage = (1u << kPageBits) - 1;
+    static constexpr uint32_t kCapacity = HugePage::kBytes / sizeof(PathVertex);
+    static_assert(kCapacity <= kInPage + 1 && kCapacity > kMaxEdges + 2 && std::is_trivially_copyable_v<PathVertex>);
+
+    PathVertex* page(size_t i) const { return reinterpret_cast<PathVertex*>(pages_[i].data()); }
+    /// A place with room for any path.
+    Writer::Place take() {
+        const std::lock_guard lock(*mutex_);
+        if (!open_.empty()) {
+            const Writer::Place place = open_.back();
+            open_.pop_back();
+            return place;
+        }
+        const uint32_t begin = uint32_t(pages_.size()) << kPageBits;
+        pages_.emplace_back();
+        return {page(pages_.size() - 1), begin, begin + kCapacity};
+    }
+    void give_back(const Writer::Place& place) {
+        if (place.end - place.begin < kMaxEdges + 2) return;
+        const std::lock_guard lock(*mutex_);
+        open_.push_back(place);
+    }
+
+    std::vector<HugePage> pages_;
+    std::vector<Writer::Place> open_;
+    std::unique_ptr<std::mutex> mutex_ = std::make_unique<std::mutex>();  ///< Guards the two while paths are traced.
 };
 
 inline constexpr int kMaxConnections = 64;
@@ -30,7 +110,7 @@ struct LightPick {
     float scale = 0;  ///< Of the contribution: one over what was really drawn.
 };
 
-/// A prefix y_0 ... y_{s-1} that can be connected.
+/// What a draw finds: a prefix, by its first vertex and length.
 struct LightCandidate {
     uint32_t first_vertex = 0;
     uint32_t s = 0;
@@ -43,15 +123,17 @@ LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPr
                              SplatVertex&& splat) {
     constexpr uint64_t kChunk = 256;
     struct Chunk {
-        std::vector<PathVertex> vertices;
-        std::vector<uint32_t> lengths;
         std::vector<Splat> splats;
         WalkCounters counters;
     };
     const UnitWork& work = scope.work;
+    LightCache cache;
+    cache.paths.resize(path_count);
     std::vector<Chunk> chunks(size_t((path_count + kChunk - 1) / kChunk));
+    cache.prefixes.resize(chunks.size());
     fork_join(chunks.size(), [&](size_t first_chunk, size_t last_chunk) {
         std::vector<PathVertex> y(size_t(scope.max_edges) + 2);
+        LightCache::Writer writer(cache);
         for (size_t c = first_chunk; c != last_chunk && !scope.stop.stop_requested(); ++c) {
             Chunk& chunk = chunks[c];
             for (uint64_t m = c * kChunk; m < std::min(path_count, (c + 1) * kChunk); ++m) {
@@ -64,22 +146,18 @@ LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPr
                 LightSampler sampler(key);
                 const int n = trace_light_path(scope.scene, sampler, scope.max_edges, scope.roulette, y.data(), &chunk.counters);
                 finish(y.data(), n);
-                chunk.lengths.push_back(uint32_t(n));
-                chunk.vertices.insert(chunk.vertices.end(), y.begin(), y.begin() + n);
+                const LightCache::Path path = cache.paths[m] = writer.append(y.data(), n);
+                for (int i = 0; i < n && i + 1 < scope.max_edges; ++i) {
+                    const PathVertex& v = y[size_t(i)];
+                    if (i == 0 || v.bsdf.has_smooth_lobe())
+                        cache.prefixes[c].push_back({path.first_vertex, uint32_t(m), uint16_t(i + 1), v.label, scalar_of(v.alpha)});
+                }
                 for (int s = 2; counted && s <= n; ++s)
                     if (y[size_t(s - 1)].bsdf.has_smooth_lobe()) splat(y.data(), s, sampler.rng().uniform2(), m, chunk);
             }
         }
     });
-    LightCache cache;
-    cache.first_vertex.push_back(0);
-    size_t total = 0;
-    for (const Chunk& chunk : chunks) total += chunk.vertices.size();
-    cache.vertices.reserve(total);
     for (Chunk& chunk : chunks) {
-        cache.vertices.insert(cache.vertices.end(), chunk.vertices.begin(), chunk.vertices.end());
-        for (const uint32_t n : chunk.lengths) cache.first_vertex.push_back(cache.first_vertex.back() + n);
-        chunk.vertices = {};
         preparation->splats.push_back(std::move(chunk.splats));
         preparation->counters.rays += chunk.counters.rays;
         preparation->counters.vertices += chunk.counters.vertices;
@@ -87,17 +165,6 @@ LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPr
     }
     preparation->light_paths = path_count;
     return cache;
-}
-
-/// Calls visit(candidate, vertex) for every prefix that can be connected to a camera sub-path: y_0 and the vertices with a
-/// smooth lobe. A prefix of max_edges vertices is too long for any connection.
-template <class Visit>
-void for_each_candidate(const LightCache& cache, uint64_t path, int max_edges, Visit&& visit) {
-    const uint32_t first = cache.first_vertex[path], n = cache.first_vertex[path + 1] - first;
-    for (uint32_t i = 0; i < n && int(i) + 1 < max_edges; ++i) {
-        const PathVertex& v = cache.vertices[first + i];
-        if (i == 0 || v.bsdf.has_smooth_lobe()) visit(LightCandidate{first, i + 1}, v);
-    }
 }
 
 /// Connects z_{t-1} to the end of a prefix: s = 1 to the point x_0 itself, s >= 2 to y_{s-1}. Unweighted contribution f / p with

@@ -47,12 +47,9 @@ struct UniformConnections {
     void complete(const Scene&, const PathVertex*, int, PathVertex*, int, const Vec3&, PathView*) const {}
     float inverse_density(const LightPick& pick) const { return pick.scale; }
 
-    Index index(const UnitScope& scope, const LightCache& cache, uint64_t paths) const {
+    Index index(const UnitScope&, const LightCache& cache, uint64_t paths) const {
         Index index;
-        for (uint64_t m = 0; m < paths; ++m) {
-            for_each_candidate(cache, m, scope.max_edges,
-                               [&](const LightCandidate& c, const PathVertex&) { index.candidates.push_back(c); });
-        }
+        cache.for_each_prefix([&](const LightPrefix& p) { index.candidates.push_back({p.first_vertex, p.s}); });
         index.inverse_density = float(double(index.candidates.size()) / (double(paths) * connections));
         return index;
     }
@@ -65,7 +62,7 @@ struct UniformConnections {
         for (int n = 0; n < connections && count > 0; ++n) {
             const LightCandidate& prefix = index.candidates[rng.below(count)];
             if (int(prefix.s) > longest_prefix) continue;
-            const PathVertex* y = &cache.vertices[prefix.first_vertex];
+            const PathVertex* y = cache.at(prefix.first_vertex);
             prefetch(&y[prefix.s - 1]);
             picks[found++] = {y, int(prefix.s), index.inverse_density};
         }

@@ -103,30 +103,27 @@ struct SubspaceConnections {
     }
     float inverse_density(const LightPick& pick) const { return pick.scale / scalar_of(pick.y[pick.s - 1].alpha); }
 
-    Index index(const UnitScope& scope, const LightCache& cache, uint64_t paths) const {
+    Index index(const UnitScope&, const LightCache& cache, uint64_t paths) const {
         const SubspaceTables& tables = selection.prepared->tables;
         Index index;
         // Counting sort by subspace; path order within one.
         index.subspaces.assign(tables.light_count, {});
         const auto each = [&](auto&& visit) {
-            for (uint64_t m = 0; m < cache.path_count(); ++m) {
-                for_each_candidate(cache, m, scope.max_edges, [&](const LightCandidate& c, const PathVertex& v) {
-                    if (m < paths * tables.window[v.label] && scalar_of(v.alpha) > 0 && scalar_of(v.alpha) < HUGE_VALF)
-                        visit(c, v);
-                });
-            }
+            cache.for_each_prefix([&](const LightPrefix& p) {
+                if (p.path < paths * tables.window[p.label] && p.throughput > 0 && p.throughput < HUGE_VALF) visit(p);
+            });
         };
         uint32_t total = 0;
-        each([&](const LightCandidate&, const PathVertex& v) { ++index.subspaces[v.label].count, ++total; });
+        each([&](const LightPrefix& p) { ++index.subspaces[p.label].count, ++total; });
         uint32_t begin = 0;
         for (Subspace& i : index.subspaces) i.begin = std::exchange(begin, begin + i.count);
         index.candidates.resize(total);
         std::vector<double> r(total);
         std::vector<uint32_t> filled(tables.light_count, 0);
-        each([&](const LightCandidate& c, const PathVertex& v) {
-            const size_t at = index.subspaces[v.label].begin + filled[v.label]++;
-            index.candidates[at].prefix = c;
-            r[at] = double(scalar_of(v.alpha));
+        each([&](const LightPrefix& p) {
+            const size_t at = index.subspaces[p.label].begin + filled[p.label]++;
+            index.candidates[at].prefix = {p.first_vertex, p.s};
+            r[at] = double(p.throughput);
         });
         fork_join(tables.light_count, [&](size_t first, size_t last) {
             std::vector<AliasEntry> entries;
@@ -182,7 +179,7 @@ struct SubspaceConnections {
             const bool own = d.second * double(d.count) - double(d.part) < double(part.keep);
             const LightCandidate& prefix = (own ? part : d.candidates[part.alias]).prefix;
             if (int(prefix.s) > longest_prefix) continue;
-            const PathVertex* y = &cache.vertices[prefix.first_vertex];
+            const PathVertex* y = cache.at(prefix.first_vertex);
             prefetch(&y[prefix.s - 1]);
             picks[count++] = {y, int(prefix.s), d.scale};
         }

@@ -12,17 +12,16 @@ struct SubspaceLabeller {
     const SubspaceTables& tables;
     const EmitterSet& emitters;
 
-    /// The label of a vertex under `tree`: of the sub-path that ends there as traced...
-    static uint16_t label(const SubspaceTree& tree, const PathVertex& v) {
-        return uint16_t(tree.label(sub_path_end(v.p, v.ng, v.wo)));
+    /// Labels the sub-path that ends at `v` as traced, and finds where the other kind's labels begin to depend on the direction.
+    static void label(const SubspaceTree& own, const SubspaceTree& other, PathVertex* v) {
+        const auto settled = own.label_and_settle(sub_path_end(v->p, v->ng, v->wo), other);
+        v->label = uint16_t(settled.label);
+        v->reverse_branch = settled.other_branch;
     }
-    /// ...and of the other kind's, that reaches it from `to_predecessor`.
+    /// The label of the other kind, of a sub-path that reaches `v` from `to_predecessor`.
     static uint16_t reverse_label(const SubspaceTree& tree, const PathVertex& v, const Vec3& to_predecessor) {
         const bool same_side = (dot(v.ng, to_predecessor) < 0) == (dot(v.ng, v.wo) < 0);
         return uint16_t(tree.label(sub_path_end(v.p, v.ng, to_predecessor), same_side ? v.reverse_branch : 0));
-    }
-    static void settle(const SubspaceTree& tree, PathVertex* v) {
-        v->reverse_branch = tree.settle(v->p, face_forward(v->ng, v->wo));
     }
     /// Point x_0 on `emitter`; `travel` is the emission's direction for the environment.
     uint16_t source(uint32_t emitter, const Vec3& position, const Vec3& travel) const {
@@ -35,16 +34,12 @@ struct SubspaceLabeller {
         y[0].label = source(uint32_t(y[0].emitter), y[0].p, y[0].ng);
         for (int i = 1; i < n; ++i) {
             if (!y[i].bsdf.has_smooth_lobe()) continue;
-            y[i].label = label(tables.light_tree, y[i]);
-            settle(tables.eye_tree, &y[i]);
+            label(tables.light_tree, tables.eye_tree, &y[i]);
             if (i + 1 < n) y[i].reverse_label = reverse_label(tables.eye_tree, y[i], -y[i + 1].wo);
         }
     }
     /// The eye label of a camera vertex, before it is connected.
-    void label_camera_vertex(PathVertex* v) const {
-        v->label = label(tables.eye_tree, *v);
-        settle(tables.light_tree, v);
-    }
+    void label_camera_vertex(PathVertex* v) const { label(tables.eye_tree, tables.light_tree, v); }
 
     /// Labels, throughput and footprint of a path made with ViewDetail::kSubspace. `towards`: unit, from z_{t-1} to x_{s-1} (to the
     /// emitter of an escaped ray); not read for s = 0 on a surface, where z_{t-1} is x_0. Vertices of z get their reverse

@@ -274,10 +274,9 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
     TrainingData data = unit.empty();
     if (!unit.scope(work).stop.stop_requested()) {
         for (uint64_t m = 0; m < work.light_path_count; ++m) {
-            const uint32_t first = state.cache.first_vertex[m];
-            if (unit.energy_share(work.first_light_path + m) > 0)
-                keep_light_path(state.cache.vertices.data() + first, int(state.cache.first_vertex[m + 1] - first), max_depth_ + 1,
-                                &data);
+            const LightCache::Path path = state.cache.paths[m];
+            if (unit.energy_share(work.first_light_path + m) > 0 && path.length > 0)
+                keep_light_path(state.cache.at(path.first_vertex), int(path.length), max_depth_ + 1, &data);
             for (const auto& [block, estimate] : from_light[m].estimates) data.block_sum[block] += estimate;
             from_light[m].reservoir.move_to(&data);
         }

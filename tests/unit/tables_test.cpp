@@ -397,7 +397,7 @@ SubspaceTree random_tree(uint64_t seed) {
 
 TEST(Classifier, CompactingAndSettlingChangeNoLabel) {
     for (const uint64_t seed : {1, 2, 3}) {
-        const SubspaceTree tree = random_tree(seed), compact = tree.compacted();
+        const SubspaceTree tree = random_tree(seed), compact = tree.compacted(), other = random_tree(seed + 10);
         EXPECT_TRUE(compact.validate(5).ok());
         EXPECT_LT(compact.nodes().size(), tree.nodes().size() - 200);
         Rng rng({seed, Stage::kTraining, 1, 0});
@@ -405,9 +405,12 @@ TEST(Classifier, CompactingAndSettlingChangeNoLabel) {
         uint32_t settled_below_root = 0;
         for (int i = 0; i < 20000; ++i) {
             const SubPathEnd end{vector(), vector(), vector()};
-            const uint32_t label = tree.label(end), branch = compact.settle(end.position, end.normal);
-            ASSERT_EQ(compact.label(end), label);
-            ASSERT_EQ(compact.label(end, branch), label);
+            const auto [label, branch] = compact.label_and_settle(end, other);
+            ASSERT_EQ(label, tree.label(end));
+            ASSERT_EQ(label, compact.label(end));
+            SubPathEnd turned = end;
+            turned.direction = vector();
+            ASSERT_EQ(other.label(turned, branch), other.label(turned));
             settled_below_root += branch > 0;
         }
         EXPECT_GT(settled_below_root, 0u);
