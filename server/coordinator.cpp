@@ -170,10 +170,8 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     jobs_.push_back(std::move(record));
     requests_[request_id] = &job;
     spdlog::info("{}: accepted, {} {}", job.id, spec.algorithm, job.spec.scene_root.hex().substr(0, 12));
-    ++job.running_tasks;
-    job.prepare_task = std::jthread([this, &job](std::stop_token stop) {
-        run_task(job, "to prepare this job: its scene or frame is too large", [&] { return prepare(job, stop); });
-    });
+    start_task(job, &job.prepare_task, "to prepare this job: its scene or frame is too large",
+               [this, &job](std::stop_token stop) { return prepare(job, stop); });
     return snapshot(job);
 }
 

@@ -115,8 +115,9 @@ class Coordinator {
     Status check_assets(const JobSpec& spec) const;
     void fail_job(JobRecord& job, const Status& why);
     void end_job(JobRecord& job, JobState state);
-    /// The body of a job's thread: its error, or too little memory for it, fails the job and nothing else. `purpose`
-    /// completes "the coordinator has too little memory ...".
+    /// Runs a task on a thread of the job's own. Its error, too little memory for it, or no thread to be had fails the job and nothing
+    /// else; false in the last case. `purpose` completes "the coordinator has too little memory ...". Under mutex_.
+    bool start_task(JobRecord& job, std::jthread* thread, const char* purpose, std::function<Status(std::stop_token)> task);
     void run_task(JobRecord& job, const char* purpose, const std::function<Status()>& task);
     Status prepare(JobRecord& job, std::stop_token stop);
     void plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables);

@@ -7,6 +7,7 @@
 #include <ctime>
 #include <new>
 #include <stdexcept>
+#include <system_error>
 
 #include "common/film/atomic_file.h"
 #include "common/transport/catalog.h"
@@ -27,6 +28,21 @@ std::string utc(std::time_t time) {
 }
 
 }  // namespace
+
+bool Coordinator::start_task(JobRecord& job, std::jthread* thread, const char* purpose,
+                             std::function<Status(std::stop_token)> task) {
+    ++job.running_tasks;
+    try {
+        *thread = std::jthread([this, &job, purpose, run = std::move(task)](std::stop_token stop) {
+            run_task(job, purpose, [&] { return run(stop); });
+        });
+        return true;
+    } catch (const std::system_error& e) {
+        --job.running_tasks;
+        fail_job(job, {StatusCode::kResourceExhausted, std::string("the coordinator cannot start a thread ") + purpose + ": " + e.what()});
+        return false;
+    }
+}
 
 void Coordinator::run_task(JobRecord& job, const char* purpose, const std::function<Status()>& task) {
     const auto no_memory = [&] {
@@ -119,10 +135,7 @@ void Coordinator::finish_if_complete(JobRecord& job) {
     job.finishing = options_.clock();
     job.units->close();
     changed(job);
-    ++job.running_tasks;
-    job.finish_task = std::jthread([this, &job] {
-        run_task(job, "to write the image of this job", [&] { return write_results(job); });
-    });
+    start_task(job, &job.finish_task, "to write the image of this job", [this, &job](std::stop_token) { return write_results(job); });
 }
 
 Status Coordinator::write_results(JobRecord& job) {

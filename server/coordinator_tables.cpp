@@ -112,11 +112,9 @@ void Coordinator::resume_waiting(const std::shared_ptr<JobRecord>& job) {
     const JobRecord& maker = *job->maker;
     const bool making = maker.state == JobState::kPreparing && maker.table_key == job->table_key;
     if (making || closing_ || job->running_tasks > 0) return;
-    ++job->running_tasks;
     JobRecord& record = *job;
-    job->prepare_task = std::jthread([this, &record] {
-        run_task(record, "to prepare this job: its frame or tables are too large", [&] { return take_over_tables(record); });
-    });
+    start_task(record, &record.prepare_task, "to prepare this job: its frame or tables are too large",
+               [this, &record](std::stop_token) { return take_over_tables(record); });
 }
 
 Status Coordinator::take_over_tables(JobRecord& job) {

@@ -59,18 +59,18 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
         if (!units || (!worker.held.empty() && !units->has_more_than(idle))) continue;
         const auto unit = units->lease(worker.index, after(options_.lease_seconds));
         if (!unit) continue;
-        worker.held.insert({job->id, unit->key});
-        if (unit->key.kind == UnitKind::kRender) return UnitLease{job->id, job->spec, *unit, job->tables.asset};
-        if (job->training_begin == TimePoint()) {
+        const bool render = unit->key.kind == UnitKind::kRender;
+        if (!render && job->training_begin == TimePoint()) {
             // Only a job that workers have begun with takes a thread and a built scene; both are made while paths are traced.
             job->training_begin = options_.clock();
-            ++job->running_tasks;
             JobRecord& record = *job;
-            job->train_task = std::jthread([this, &record](std::stop_token stop) {
-                run_task(record, "to learn the tables of this job; choose fewer training-paths, energy-paths or subspaces",
-                         [&] { return learn(record, stop); });
-            });
+            if (!start_task(record, &record.train_task,
+                            "to learn the tables of this job; choose fewer training-paths, energy-paths or subspaces",
+                            [this, &record](std::stop_token stop) { return learn(record, stop); }))
+                continue;
         }
+        worker.held.insert({job->id, unit->key});
+        if (render) return UnitLease{job->id, job->spec, *unit, job->tables.asset};
         return UnitLease{job->id, job->spec, *unit, job->guide};
     }
     return std::nullopt;

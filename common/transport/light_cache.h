@@ -88,6 +88,7 @@ class LightCache {
         }
         const uint32_t begin = uint32_t(pages_.size()) << kPageBits;
         pages_.emplace_back();
+        open_.reserve(pages_.size());  // giving back happens in destructors and must not fail
         return {page(pages_.size() - 1), begin, begin + kCapacity};
     }
     void give_back(const Writer::Place& place) {
