@@ -28,7 +28,8 @@ class Backoff {
 
 constexpr double kLeaseWaitSeconds = 1;
 constexpr int kSubmitAttempts = 40;
-constexpr uint64_t kWarmUpShare = 8;  ///< A probe's samples over those that are traced before it is timed.
+/// Of a probe's samples, so many are traced before it is timed; enough for every thread to get some.
+constexpr uint64_t kWarmUpShare = 8, kWarmUpPerThread = kTrainingChunkSamples;
 
 std::string name_of(const UnitReference& unit) {
     if (unit.key.kind != UnitKind::kRender) return unit.job_id + " training unit " + std::to_string(unit.key.group);
@@ -203,7 +204,8 @@ Status Worker::trace_unit(const UnitLease& lease, std::stop_token unit_stop, std
         // A probe measures what a sample costs. The first ones also pay for threads, page faults and cold caches, a tenth of
         // a second that the job pays once and that would make a short probe call every sample several times too dear.
         TrainingWork first = lease.unit.training;
-        first.sample_count = std::max<uint64_t>(1, first.sample_count / kWarmUpShare);
+        first.sample_count = std::min(first.sample_count,
+                                      std::max(first.sample_count / kWarmUpShare, kWarmUpPerThread * options_.thread_count));
         const auto warm = in_turn(lease, unit_stop, drain, [&] { data = (*tracer)(first, unit_stop); });
         if (!warm.ok()) return warm.status();
         if (!data.ok()) return data.status();

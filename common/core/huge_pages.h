@@ -36,6 +36,7 @@ struct HugePageAllocator {
 class HugePage {
   public:
     static constexpr size_t kBytes = HugePageAllocator<std::byte>::kPage;
+    static constexpr size_t kMostKeptBytes = size_t(128) << 20;  ///< Of a process, without an owner.
 
     HugePage();
     ~HugePage();

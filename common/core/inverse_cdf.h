@@ -22,6 +22,8 @@ class InverseCdfTable {
 
     class Column {
       public:
+        static constexpr int kMaxStrata = 64;
+
         Draw draw(double u) const {
             Draw draw;
             draw_strata(u, 1, &draw);
@@ -52,9 +54,9 @@ class InverseCdfTable {
         const uint16_t* cutpoints_;
     };
 
-    static constexpr int kMaxStrata = 64;
+    static constexpr uint32_t kMaxOutcomes = 65536;
 
-    /// At most 65536 outcomes.
+    /// At most kMaxOutcomes.
     InverseCdfTable(uint32_t outcomes, uint32_t columns)
         : outcomes_(outcomes), first_(size_t(outcomes + 1) * columns), cutpoints_(size_t(kCuts) * columns) {}
 

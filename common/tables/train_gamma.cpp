@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
+#include <utility>
 
 #include "common/core/fork_join.h"
 #include "common/core/math.h"
@@ -25,10 +25,10 @@ struct Level {
 };
 
 /// The dataset as a level sees it: what a matrix B (column-major) is worth and how to improve it. Columns that no path names are
-/// left alone: their share of the loss is the floor's, and the prior is what is known of them.
+/// left alone: they have no part in the loss, and the prior is what is known of them.
 class LevelProblem {
   public:
-    LevelProblem(const GammaDataset& data, uint32_t bits, double mix) : data_(data), level_(data, bits), mix_(mix) {
+    LevelProblem(const GammaDataset& data, uint32_t bits, double mix) : data_(&data), level_(data, bits), mix_(mix) {
         energy_.assign(level_.light_count, 0.0);
         for (uint32_t i = 0; i < data.light_count; ++i) energy_[level_.light(i)] += double(data.energy[i]);
         const double total = std::accumulate(energy_.begin(), energy_.end(), 0.0);
@@ -94,7 +94,7 @@ class LevelProblem {
         double sum = 0;
         for (const uint32_t x : paths) {
             const double f = density(x, b);
-            if (f > 0) sum += double(data_.paths[x].weight) / f;
+            if (f > 0) sum += double(data_->paths[x].weight) / f;
         }
         return paths.empty() ? 0 : sum / double(paths.size());
     }
@@ -105,7 +105,7 @@ class LevelProblem {
             std::fill(column, column + level_.light_count, 0.0);
         });
         for (const uint32_t* x = begin; x != end; ++x) {
-            const GammaPath& p = data_.paths[*x];
+            const GammaPath& p = data_->paths[*x];
             const double f = density(*x, b);
             if (!(f > 0)) continue;
             const double scale = double(p.weight) / (f * f);
@@ -132,7 +132,7 @@ class LevelProblem {
                 (*g)[c] = std::sqrt(old * old * (*g)[c] + lambda * mean * pi * pi);
                 sum += (*g)[c];
             }
-            if (!(sum > 0)) return;  // none of its paths are among these: the prior stays
+            if (!(sum > 0)) return;  // neither paths nor a prior's strength: it stays
             for (size_t c = column; c < column + level_.light_count; ++c) (*b)[c] = float((*g)[c] / sum);
         });
     }
@@ -145,18 +145,18 @@ class LevelProblem {
         });
     }
     double density(uint32_t path, const std::vector<float>& b) const {
-        const GammaPath& p = data_.paths[path];
+        const GammaPath& p = data_->paths[path];
         double f = fixed_[path];
         for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n) f += double(gains_[n]) * double(b[cells_[n]]);
         return f;
     }
     uint32_t finest_light(uint32_t i) const {
-        return i < level_.coarse_sources ? i << level_.bits : data_.source_count + ((i - level_.coarse_sources) << level_.bits);
+        return i < level_.coarse_sources ? i << level_.bits : data_->source_count + ((i - level_.coarse_sources) << level_.bits);
     }
 
-    const GammaDataset& data_;
-    const Level level_;
-    const double mix_;
+    const GammaDataset* data_;
+    Level level_;
+    double mix_;
     std::vector<double> energy_;
     std::vector<double> floor_;      ///< What the mix adds to an entry, by light label.
     std::vector<uint32_t> columns_;  ///< That a path names, ascending.
@@ -188,9 +188,9 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
     // From about 16 subspaces a side to the finest, a quarter of a subspace's size at a time.
     uint32_t bits = 0;
     while ((std::max(data.light_count, data.eye_count) >> bits) > 16) bits += 2;
-    std::optional<LevelProblem> problem(std::in_place, data, bits, options.mix);
-    std::vector<float> prior = problem->flat_prior(), b = prior;
-    report->uniform_loss = problem->loss(prior, judge);
+    LevelProblem problem(data, bits, options.mix);
+    std::vector<float> prior = problem.flat_prior(), b = prior;
+    report->uniform_loss = problem.loss(prior, judge);
     double best_loss = report->uniform_loss;
     std::vector<double> room;
     while (true) {
@@ -203,32 +203,32 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
             std::vector<float> candidate = b;
             for (int i = 0; i < (bits > 2 ? kCoarseSteps : kStepsPerStrength); ++i) {
                 if (options.stop.stop_requested()) return b;
-                problem->improve(&candidate, prior, lambda, train, &room);
+                problem.improve(&candidate, prior, lambda, train, &room);
             }
-            const double loss = problem->loss(candidate, judge);
+            const double loss = problem.loss(candidate, judge);
             if (loss < level_loss) level_loss = loss, strength = lambda, best_b = std::move(candidate);
         }
         if (level_loss < best_loss) {
             best_loss = level_loss;
             report->prior_strength = strength;
-            report->light_resolution = problem->level().light_count;
-            report->eye_resolution = problem->level().eye_count;
+            report->light_resolution = problem.level().light_count;
+            report->eye_resolution = problem.level().eye_count;
             b = std::move(best_b);
             // What judged may teach as well once the choice is made.
             if (finest)
                 for (int i = 0; i < kFinalSteps && !options.stop.stop_requested(); ++i)
-                    problem->improve(&b, prior, strength, all, &room);
+                    problem.improve(&b, prior, strength, all, &room);
         } else {
             b = prior;  // finer subspaces than the data support: keep the coarser model, lifted
         }
         if (finest) break;
-        const LevelProblem coarse = *problem;
         bits -= 2;
-        problem.emplace(data, bits, options.mix);
-        b = prior = problem->lifted(coarse, b);
+        LevelProblem fine(data, bits, options.mix);
+        b = prior = fine.lifted(problem, b);
+        problem = std::move(fine);
     }
     report->loss = best_loss;
-    return problem->mixed(b);
+    return problem.mixed(b);
 }
 
 std::vector<float> train_adam(const GammaDataset& data, const GammaOptions& options) {
@@ -237,7 +237,8 @@ std::vector<float> train_adam(const GammaDataset& data, const GammaOptions& opti
     constexpr int kEpochs = 2;
     const LevelProblem problem(data, 0, options.mix);
     std::vector<float> b = problem.flat_prior();
-    std::vector<double> theta(b.size()), first(b.size(), 0), second(b.size(), 0), g(b.size());
+    // The gradient of columns that no path names is never written: it stays zero.
+    std::vector<double> theta(b.size()), first(b.size(), 0), second(b.size(), 0), g(b.size(), 0), column_exp(data.light_count);
     for (size_t c = 0; c < b.size(); ++c) theta[c] = math::log(double(b[c]));
     std::vector<uint32_t> order(data.paths.size());
     std::iota(order.begin(), order.end(), 0u);
@@ -264,8 +265,8 @@ std::vector<float> train_adam(const GammaDataset& data, const GammaOptions& opti
                     largest = std::max(largest, theta[c]);
                 }
                 double sum = 0;
-                for (size_t c = column; c < column + data.light_count; ++c) sum += g[c] = math::exp(theta[c] - largest);
-                for (size_t c = column; c < column + data.light_count; ++c) b[c] = float(g[c] / sum);
+                for (size_t i = 0; i < data.light_count; ++i) sum += column_exp[i] = math::exp(theta[column + i] - largest);
+                for (size_t i = 0; i < data.light_count; ++i) b[column + i] = float(column_exp[i] / sum);
             }
         }
     }

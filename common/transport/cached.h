@@ -7,7 +7,7 @@
 //       static constexpr ViewDetail kDetail;
 //       struct / using Index;                    // of a unit's cache, frozen before the first camera sample
 //       uint64_t windows() const;                // light-only repetitions of the cache that the index may reach into
-//       Index index(const UnitScope&, const LightCache&, uint64_t paths) const;            // paths: of one window
+//       Index index(const LightCache&, uint64_t paths) const;                              // paths: of one window
 //       void label_light_path(const Scene&, PathVertex* y, int n) const;
 //       void label_camera_vertex(const Scene&, PathVertex* v) const;
 //       void complete(const Scene&, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView*) const;
@@ -59,7 +59,8 @@ struct CachedAlgorithm {
         };
         state.cache = trace_light_cache(scope, window * method.windows(), preparation,
                                         [&](PathVertex* y, int n) { method.label_light_path(scene, y, n); }, splat);
-        if (!scope.stop.stop_requested()) state.index = method.index(scope, state.cache, window);
+        if (!scope.stop.stop_requested()) state.index = method.index(state.cache, window);
+        state.cache.prefixes = {};
         return state;
     }
     State prepare(const UnitScope& scope, UnitPreparation* preparation) const {

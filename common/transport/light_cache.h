@@ -37,7 +37,7 @@ class LightCache {
         uint32_t first_vertex = 0, length = 0;
     };
     std::vector<Path> paths;
-    std::vector<std::vector<LightPrefix>> prefixes;  ///< By chunk of paths.
+    std::vector<std::vector<LightPrefix>> prefixes;  ///< By chunk of paths; for the method's index, and empty once that is made.
 
     uint64_t path_count() const { return paths.size(); }
     /// y_0 of the path or prefix with this `first_vertex`; the others follow it.
@@ -86,12 +86,13 @@ class LightCache {
             open_.pop_back();
             return place;
         }
+        if (pages_.size() >> (32 - kPageBits)) throw std::bad_alloc();  // a terabyte: the numbers end
         const uint32_t begin = uint32_t(pages_.size()) << kPageBits;
         pages_.emplace_back();
-        open_.reserve(pages_.size());  // giving back happens in destructors and must not fail
+        open_.reserve(pages_.capacity());  // giving back happens in destructors and must not fail
         return {page(pages_.size() - 1), begin, begin + kCapacity};
     }
-    void give_back(const Writer::Place& place) {
+    void give_back(const Writer::Place& place) noexcept {
         if (place.end - place.begin < kMaxEdges + 2) return;
         const std::lock_guard lock(*mutex_);
         open_.push_back(place);
@@ -150,8 +151,8 @@ LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPr
                 const LightCache::Path path = cache.paths[m] = writer.append(y.data(), n);
                 for (int i = 0; i < n && i + 1 < scope.max_edges; ++i) {
                     const PathVertex& v = y[size_t(i)];
-                    if (i == 0 || v.bsdf.has_smooth_lobe())
-                        cache.prefixes[c].push_back({path.first_vertex, uint32_t(m), uint16_t(i + 1), v.label, scalar_of(v.alpha)});
+                    if (i > 0 && !v.bsdf.has_smooth_lobe()) continue;
+                    cache.prefixes[c].push_back({path.first_vertex, uint32_t(m), uint16_t(i + 1), v.label, scalar_of(v.alpha)});
                 }
                 for (int s = 2; counted && s <= n; ++s)
                     if (y[size_t(s - 1)].bsdf.has_smooth_lobe()) splat(y.data(), s, sampler.rng().uniform2(), m, chunk);

@@ -47,7 +47,7 @@ struct UniformConnections {
     void complete(const Scene&, const PathVertex*, int, PathVertex*, int, const Vec3&, PathView*) const {}
     float inverse_density(const LightPick& pick) const { return pick.scale; }
 
-    Index index(const UnitScope&, const LightCache& cache, uint64_t paths) const {
+    Index index(const LightCache& cache, uint64_t paths) const {
         Index index;
         cache.for_each_prefix([&](const LightPrefix& p) { index.candidates.push_back({p.first_vertex, p.s}); });
         index.inverse_density = float(double(index.candidates.size()) / (double(paths) * connections));

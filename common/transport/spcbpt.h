@@ -77,6 +77,8 @@ struct SubspaceConnections {
 
     static constexpr ViewDetail kDetail = ViewDetail::kSubspace;
 
+    static_assert(kMaxConnections <= InverseCdfTable::Column::kMaxStrata && SubspaceTables::kMaxSubspaces <= InverseCdfTable::kMaxOutcomes);
+
     /// A prefix and its part of the alias table of its subspace, drawn in proportion to r.
     struct Candidate {
         LightCandidate prefix;
@@ -103,7 +105,7 @@ struct SubspaceConnections {
     }
     float inverse_density(const LightPick& pick) const { return pick.scale / scalar_of(pick.y[pick.s - 1].alpha); }
 
-    Index index(const UnitScope&, const LightCache& cache, uint64_t paths) const {
+    Index index(const LightCache& cache, uint64_t paths) const {
         const SubspaceTables& tables = selection.prepared->tables;
         Index index;
         // Counting sort by subspace; path order within one.

@@ -16,7 +16,7 @@ namespace lightloom {
 namespace {
 
 constexpr uint64_t kTrainingSeed = 0x7472'6169'6e69'6e67ull;
-constexpr uint64_t kChunk = 512;
+constexpr uint64_t kChunk = kTrainingChunkSamples;
 constexpr double kSamplesPerBlock = 200;
 
 /// How the weights of the render to come will count (spcbpt.h), as far as no table decides that.

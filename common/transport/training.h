@@ -14,6 +14,9 @@ namespace lightloom {
 
 struct PreparedTables;
 
+/// What one thread traces at a time.
+inline constexpr uint64_t kTrainingChunkSamples = 512;
+
 /// Which part of the dataset a unit traces.
 struct TrainingWork {
     uint64_t first_sample = 0;

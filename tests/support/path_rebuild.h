@@ -104,6 +104,7 @@ inline std::optional<std::vector<PathVertex>> rebuild_light(const Scene& scene, 
     y0.alpha = emitters.strength(e, first) / float(y0.fwd);
     y0.survival = 1;
     y0.label = y0.reverse_label = kNoLabel;
+    y0.reverse_branch = 0;
     y.push_back(y0);
     for (int i = 1; i < s; ++i) {
         PathVertex v;

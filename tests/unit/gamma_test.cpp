@@ -160,6 +160,22 @@ TEST(Gamma, ColumnsAreDistributionsAboveTheMix) {
     }
 }
 
+/// What is known of an eye subspace without paths is the prior, however long the others are trained.
+TEST(Gamma, ColumnsWithoutPathsKeepThePrior) {
+    GammaDataset data = Problem(3, 9).draw(45000, 10);
+    const uint32_t unnamed = data.eye_count++;
+    const double total = std::accumulate(data.energy.begin(), data.energy.end(), 0.0);
+    for (const GammaTrainer trainer : {GammaTrainer::kMm, GammaTrainer::kAdam, GammaTrainer::kContribution}) {
+        GammaOptions options;
+        options.trainer = trainer;
+        GammaReport report;
+        const std::vector<float> gamma = train_gamma(data, options, &report);
+        for (uint32_t i = 0; i < data.light_count; ++i)
+            EXPECT_NEAR(double(gamma[unnamed * data.light_count + i]), 0.5 / data.light_count + 0.5 * double(data.energy[i]) / total,
+                        1e-6);
+    }
+}
+
 /// The default trainer is the safe one. Both are judged on paths that neither has seen; the bounds are those of the issue.
 TEST(Gamma, RegularisedTrainerIsSaferThanAdam) {
     const struct {

@@ -116,6 +116,18 @@ TEST(InverseCdfTable, EveryOutcomeHasExactlyItsPartOfTheUnitInterval) {
         EXPECT_EQ(table.column(c).draw(1.0).outcome, drawn[c].back());
         EXPECT_LT(table.column(c).draw(1.0).rest, 1);
     }
+    for (uint32_t c = 0; c < columns.size(); ++c) {
+        InverseCdfTable::Draw strata[7];
+        for (const double u : {0.0, 0.37, 1 - 0x1p-53}) {
+            table.column(c).draw_strata(u, 7, strata);
+            for (int n = 0; n < 7; ++n) {
+                const InverseCdfTable::Draw alone = table.column(c).draw((u + n) / 7);
+                EXPECT_EQ(strata[n].outcome, alone.outcome);
+                EXPECT_EQ(strata[n].probability, alone.probability);
+                EXPECT_EQ(strata[n].rest, alone.rest);
+            }
+        }
+    }
     InverseCdfTable single(1, 1);
     single.set(0, std::vector<float>{3});
     EXPECT_EQ(single.column(0).draw(0.75).rest, 0.75);
