@@ -23,7 +23,11 @@ namespace {
 char racy_bytes[256];
 volatile size_t racy_size = sizeof racy_bytes;  // not a constant: the copy must be a call
 
-void racy_plain_store(int round) { racy_bytes[0] = char(racy_bytes[0] + round); }
+/// Volatile: a thousand rounds must be as many stores. Two threads that each made a single one at the same instant would both
+/// look at the detector's record of it before either had written there, and go unnoticed.
+volatile int racy_number = 0;
+
+void racy_plain_store(int round) { racy_number = racy_number + round; }
 
 void racy_copy(int round) {
     char source[sizeof racy_bytes];
