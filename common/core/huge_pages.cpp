@@ -6,11 +6,7 @@
 namespace lightloom {
 namespace {
 
-#ifdef __SANITIZE_ADDRESS__
-constexpr size_t kMostKept = 0;  // memory that passes from hand to hand would hide reads of what is gone
-#else
 constexpr size_t kMostKept = HugePage::kMostKeptBytes / HugePage::kBytes;
-#endif
 
 /// Pages without an owner. Never destroyed: owners may outlive whatever order static objects end in.
 struct Spare {
