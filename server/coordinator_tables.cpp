@@ -27,14 +27,15 @@ uint64_t energy_paths(const JobSpec& spec, const TrainingWork& work) {
     return p->energy_paths_before(work.first_sample + work.sample_count) - p->energy_paths_before(work.first_sample);
 }
 
-/// Above any data that the unit can have: two paths per sample and the light sub-paths, each of the greatest length, and a sum
-/// per block of the frame.
+/// Above any data that the unit can have: the paths of samples, one more that their light sub-path may leave, and the light
+/// sub-paths, each of the greatest length, and a sum per block of the frame.
 uint64_t largest_training_payload(const JobSpec& spec, const TrainingWork& work) {
     const FrameLayout& frame = spec.frame;
     const uint64_t most_blocks = work.total_samples + uint64_t(frame.crop.width() + frame.crop.height() + 1);
     const uint64_t blocks = std::min(uint64_t(frame.crop.area()), most_blocks);
     const uint64_t path = sizeof(TrainingPath) + uint64_t(spec.max_depth + 3) * sizeof(TrainingVertex);
-    return 256 + blocks * sizeof(double) + (2 * work.sample_count + energy_paths(spec, work)) * path;
+    const uint64_t paths = (kTrainingPathsPerSample + 1) * work.sample_count + energy_paths(spec, work);
+    return 256 + blocks * sizeof(double) + paths * path;
 }
 
 }  // namespace

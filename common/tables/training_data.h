@@ -8,8 +8,9 @@
 //     vertices[i].density = n p of a technique, without N Gamma / Q (with correlation_aware: c_s n p; with the
 //                           typical survival of roulette), over p_own: i = 0 holds the ones that tables do not change
 //                           (s = 0 and s = k), 1 <= s <= k-1 the connection of x_{s-1} and x_s; 0 where impossible
-// One path per camera sample (and one per light sub-path that reached the lens) is kept, chosen in proportion to its
-// estimate; both numbers are divided by the probability of that choice, so that sums over D stay unbiased.
+// A camera sample keeps one path with two camera vertices (the lens counts), one with three, four, and one with more; a light
+// sub-path that reached the lens keeps one. Each is chosen in proportion to its estimate; both numbers are divided by the
+// probability of that choice, so that sums over D stay unbiased.
 
 #include <cstdint>
 #include <string>
@@ -27,6 +28,9 @@ struct TrainingVertex {
     float density = 0;       ///< Paths: see above. Light sub-paths: scalar throughput; 0 where not connectible.
     uint32_t emitter = 0;    ///< x_0 only.
 };
+
+/// That a camera sample keeps at most, side by side in TrainingData::paths.
+inline constexpr size_t kTrainingPathsPerSample = 4;
 
 struct TrainingPath {
     uint32_t first_vertex = 0;

@@ -87,6 +87,18 @@ class Reservoir {
     std::vector<TrainingVertex> vertices_;
 };
 
+/// What a camera sample keeps: a path for every length of its sub-path, because each teaches another eye subspace.
+class CameraReservoirs {
+  public:
+    Reservoir& of(const PathContribution& c) { return by_length_[std::clamp(c.t - 2, 0, int(kTrainingPathsPerSample) - 1)]; }
+    void move_to(TrainingData* data) {
+        for (Reservoir& r : by_length_) r.move_to(data);
+    }
+
+  private:
+    Reservoir by_length_[kTrainingPathsPerSample];
+};
+
 void keep_light_path(const PathVertex* y, int n, int max_edges, TrainingData* data) {
     if (n == 0) return;
     TrainingPath path;
@@ -232,7 +244,8 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
     const BdptSelection generator{unit.pixels()};
     const RenderCounts render = unit.render();
     return unit.trace(unit.empty(), [&](SampleContext& context, uint32_t camera_block, TrainingData& data, Rng& rng) {
-        Reservoir from_camera, from_light;
+        CameraReservoirs from_camera;
+        Reservoir from_light;
         trace_bdpt_sample<ViewDetail::kSubspace>(
             context,
             [&](const PathVertex* y, int count) {
@@ -243,7 +256,7 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
                 const bool splat = found.to_lens();
                 const uint32_t block = splat ? unit.blocks().at(int(found.film.x), int(found.film.y)) : camera_block;
                 const double weight = mis_weight(view, {TechniqueKind::kConnect, found.s}, generator);
-                data.block_sum[block] += (splat ? from_light : from_camera)
+                data.block_sum[block] += (splat ? from_light : from_camera.of(found))
                                              .offer(found, view, weight, splat ? 1 / unit.pixels() : 1, block,
                                                     render, rng);
             });
@@ -282,10 +295,10 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
         }
     }
     return unit.trace(std::move(data), [&](SampleContext& context, uint32_t block, TrainingData& chunk, Rng& rng) {
-        Reservoir from_camera;
+        CameraReservoirs from_camera;
         generator.trace(context, state, [&](const PathContribution& found, PathView& view) {
             chunk.block_sum[block] +=
-                from_camera.offer(found, view, generator.weight(view, found.s), 1, block, render, rng);
+                from_camera.of(found).offer(found, view, generator.weight(view, found.s), 1, block, render, rng);
         });
         from_camera.move_to(&chunk);
     });

@@ -191,6 +191,23 @@ TEST(GuidedTraining, DoesNotDependOnThreads) {
     EXPECT_EQ(one, two);
 }
 
+/// A sample's first diffuse vertex finds most of its light; the ones behind it teach other eye subspaces, and keep paths too.
+TEST(GuidedTraining, ASampleKeepsAPathOfEveryLength) {
+    const auto scene = testing::diffuse_box();
+    TrainingReport report;
+    RenderSettings small = settings_of(7);
+    small.parameters["training-paths"] = "3000";
+    const Result<SubspaceTables> guide = make_tables(*scene, small, {}, &report);
+    ASSERT_TRUE(guide.ok());
+    const auto generator = TrainingGenerator::create(*scene, settings_of(1), &*guide);
+    ASSERT_TRUE(generator.ok());
+    constexpr uint64_t kTraced = 2000;
+    const Result<TrainingData> data = generator->trace({0, kTraced, kTraced}, {});
+    ASSERT_TRUE(data.ok());
+    EXPECT_GT(data->paths.size(), 2 * kTraced);
+    EXPECT_LE(data->paths.size(), (kTrainingPathsPerSample + 1) * kTraced);
+}
+
 TEST(GuidedTraining, TwoRoundsAreMadeOfWholeUnits) {
     RenderSettings settings = settings_of(1);
     const auto pilot = [&](const char* samples, const char* share) {
