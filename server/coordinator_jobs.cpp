@@ -37,7 +37,7 @@ bool Coordinator::start_task(JobRecord& job, std::jthread* thread, const char* p
             run_task(job, purpose, [&] { return run(stop); });
         });
         return true;
-    } catch (const std::system_error& e) {
+    } catch (const std::exception& e) {  // no thread, or no memory for one
         --job.running_tasks;
         fail_job(job, {StatusCode::kResourceExhausted, std::string("the coordinator cannot start a thread ") + purpose + ": " + e.what()});
         return false;

@@ -181,6 +181,7 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
     SceneFacts facts;
     double traced = 0;
     size_t crew = 0;
+    uint32_t threads = 1;  // of the worker that traced the probe: the largest, to be safe
     {
         const std::lock_guard lock(mutex_);
         if (job.state != JobState::kPreparing) return over();
@@ -188,7 +189,11 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
         facts = job.facts;
         traced = job.traced_seconds;
         const TimePoint now = options_.clock();
-        for (const auto& w : workers_) crew += !w->left && seconds_between(w->last_heard, now) <= options_.lease_seconds;
+        for (const auto& w : workers_) {
+            if (w->left || seconds_between(w->last_heard, now) > options_.lease_seconds) continue;
+            ++crew;
+            threads = std::max(threads, w->hello.thread_count);
+        }
     }
     const auto parameters = TransportParameters::read(render_settings(spec));
     if (!parameters.ok()) return parameters.status();
@@ -197,13 +202,21 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
     const auto tables = train_tables(probe, scene.emitters(), parameters->training, stop, &report);
     if (!tables.ok()) return tables.status();
     const double learned = seconds_since(begin), samples = double(std::max<uint64_t>(1, probe.samples));
-    const bool guided = parameters->pilot_samples > 0;
-    // Every round learns once more what the probe's learning cost.
-    const double budget = kTrainingShare * spec.time_limit_seconds - traced - (guided ? 3 : 2) * learned;
     const uint64_t wanted = parameters->training_samples;
-    const double per_sample = (guided ? kGuidedCost : 1) * traced / samples;
-    const TrainingRate rate{per_sample / double(std::max<size_t>(1, crew)), kLearningOverTracing * per_sample};
-    const uint64_t chosen = affordable_training_samples(rate, budget, wanted);
+    const auto affordable = [&](bool guided, uint64_t most) {
+        // Every round learns once more what the probe's learning cost.
+        const double budget = kTrainingShare * spec.time_limit_seconds - traced - (guided ? 3 : 2) * learned;
+        const double per_sample = (guided ? kGuidedCost : 1) * traced / samples;
+        const TrainingRate rate{per_sample / double(std::max<size_t>(1, crew)), kLearningOverTracing * per_sample * threads};
+        return affordable_training_samples(rate, budget, most);
+    };
+    const auto has_pilot = [&](uint64_t n) {
+        const auto p = TransportParameters::read(render_settings(with_training_samples(spec, n)));
+        return p.ok() && p->pilot_samples > 0;
+    };
+    uint64_t chosen = affordable(has_pilot(wanted), wanted);
+    // A set too small for two rounds costs what one round costs.
+    if (has_pilot(wanted) && !has_pilot(chosen)) chosen = affordable(false, std::min(wanted, kTrainingUnitSamples));
     spec = with_training_samples(spec, chosen);
     spdlog::info("{}: the time limit has room for {} of {} training samples; {} traced in {:.3f} s, learned in {:.3f} s", job.id,
                  chosen, wanted, probe.samples, traced, learned);

@@ -3,18 +3,27 @@
 #include <signal.h>
 #include <spdlog/spdlog.h>
 
+#include <tbb/global_control.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iostream>
+#include <optional>
+#include <thread>
 
 #include "common/core/log.h"
 #include "common/film/atomic_file.h"
 #include "common/work/identity.h"
 #include "server/data_lock.h"
 #include "server/grpc_services.h"
+#include "server/local_ports.h"
 #include "server/scene_reader.h"
 #include "server/status_http.h"
+#include "worker/scene_cache.h"
+#include "worker/worker.h"
 
+namespace lightloom {
 namespace {
 
 constexpr const char* kFooter = R"(Start a coordinator, then workers that point to it, then submit:
@@ -22,6 +31,8 @@ constexpr const char* kFooter = R"(Start a coordinator, then workers that point 
   lightloom-server --data /var/lib/lightloom
   lightloom-worker --server 127.0.0.1:50051
   lightloom submit scene.pbrt --server 127.0.0.1:50051 -o scene.exr
+
+With --threads it also works itself, so that it learns tables and renders without anybody else.
 
 Connections are plain text without authentication, so other than loopback addresses need --allow-plaintext: use it only
 in a network in which everybody may render.
@@ -33,7 +44,30 @@ bool is_loopback(const std::string& address) {
            address.starts_with("unix:");
 }
 
+/// A worker inside of the coordinator's process. Ends, after the unit in work, with its owner.
+class OwnWorker {
+  public:
+    OwnWorker(Coordinator& coordinator, const BuildIdentity& identity, uint32_t threads, const std::filesystem::path& cache)
+        : parallelism_(tbb::global_control::max_allowed_parallelism, std::max(threads, 1u)), port_(coordinator), fetcher_(port_, cache),
+          worker_(port_, {.identity = identity, .thread_count = threads, .host = "coordinator", .process_id = uint64_t(::getpid())},
+                  [this](const UnitLease& lease, std::stop_token stop) { return renderers_.renderer(lease, stop); },
+                  [this](const UnitLease& lease, std::stop_token stop) { return renderers_.tracer(lease, stop); }),
+          thread_([this](std::stop_token stop) {
+              if (const Status s = worker_.run(stop); !s.ok()) spdlog::error("the coordinator's own worker: {}", s.message());
+          }) {}
+
+  private:
+    tbb::global_control parallelism_;
+    LocalWorkerPort port_;
+    SceneFetcher fetcher_;
+    RendererCache renderers_{[this](const JobSpec& spec, std::stop_token s) { return fetcher_.scene(spec, s); },
+                             [this](const AssetReference& tables, std::stop_token s) { return fetcher_.tables(tables, s); }};
+    Worker worker_;
+    std::jthread thread_;
+};
+
 }  // namespace
+}  // namespace lightloom
 
 int main(int argc, char** argv) {
     using namespace lightloom;
@@ -42,6 +76,7 @@ int main(int argc, char** argv) {
     app.footer(kFooter);
     std::string listen = "127.0.0.1:50051", data = "lightloom-data", status = "127.0.0.1:9464", level = "info", port_file;
     double lease = 10;
+    uint32_t threads = 0;
     uint64_t table_cache_mb = 4096;
     bool plaintext = false;
     std::optional<uint64_t> shuffle;
@@ -52,6 +87,8 @@ int main(int argc, char** argv) {
     app.add_option("--status", status, "HOST:PORT of the status page (/healthz, /api/v1/status), or off")->capture_default_str();
     app.add_option("--lease", lease, "Seconds without a heartbeat after which a unit goes to another worker")
         ->check(CLI::Range(0.2, 3600.0))->capture_default_str();
+    app.add_option("--threads", threads, "Threads with which the coordinator itself traces and renders; 0 leaves that to workers")
+        ->check(CLI::Range(0, 1024))->capture_default_str();
     app.add_option("--table-cache-size", table_cache_mb,
                    "MB of the table cache: learned tables that later jobs find again, also after a restart; those used "
                    "least recently go first; 0 keeps none")->capture_default_str();
@@ -118,6 +155,8 @@ int main(int argc, char** argv) {
         }
         http = std::move(started).value();
     }
+    std::optional<OwnWorker> own;
+    if (threads > 0) own.emplace(coordinator, *identity, threads, std::filesystem::path(data) / "worker");
     spdlog::info("build {}, listening on port {}, status on port {}", identity->build_id, (*server)->port(),
                  http ? http->port() : 0);
     if (!port_file.empty()) {

@@ -146,15 +146,18 @@ GammaDataset gamma_dataset(const TrainingData& d, const std::vector<double>& bri
     out.source_count = t.division.cell_count();
     out.energy = t.energy;
     std::vector<float> weights;
-    uint32_t part = 0;
+    uint32_t part = 0, sample = 0;
+    Vec3 first_hit;  // which a camera sample's paths have in common
     for (size_t x = 0; x < d.paths.size(); ++x) {
         if (stop.stop_requested()) return out;
         const TrainingPath& p = d.paths[x];
         while (part < d.part_ends.size() && x >= d.part_ends[part]) ++part;
         if (!d.in_range(p)) continue;
         const TrainingVertex* v = &d.vertices[p.first_vertex];
+        if (const Vec3& hit = v[p.vertex_count - 2].position; !(hit == first_hit)) first_hit = hit, ++sample;
         GammaPath path;
         path.batch = part;
+        path.sample = sample;
         path.first_node = uint32_t(out.nodes.size());
         for (uint32_t s = 1; s + 1 < p.vertex_count; ++s) {
             if (!(v[s].density > 0)) continue;

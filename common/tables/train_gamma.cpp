@@ -170,14 +170,14 @@ constexpr int kCoarseSteps = 4, kStepsPerStrength = 4, kFinalSteps = 3;
 
 std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& options, GammaReport* report) {
     // A light sub-path that made paths in both parts would confirm itself: whole batches judge, where there are enough of them.
-    // Where there are few, neighbours at least: a sample's paths lie side by side.
-    constexpr uint32_t kFewBatches = 5, kNeighbours = 16;
+    // Where there are few, samples do: a guided round's still share light sub-paths then, and the prior comes out weaker.
+    constexpr uint32_t kFewBatches = 5;
     uint32_t batches = 0;
     for (const GammaPath& p : data.paths) batches = std::max(batches, p.batch + 1);
     std::vector<uint32_t> train, judge;
     for (uint32_t x = 0; x < data.paths.size(); ++x) {
         const double batch = data.paths[x].batch;
-        const uint64_t h = mix64(options.seed ^ mix64(x / kNeighbours + 0x51ull));
+        const uint64_t h = mix64(options.seed ^ mix64(data.paths[x].sample + 0x51ull));
         const bool judges = batches < kFewBatches
                                 ? double(h >> 11) * 0x1p-53 < options.held_out
                                 : std::floor((batch + 1) * options.held_out) > std::floor(batch * options.held_out);

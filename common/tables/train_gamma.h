@@ -27,6 +27,7 @@ struct GammaPath {
     float fixed = 0;         ///< Techniques that Gamma does not change.
     float contribution = 0;  ///< Relative to the block's brightness.
     uint32_t batch = 0;      ///< Paths of a batch are not independent of one another: they share light sub-paths.
+    uint32_t sample = 0;     ///< Nor are those of a sample, side by side in the dataset: they share a camera sub-path.
 };
 
 struct GammaDataset {

@@ -178,6 +178,28 @@ TEST(Processes, TrainingIsSharedOutAndAWorkerKilledDuringItCostsTimeOnly) {
     EXPECT_GE(manifest["work"]["expired_leases"].get<int>(), 1);
 }
 
+/// The coordinator can do everything alone: learn the tables and render.
+TEST(Processes, ACoordinatorWithThreadsOfItsOwnNeedsNoWorker) {
+    const std::vector<std::string> job{"--algorithm", "spcbpt", "--spp", "4", "--resolution", "32x24", "--max-depth", "4",
+                                       "--set", "training-paths=40000"};
+    const Service alone({"--threads", "2"});
+    ASSERT_EQ(alone.submit("alone", job)->wait(), 0) << alone.log("alone") << alone.log("server");
+    const Json workers = alone.manifest("alone")["workers"];
+    ASSERT_EQ(workers.size(), 1u);
+    EXPECT_EQ(workers[0]["process_id"].get<int64_t>(), alone.server->pid());
+    EXPECT_EQ(alone.digest("alone"), embedded(alone, 1, 1, job));
+    // It stops as one does that leaves work to others, in the middle of a job.
+    const auto unfinished = alone.submit("unfinished", {"--algorithm", "path", "--spp", "100000"});
+    EXPECT_TRUE(wait_until(60, [&] {
+        const auto jobs = alone.jobs().list_jobs();
+        return jobs.ok() && std::any_of(jobs->begin(), jobs->end(), [](const JobInfo& j) {
+                   return j.state == JobState::kRunning && j.unit_done > 0;
+               });
+    }));
+    alone.server->signal(SIGTERM);
+    EXPECT_EQ(alone.server->wait(), 0) << alone.log("server");
+}
+
 TEST(Processes, TablesAreKeptForTheNextRenderAndCanBeInspected) {
     const Service service;
     std::vector<std::string> job = kTableJob;

@@ -54,6 +54,7 @@ struct Problem {
             }
             p.weight = float(value * value);
             p.contribution = float(value);
+            p.sample = uint32_t(x);
             d.paths.push_back(p);
         }
         return d;
@@ -174,6 +175,37 @@ TEST(Gamma, ColumnsWithoutPathsKeepThePrior) {
             EXPECT_NEAR(double(gamma[unnamed * data.light_count + i]), 0.5 / data.light_count + 0.5 * double(data.energy[i]) / total,
                         1e-6);
     }
+}
+
+/// Paths that share a sub-path would confirm one another: they judge together or learn together. Here each has seven twins.
+TEST(Gamma, PathsThatShareASubPathDoNotJudgeOneAnother) {
+    constexpr size_t kPaths = 1500;
+    constexpr uint32_t kTwins = 8, kBatches = 10;
+    constexpr uint64_t kProblems = 24;
+    struct Losses {
+        double believed = 0, true_one = 0;  ///< Mean logarithms: on the paths held out, and on others.
+    } apart, by_sample, by_batch;
+    for (uint64_t seed = 0; seed < kProblems; ++seed) {
+        const Problem problem(24, 400 + seed);
+        const GammaDataset drawn = problem.draw(kPaths, 500 + seed), judge = problem.draw(100000, 600 + seed);
+        GammaDataset data = drawn;
+        data.paths.clear();
+        for (const GammaPath& p : drawn.paths) data.paths.insert(data.paths.end(), kTwins, p);
+        const auto train = [&](Losses* losses, const auto& mark) {
+            for (uint32_t x = 0; x < data.paths.size(); ++x) mark(data.paths[x], x);
+            GammaReport report;
+            losses->true_one += std::log(gamma_loss(judge, train_gamma(data, {}, &report))) / kProblems;
+            losses->believed += std::log(report.loss) / kProblems;
+        };
+        train(&apart, [](GammaPath& p, uint32_t x) { p.sample = x; });
+        train(&by_sample, [](GammaPath& p, uint32_t x) { p.sample = x / kTwins; });
+        train(&by_batch, [](GammaPath& p, uint32_t x) { p.sample = x, p.batch = uint32_t(x / kTwins * kBatches / kPaths); });
+    }
+    RecordProperty("apart", std::to_string(std::exp(apart.believed - apart.true_one)));
+    RecordProperty("by sample", std::to_string(std::exp(by_sample.believed - by_sample.true_one)));
+    EXPECT_LT(apart.believed, apart.true_one + std::log(0.5));  // it believes itself twice as good as it is
+    EXPECT_GT(by_sample.believed, by_sample.true_one + std::log(0.75));
+    EXPECT_GT(by_batch.believed, by_batch.true_one + std::log(0.75));
 }
 
 /// The default trainer is the safe one. Both are judged on paths that neither has seen; the bounds are those of the issue.
