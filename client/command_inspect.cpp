@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cinttypes>
 #include <cstdio>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -13,6 +12,7 @@
 #include "client/commands.h"
 #include "client/inspect_tables.h"
 #include "client/job_options.h"
+#include "common/film/atomic_file.h"
 #include "common/import/import.h"
 #include "common/scene/scene.h"
 
@@ -143,14 +143,7 @@ int run(const Options& options) {
     if (!options.json.empty()) {
         nlohmann::json out = describe(description, summary, imported->files, seconds);
         if (tables) out["tables"] = describe(*tables);
-        std::ofstream file(options.json);
-        file << out.dump(2) << "\n";
-        file.close();
-        if (!file) {
-            std::fprintf(stderr, "cannot write %s; check that its folder exists and is writable\n",
-                         options.json.c_str());
-            return kFailure;
-        }
+        if (const Status s = write_file_atomically(options.json, out.dump(2) + "\n"); !s.ok()) return report_error(s);
     }
     return kSuccess;
 }

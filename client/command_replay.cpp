@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <memory>
+#include <vector>
 
 #include "client/commands.h"
 #include "client/job_options.h"
@@ -24,7 +25,8 @@ behind it.)";
 struct ReplayOptions {
     JobOptions job;
     uint64_t iteration = 0;
-    std::string pixel, unit;
+    std::vector<int> pixel;      ///< X, Y, or empty.
+    std::vector<uint32_t> unit;  ///< Group, tile, or empty.
     uint64_t spp = 0;
 };
 
@@ -38,9 +40,14 @@ Group group_of_job(const Plan& plan, uint32_t index, uint64_t spp) {
 
 Result<WorkUnit> find_unit(const ReplayOptions& options, const Plan& plan, uint64_t iteration, int x, int y) {
     if (!options.unit.empty()) {
-        unsigned group = 0, tile = 0;
-        if (std::sscanf(options.unit.c_str(), "%u,%u", &group, &tile) != 2 || tile >= plan.tile_count())
+        const uint32_t group = options.unit[0], tile = options.unit[1];
+        if (tile >= plan.tile_count())
             return invalid_argument("--unit takes GROUP,TILE with a tile below " + std::to_string(plan.tile_count()));
+        // Groups grow: a job of the largest size has fewer of them than iterations.
+        const uint64_t iterations = options.spp > 0 ? options.spp : JobSpec::kMaxSamplesPerPixel;
+        if (group >= iterations || plan.group(group).first_iteration >= iterations)
+            return invalid_argument("--unit " + std::to_string(group) + "," + std::to_string(tile) + ": a job of " +
+                                    std::to_string(iterations) + " samples per pixel has no such group");
         return plan.units(group_of_job(plan, group, options.spp))[tile];
     }
     for (uint32_t g = 0;; ++g) {
@@ -72,9 +79,7 @@ int replay(const ReplayOptions& options) {
     const auto parameters = parse_parameters(**algorithm, spec->parameters);
     const Plan plan(scene->frame(), light_paths_per_pixel(**algorithm, *parameters));
 
-    int x = 0, y = 0;
-    if (options.unit.empty() && std::sscanf(options.pixel.c_str(), "%d,%d", &x, &y) != 2)
-        return report_error(invalid_argument("--pixel takes X,Y, for example 120,64"));
+    const int x = options.pixel.empty() ? 0 : options.pixel[0], y = options.pixel.empty() ? 0 : options.pixel[1];
     const auto unit = find_unit(options, plan, options.iteration, x, y);
     if (!unit.ok()) return report_error(unit.status());
     UnitWork work = unit_work(*unit);
@@ -121,9 +126,12 @@ void add_replay_command(CLI::App& app, int* exit_code) {
     CLI::App* command = app.add_subcommand("replay", "Render one sample or one unit of a job again and print it");
     command->footer(kFooter);
     add_render_settings(*command, options->job);
-    auto* iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, from 0");
-    auto* pixel = command->add_option("--pixel", options->pixel, "X,Y in full-frame pixels, 0,0 at the top left");
-    auto* unit = command->add_option("--unit", options->unit, "GROUP,TILE: the whole unit instead of one sample");
+    auto* iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, from 0")
+                          ->check(CLI::Range(uint64_t(0), uint64_t(JobSpec::kMaxSamplesPerPixel - 1)));
+    auto* pixel = command->add_option("--pixel", options->pixel, "X,Y in full-frame pixels, 0,0 at the top left")
+                      ->expected(2)->delimiter(',');
+    auto* unit = command->add_option("--unit", options->unit, "GROUP,TILE: the whole unit instead of one sample")
+                     ->expected(2)->delimiter(',');
     command->add_option("--spp", options->spp, "Samples per pixel of the job, if it was bounded by them");
     iteration->needs(pixel);
     pixel->excludes(unit);

@@ -124,10 +124,19 @@ Status check_outputs(const JobOptions& options) {
     const std::filesystem::path output = output_path(options);
     std::filesystem::path manifest = output;
     manifest.replace_extension(".manifest.json");
+    std::vector<std::filesystem::path> taken;
+    if (!options.scene.empty()) taken.push_back(options.scene);
     for (const std::string& path : {output.string(), manifest.string(), options.png, options.json}) {
         if (path.empty()) continue;
         std::error_code ignored;
-        if (std::filesystem::is_directory(path, ignored)) return invalid_argument(path + ": is a directory; give a file name");
+        const auto status = std::filesystem::status(path, ignored);
+        if (std::filesystem::is_directory(status)) return invalid_argument(path + ": is a directory; give a file name");
+        if (std::filesystem::is_other(status)) continue;  // a pipe or a device
+        for (const std::filesystem::path& other : taken)
+            if (std::filesystem::weakly_canonical(path, ignored) == std::filesystem::weakly_canonical(other, ignored))
+                return invalid_argument(path + ": is " + (other == options.scene ? "the scene itself" : "another output, too") +
+                                        "; give another file name");
+        taken.push_back(path);
         const std::string probe = path + ".probe-" + std::to_string(::getpid());
         LL_RETURN_IF_ERROR(write_file_atomically(probe, {}));
         std::filesystem::remove(probe, ignored);

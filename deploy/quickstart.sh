@@ -19,14 +19,16 @@ if [ ! -f build/release/build.ninja ]; then
     cmake --preset release >/dev/null
 fi
 echo "building (the first time takes some minutes)..."
-cmake --build --preset release --target lightloom lightloom-server lightloom-worker | grep -E 'error|warning|FAILED' || true
-for program in lightloom lightloom-server lightloom-worker; do
-    [ -x "$bin/$program" ] || { echo "quickstart: the build failed; see: cmake --build --preset release" >&2; exit 1; }
-done
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+if ! cmake --build --preset release --target lightloom lightloom-server lightloom-worker >"$work/build.log" 2>&1; then
+    grep -E 'error|FAILED' "$work/build.log" | head -n 20 >&2 || true
+    echo "quickstart: the build failed; see: cmake --build --preset release" >&2
+    exit 1
+fi
 cd - >/dev/null
 
 mkdir -p "$output"
-work=$(mktemp -d)
 started=()
 stop_all() {
     local pid
@@ -56,6 +58,12 @@ threads=$((($(nproc) + 1) / 2))
 for i in 1 2; do
     "$bin/lightloom-worker" --server "127.0.0.1:$port" --threads "$threads" --cache "$work/cache" 2>"$output/worker$i.log" &
     started+=($!)
+done
+for i in 1 2; do
+    until grep -qs 'registered as' "$output/worker$i.log"; do
+        kill -0 "${started[i]}" 2>/dev/null || { echo "quickstart: a worker did not start:" >&2; cat "$output/worker$i.log" >&2; exit 1; }
+        sleep 0.1
+    done
 done
 echo "coordinator on port $port, status at http://127.0.0.1:$status_port/api/v1/status, two workers with $threads thread(s) each"
 

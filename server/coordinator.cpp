@@ -108,7 +108,8 @@ Result<JobSpec> Coordinator::canonical_spec(const JobSpec& spec) const {
     if (!parameters.ok()) return parameters.status();
     if ((spec.samples_per_pixel > 0) == (spec.time_limit_seconds > 0))
         return invalid_argument("a job needs either a number of samples per pixel or a time limit");
-    if (spec.samples_per_pixel > (1u << 24)) return invalid_argument("at most 16777216 samples per pixel");
+    if (spec.samples_per_pixel > JobSpec::kMaxSamplesPerPixel)
+        return invalid_argument("at most " + std::to_string(JobSpec::kMaxSamplesPerPixel) + " samples per pixel");
     if (!(spec.time_limit_seconds >= 0 && spec.time_limit_seconds <= 30 * 86400.0))
         return invalid_argument("the time limit must lie between 0 and 30 days");
     if (spec.max_depth < -1 || spec.max_depth >= kMaxEdges)

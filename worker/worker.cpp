@@ -147,7 +147,7 @@ bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
     {
         const std::lock_guard lock(mutex_);
         const auto [item, fresh] = running_.try_emplace(reference);
-        if (!fresh) return true;  // the other lane has it: its lease ran out and came back to us
+        if (!fresh) return true;  // the other lane has it: its lease came back to us, and if its result fails, that lane gives it back
         unit_stop = item->second.stop.get_token();
     }
     const bool training = reference.key.kind != UnitKind::kRender;
@@ -192,8 +192,7 @@ Status Worker::render_unit(const UnitLease& lease, std::stop_token unit_stop, st
         in_turn(lease, unit_stop, drain, [&] { partial = (*renderer)->render(unit_work(lease.unit), unit_stop); });
     if (!seconds.ok()) return seconds.status();
     if (!partial.ok()) return partial.status();
-    submit(lease, [&](const std::string& worker_id) { return port_.submit_result(worker_id, lease, *partial, *seconds); }, drain);
-    return {};
+    return submit(lease, [&](const std::string& worker_id) { return port_.submit_result(worker_id, lease, *partial, *seconds); }, drain);
 }
 
 Status Worker::trace_unit(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain) {
@@ -217,32 +216,31 @@ Status Worker::trace_unit(const UnitLease& lease, std::stop_token unit_stop, std
     const auto send = [&](const std::string& worker_id) {
         return port_.submit_training(worker_id, lease, payload, *seconds);
     };
-    submit(lease, send, drain);
-    return {};
+    return submit(lease, send, drain);
 }
 
-void Worker::submit(const UnitLease& lease, const Send& send, std::stop_token stop) {
+Status Worker::submit(const UnitLease& lease, const Send& send, std::stop_token stop) {
     Backoff backoff;
     for (int attempt = 0; attempt < kSubmitAttempts; ++attempt) {
         const std::string worker_id = id();
         const auto ack = send(worker_id);
         if (ack.ok()) {
-            if (ack->outcome == SubmitOutcome::kRejected || ack->outcome == SubmitOutcome::kDuplicateDifferent)
-                spdlog::error("{}: {}", name_of(lease.reference()), ack->reason);
-            return;
+            if (ack->outcome == SubmitOutcome::kDuplicateDifferent) spdlog::error("{}: {}", name_of(lease.reference()), ack->reason);
+            // The coordinator has counted that. But a heartbeat may have taken the unit back for us meanwhile, or our other lane.
+            if (ack->outcome == SubmitOutcome::kRejected) return {StatusCode::kAborted, ack->reason};
+            return {};
         }
         const StatusCode code = ack.status().code();
         if (code == StatusCode::kNotFound) {
-            if (!sign_in(stop, worker_id).ok()) return;
+            if (const Status status = sign_in(stop, worker_id); !status.ok()) return status;
         } else if (code == StatusCode::kUnavailable || code == StatusCode::kDeadlineExceeded) {
             wait(backoff.next(), stop);
-            if (stop.stop_requested() && attempt > 2) return;  // the unit will be leased again
+            if (stop.stop_requested() && attempt > 2) return {StatusCode::kCancelled, "this worker leaves"};
         } else {
-            spdlog::error("{}: {}", name_of(lease.reference()), ack.status().message());
-            (void)port_.release_unit(worker_id, lease.reference(), ack.status());
-            return;
+            return ack.status();
         }
     }
+    return {StatusCode::kUnavailable, "the coordinator did not take the result"};
 }
 
 void Worker::announce_rendering(const UnitReference& unit) {

@@ -58,9 +58,9 @@ class Worker {
     /// Waits for the unit's turn and calls `make` on all threads; how long that took.
     Result<double> in_turn(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain,
                            const std::function<void()>& make);
-    /// Sends until there is an answer.
+    /// Sends until there is an answer. An error: the unit is to be given back.
     using Send = std::function<Result<SubmitAck>(const std::string& worker_id)>;
-    void submit(const UnitLease& lease, const Send& send, std::stop_token stop);
+    Status submit(const UnitLease& lease, const Send& send, std::stop_token stop);
     void heartbeats(std::stop_token stop);
     void send_heartbeat();
     void announce_rendering(const UnitReference& unit);

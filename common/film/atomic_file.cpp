@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
+#include <filesystem>
 #include <system_error>
 
 namespace lightloom {
@@ -24,8 +25,15 @@ Status failure(const std::string& path, const char* what, int error) {
 
 Status write_file_atomically(const std::string& path, std::string_view bytes) {
     static std::atomic<uint64_t> counter{0};
-    const std::string temporary = path + ".tmp-" + std::to_string(getpid()) + "-" + std::to_string(counter++);
-    const int file = open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    // What a link points to is replaced, not the link; a pipe or a device is written to.
+    std::error_code none;
+    const std::filesystem::path resolved = std::filesystem::canonical(path, none);
+    const std::string target = none ? path : resolved.string();
+    struct stat info {};
+    const bool stream = stat(target.c_str(), &info) == 0 && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode);
+    const std::string temporary =
+        stream ? target : target + ".tmp-" + std::to_string(getpid()) + "-" + std::to_string(counter++);
+    const int file = open(temporary.c_str(), stream ? O_WRONLY | O_CLOEXEC : O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (file < 0) return failure(path, "cannot be written", errno);
     int error = 0;
     while (!bytes.empty() && error == 0) {
@@ -38,9 +46,9 @@ Status write_file_atomically(const std::string& path, std::string_view bytes) {
     }
     if (error == 0 && fsync(file) != 0 && errno != EINVAL) error = errno;  // EINVAL: not a thing that can be flushed.
     if (close(file) != 0 && error == 0) error = errno;
-    if (error == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
+    if (!stream && error == 0 && std::rename(temporary.c_str(), target.c_str()) != 0) error = errno;
     if (error != 0) {
-        unlink(temporary.c_str());
+        if (!stream) unlink(temporary.c_str());
         return failure(path, "cannot be written", error);
     }
     return Status::ok_status();

@@ -9,7 +9,7 @@
 namespace lightloom {
 
 /// Writes `bytes` under a temporary name in the same folder, flushes it to disk and renames it to `path`; an existing file
-/// is replaced. After an error nothing new is left behind.
+/// is replaced, through symbolic links. After an error nothing new is left behind. A pipe or a device is written to as it is.
 Status write_file_atomically(const std::string& path, std::string_view bytes);
 
 /// The whole file. kNotFound or kInvalidArgument names the path.

@@ -16,6 +16,8 @@
 namespace lightloom {
 
 struct JobSpec {
+    static constexpr uint32_t kMaxSamplesPerPixel = 1u << 24;
+
     std::string algorithm = "path";
     std::map<std::string, std::string> parameters;  ///< --set key=value, canonical text; validated by the catalog.
     uint64_t seed = 0;

@@ -3,6 +3,7 @@
 #include <arpa/inet.h>
 #include <sys/socket.h>
 
+#include "tests/service/forwarding_port.h"
 #include "tests/service/table_service.h"
 
 namespace lightloom {
@@ -11,30 +12,15 @@ namespace {
 using namespace lightloom::testing;
 
 /// Bytes that arrive damaged, the first few times.
-class NoisyPort final : public WorkerPort {
+class NoisyPort final : public ForwardingPort {
   public:
-    NoisyPort(WorkerPort& port, int damaged_reads) : port_(port), damaged_(damaged_reads) {}
-    Result<WorkerGrant> register_worker(const WorkerHello& hello) override { return port_.register_worker(hello); }
-    Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds, std::stop_token stop) override {
-        return port_.lease_units(worker_id, wait_seconds, stop);
-    }
-    Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running) override {
-        return port_.heartbeat(worker_id, running);
-    }
-    Result<SubmitAck> submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial,
-                                    double seconds) override {
-        return port_.submit_result(worker_id, lease, std::move(partial), seconds);
-    }
+    NoisyPort(WorkerPort& port, int damaged_reads) : ForwardingPort(port), damaged_(damaged_reads) {}
     Result<SubmitAck> submit_training(const std::string& worker_id, const UnitLease& lease, std::string_view payload,
                                       double seconds) override {
         double none = 0;
         first_trace_seconds.compare_exchange_strong(none, seconds);
         return port_.submit_training(worker_id, lease, payload, seconds);
     }
-    Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why) override {
-        return port_.release_unit(worker_id, unit, why);
-    }
-    Status goodbye(const std::string& worker_id) override { return port_.goodbye(worker_id); }
     Status read_asset(const Digest& digest, uint64_t offset, const std::function<Status(std::string_view)>& sink) override {
         ++reads;
         const bool damage = damaged_ > 0 && damaged_-- > 0;
@@ -48,7 +34,6 @@ class NoisyPort final : public WorkerPort {
     std::atomic<double> first_trace_seconds{0};
 
   private:
-    WorkerPort& port_;
     std::atomic<int> damaged_;
 };
 

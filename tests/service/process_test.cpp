@@ -281,7 +281,28 @@ TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
     EXPECT_EQ(run({"--help"}), 0);
     EXPECT_EQ(run({"algorithms"}), 0);
     EXPECT_EQ(run({"replay", kScene, "--algorithm", "bdpt", "--iteration", "3", "--pixel", "10,10"}), 0);
+    EXPECT_EQ(run({"replay", kScene, "--algorithm", "bdpt", "--pixel", "5,3x"}), 2);
+    EXPECT_EQ(run({"replay", kScene, "--algorithm", "bdpt", "--unit", "4000000000,0"}), 2);
+    EXPECT_EQ(run({"replay", kScene, "--algorithm", "bdpt", "--iteration", "4000000000", "--pixel", "1,1"}), 2);
     EXPECT_FALSE(std::filesystem::exists("cornell.exr"));
+    // No output takes the place of the scene, of another output, or of a device; one behind a link is replaced there.
+    const auto at = [&](const char* name) { return (directory.path / name).string(); };
+    const std::string source = std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/furnace-sphere.pbrt";  // which includes no file
+    std::filesystem::copy_file(source, at("own.pbrt"));
+    const auto render = [&](std::vector<std::string> more) {
+        std::vector<std::string> arguments{"render", at("own.pbrt"), "--spp", "1", "--resolution", "8x8", "-q"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run(arguments);
+    };
+    EXPECT_EQ(render({"-o", at("own.pbrt")}), 2);
+    EXPECT_EQ(render({"-o", at("x.exr"), "--png", at("x.exr")}), 2);
+    EXPECT_EQ(*digest_file(at("own.pbrt")), *digest_file(source));
+    std::ofstream(at("behind.json")) << "before";
+    std::filesystem::create_symlink("behind.json", at("link.json"));
+    EXPECT_EQ(render({"-o", at("x.exr"), "--png", "/dev/null", "--json", at("link.json")}), 0);
+    EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+    EXPECT_TRUE(std::filesystem::is_symlink(at("link.json")));
+    EXPECT_GT(std::filesystem::file_size(at("behind.json")), 100u);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "server/grpc_services.h"
 #include "server/status_http.h"
 #include "tests/service/fake.h"
+#include "tests/service/forwarding_port.h"
 #include "worker/grpc_worker_port.h"
 
 namespace lightloom {
@@ -62,6 +63,31 @@ TEST(Workers, BytesDoNotDependOnWhoRendersWhatAndHow) {
         EXPECT_EQ(run(workers, 2, false, std::nullopt), reference) << workers;
         EXPECT_EQ(run(workers, 1, true, workers), reference) << workers << " over gRPC, shuffled";
     }
+}
+
+/// The coordinator refuses a result, and before the worker hears of it, its heartbeat takes the unit back.
+class RefusingPort final : public testing::ForwardingPort {
+  public:
+    using ForwardingPort::ForwardingPort;
+    Result<SubmitAck> submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial,
+                                    double seconds) override {
+        if (++results % 4 != 1) return port_.submit_result(worker_id, lease, std::move(partial), seconds);
+        EXPECT_TRUE(port_.release_unit(worker_id, lease.reference(), {StatusCode::kDataLoss, "nonsense"}).ok());
+        EXPECT_TRUE(port_.heartbeat(worker_id, {{lease.reference(), true}}).ok());
+        return SubmitAck{SubmitOutcome::kRejected, "nonsense"};
+    }
+    std::atomic<int> results{0};
+};
+
+TEST(Workers, AUnitWhoseResultWasRefusedIsNotKept) {
+    FakeService service;  // its clock stands still: a unit that somebody keeps is never leased again
+    LocalWorkerPort local(*service.coordinator);
+    RefusingPort port(local);
+    Crew crew;
+    crew.add(port, service.identity, 1, 0.001);
+    const JobInfo info = service.wait_end(service.submit(service.spec(12)));
+    EXPECT_EQ(info.state, JobState::kSucceeded) << info.message;
+    EXPECT_GT(port.results.load(), 4);
 }
 
 TEST(Workers, JobPortOverGrpcDoesAllThatAClientNeeds) {

@@ -8,4 +8,4 @@ lightloom_test(large_scene_test LINK lt_transport lt_import)
 
 add_test(NAME light_math_symbols
          COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/light_math_symbols.sh $<TARGET_FILE:lt_core> $<TARGET_FILE:lt_scene_base>
-                 $<TARGET_FILE:lt_scene> $<TARGET_FILE:lt_import> $<TARGET_FILE:lt_transport>)
+                 $<TARGET_FILE:lt_scene> $<TARGET_FILE:lt_tables> $<TARGET_FILE:lt_import> $<TARGET_FILE:lt_transport>)
