@@ -4,9 +4,52 @@
 #include <array>
 #include <cmath>
 
+#include "common/core/math.h"
 #include "common/import/context.h"
 
 namespace lightloom::import {
+namespace {
+
+/// Refuses a camera whose rays or their densities are beyond single precision.
+void check_camera(const ParameterList& p, const PerspectiveCamera& camera) {
+    const auto& m = camera.camera_to_world.m;
+    if (!within_bounds({float(m[0][3]), float(m[1][3]), float(m[2][3])}))
+        fail(p.where(), p.what() + ": its position lies beyond 1e15; scale the scene down");
+    constexpr double kLongest = double(kMaxCoordinate), kShortest = 1 / kLongest;
+    const auto usable = [](double length) { return length >= kShortest && length <= kLongest; };
+    double scale = 0;
+    for (int j = 0; j < 3; ++j) {
+        scale = std::sqrt(m[0][j] * m[0][j] + m[1][j] * m[1][j] + m[2][j] * m[2][j]);
+        if (!usable(scale))
+            fail(p.where(), p.what() + ": its transformation scales by less than 1e-15 or more than 1e15; remove the scale");
+    }
+    // Steeper rays than this come from no pixel of a usable picture, and the renderer takes them for sideways ones.
+    constexpr double kSteepest = 1e6;
+    if (camera.lens_radius > 0) {
+        const double radius = camera.lens_radius * scale, focus = camera.focal_distance * scale;
+        if (!usable(radius) || !usable(focus) || radius > kSteepest * focus)
+            fail(p.where(), p.what() + ": lensradius and focaldistance must lie between 1e-15 and 1e15, and lensradius must not "
+                                       "exceed a million times focaldistance; set lensradius to 0 for a pinhole");
+    }
+    // The image on a plane at distance 1, of a square film if nothing here says more.
+    double x[2] = {-1, 1}, y[2] = {-1, 1};
+    const double aspect = camera.frame_aspect_ratio;
+    if (camera.has_screen_window)
+        for (int i = 0; i < 2; ++i) x[i] = camera.screen_window[i], y[i] = camera.screen_window[2 + i];
+    else if (aspect > 1)
+        x[0] = -aspect, x[1] = aspect;
+    else if (aspect > 0)
+        y[0] = -1 / aspect, y[1] = 1 / aspect;
+    const double half = math::tan(double(camera.fov_degrees) * (kPiD / 360));
+    constexpr double kNarrowest = 1e-9;
+    for (const double* side : {x, y})
+        if (!(std::fmax(std::fabs(side[0]), std::fabs(side[1])) * half <= kSteepest) ||
+            !((side[1] - side[0]) * half >= kNarrowest))
+            fail(p.where(), p.what() + ": fov, screenwindow and frameaspectratio give a picture that is wider than a million "
+                                       "times or narrower than 1e-9 times its distance; correct them");
+}
+
+}  // namespace
 
 void set_camera(Context* context, const std::string& kind, const ParameterList& p, const Mat4& camera_to_world) {
     if (kind != "perspective") fail(p.where(), p.what() + " is not supported; use \"perspective\"");
@@ -30,6 +73,7 @@ void set_camera(Context* context, const std::string& kind, const ParameterList& 
             !(camera.screen_window[2] < camera.screen_window[3]))
             fail(p.where(), p.what() + ": screenwindow must be x0 < x1, y0 < y1");
     }
+    check_camera(p, camera);
     // Nothing moves, so the shutter matters only as the exposure time.
     const float open = p.one_float("shutteropen", 0), close = p.one_float("shutterclose", 1);
     if (!(close > open)) fail(p.where(), p.what() + ": shutterclose must come after shutteropen");
@@ -63,6 +107,11 @@ void set_film(Context* context, const std::string& kind, const ParameterList& p)
     }
     if ((bounds || window) && (film.crop[0] >= film.crop[1] || film.crop[2] >= film.crop[3]))
         fail(p.where(), p.what() + ": the crop is empty");
+    const int64_t pixels = bounds || window ? int64_t(film.crop[1] - film.crop[0]) * (film.crop[3] - film.crop[2])
+                                            : int64_t(film.width) * film.height;
+    if (pixels > kMaxFilmPixels)
+        fail(p.where(), p.what() + ": the picture has " + std::to_string(pixels) + " pixels; the limit is " +
+                            std::to_string(kMaxFilmPixels) + ", so lower the resolution or give a cropwindow");
     p.ignore(&context->diagnostics, "maxcomponentvalue", "samples are not clamped, because that changes the mean");
     context->iso = p.one_float("iso", 100);
     if (!(context->iso > 0)) fail(p.where(), p.what() + ": iso must be positive");
@@ -116,7 +165,9 @@ void set_integrator(Context* context, const std::string& kind, const ParameterLi
     if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end())
         fail(p.where(), p.what() + " is not supported: it does not compute light transport; use \"path\"");
     context->scene.max_depth = p.one_int("maxdepth", 5);
-    if (context->scene.max_depth < 0) fail(p.where(), p.what() + ": maxdepth is negative");
+    if (context->scene.max_depth < 0 || context->scene.max_depth > kMaxDepth)
+        fail(p.where(), p.what() + ": maxdepth must lie between 0 and " + std::to_string(kMaxDepth) + ", not " +
+                            std::to_string(context->scene.max_depth));
     if (p.one_bool("regularize", false))
         context->diagnostics.warn(p.where(),
                                   p.what() + ": regularize is ignored, it would blur the picture's glossy light");

@@ -1,6 +1,13 @@
 #include "common/import/context.h"
 
+#include <cmath>
+
 namespace lightloom::import {
+
+bool within_bounds(const Vec3& position) {
+    const float farthest = std::fmax(std::fabs(position.x), std::fmax(std::fabs(position.y), std::fabs(position.z)));
+    return is_finite(position) && farthest <= kMaxCoordinate;
+}
 
 std::string Context::read_file(const Location& where, const std::string& reference, std::string* normalised) {
     const Result<std::string> name = normalise_reference(reference);

@@ -3,6 +3,7 @@
 // map names to what they stand for.
 
 #include <array>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
@@ -21,6 +22,12 @@ namespace lightloom::import {
 
 /// A material that absorbs nothing and scatters nothing: the shape does not exist for light ("interface").
 inline constexpr MaterialId kInterfaceMaterial = -2;
+
+/// Farthest that anything may lie from the origin, and longest length: its square, and an area times a squared distance
+/// over another, stay far from the end of single precision (Embree gives up beyond 1.8e18).
+inline constexpr float kMaxCoordinate = 1e15f;
+inline constexpr int kMaxDepth = 255;                                   ///< Edges of a path but one; see kMaxEdges.
+inline constexpr int64_t kMaxFilmPixels = (int64_t(1) << 31) / 28 - 1;  ///< Of the crop window; see kMaxPartialPixels.
 
 /// A material as a shape names it: a named one, or an anonymous one by its index.
 struct MaterialReference {
@@ -44,6 +51,7 @@ struct AreaLightDefinition {
 /// A shape with its references still unresolved.
 struct PendingShape {
     std::variant<TriangleMesh, Sphere> geometry;
+    std::vector<uint32_t> faces;  ///< As make_shape() gives them; empty if nothing asks for them.
     int32_t object = kNone;  ///< Index into SceneDescription::objects, or kNone.
     MaterialReference material;
     std::shared_ptr<const AreaLightDefinition> area_light;  ///< Null if the shape does not emit.
@@ -117,6 +125,9 @@ MaterialId resolve_material_reference(Context* context, const MaterialReference&
 // lights.cpp
 /// Transformation in force at a directive.
 void add_light(Context* context, const std::string& kind, const ParameterList& parameters, const Mat4& light_to_world);
+/// Whether no coordinate is beyond kMaxCoordinate (or not a number).
+bool within_bounds(const Vec3& position);
+
 /// Radiance of an area light on a surface of `area` (its "power" parameter is per primitive, as in pbrt).
 AreaEmission area_emission(Context* context, const AreaLightDefinition& definition, double area);
 bool area_light_uses_power(const AreaLightDefinition& definition);
@@ -135,9 +146,11 @@ struct ShapeState {
     Mat4 object_to_world;
     bool reverse_orientation = false;
 };
-/// Appends the shape's geometry to `pending` (its references are the caller's).
+/// The shape's geometry. `*faces` says for every triangle of a mesh which of pbrt's shapes it is a part of, as ascending
+/// numbers without gaps; it is empty if every triangle is a shape of its own.
 std::variant<TriangleMesh, Sphere> make_shape(Context* context, const std::string& kind,
-                                              const ParameterList& parameters, const ShapeState& state);
+                                              const ParameterList& parameters, const ShapeState& state,
+                                              std::vector<uint32_t>* faces);
 
 // resolve.cpp
 /// Resolves all references and moves the shapes into the scene.

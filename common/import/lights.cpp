@@ -75,6 +75,8 @@ Vec3 unit_vector(const ParameterList& p, const Mat4& m, const Vec3& from, const 
 Vec3 light_position(const ParameterList& p, const Mat4& m, const Vec3& from) {
     const Vec3 position = m.point(from);
     if (!is_finite(position)) fail(p.where(), p.what() + ": its position is not finite");
+    if (!within_bounds(position))
+        fail(p.where(), p.what() + ": its position lies beyond 1e15; scale the scene down or use a distant light");
     return position;
 }
 

@@ -10,6 +10,8 @@ namespace lightloom::import {
 namespace {
 
 constexpr int kMaxMixDepth = 32;
+/// Of pbrt's random walk between the layers: far more than any walk has, and few enough to count one by one.
+constexpr int kMaxLayerEvents = 10000;
 
 TextureId spectrum_or(Context* context, const ParameterList& p, std::string_view name, float fallback) {
     const TextureId id = spectrum_texture_parameter(context, p, name, ColourUse::kReflectance);
@@ -93,15 +95,30 @@ void read_layers(Context* context, const ParameterList& p, Material* m) {
     Diagnostics* d = &context->diagnostics;
     m->thickness = p.one_float("thickness", m->thickness);
     if (!(m->thickness >= 0)) fail(p.where(), p.what() + ": the thickness is negative");
-    if (m->kind == MaterialKind::kCoatedDiffuse) {
-        m->layer_events = p.one_int("maxdepth", m->layer_events);
-        if (m->layer_events < 1) fail(p.where(), p.what() + ": maxdepth must be positive");
-    } else {
+    const auto count = [&](std::string_view name, int fallback) {
+        const int value = p.one_int(name, fallback);
+        if (value < 1 || value > kMaxLayerEvents)
+            fail(p.where(), p.what() + ": " + std::string(name) + " must lie between 1 and " +
+                                std::to_string(kMaxLayerEvents) + ", not " + std::to_string(value));
+        return value;
+    };
+    const int events = count("maxdepth", m->layer_events);
+    count("nsamples", 1);
+    if (m->kind == MaterialKind::kCoatedDiffuse)
+        m->layer_events = events;
+    else
         p.ignore(d, "maxdepth", "the layers here are joined analytically, without a random walk");
-    }
-    p.ignore(d, "g", "the medium between the layers is not modelled");
-    p.ignore(d, "albedo", "the medium between the layers is not modelled");
     p.ignore(d, "nsamples", "the layers here are joined analytically, without a random walk");
+    for (const std::string_view name : {"albedo", "g"}) {
+        const Parameter* medium = p.find_any(name);
+        const auto is_zero = [](double v) { return v == 0; };
+        // A texture or a named spectrum has no numbers.
+        if (medium && (medium->numbers.empty() || medium->type == "spectrum" ||
+                       !std::all_of(medium->numbers.begin(), medium->numbers.end(), is_zero)))
+            fail(medium->where, p.what() + ": " + quoted(medium->type + " " + medium->name) +
+                                    " is not supported, the medium between the layers is not modelled; set it to 0 or "
+                                    "remove it");
+    }
 }
 
 void read_mix(Context* context, const ParameterList& p, Material* m) {

@@ -213,8 +213,17 @@ void ParameterList::finish() const {
             if (asked.substr(space + 1) == p.name)
                 fail(p.where, what_ + ": " + title(p) + " has the wrong type; write " + quoted(asked));
         }
-        fail(p.where, what_ + ": unknown parameter " + title(p) + "; remove it or correct its name");
+        fail_unknown(p);
     }
+}
+
+void ParameterList::check_names(std::span<const std::string_view> names) const {
+    for (const Parameter& p : parameters_)
+        if (std::find(names.begin(), names.end(), p.name) == names.end()) fail_unknown(p);
+}
+
+void ParameterList::fail_unknown(const Parameter& p) const {
+    fail(p.where, what_ + ": unknown parameter " + title(p) + "; remove it or correct its name");
 }
 
 void ParameterList::add_defaults(const ParameterList& defaults) {

@@ -3,6 +3,7 @@
 // ignored) by whoever interprets the directive; finish() reports the rest, so that nothing is ever silently dropped.
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -59,6 +60,9 @@ class ParameterList {
 
     /// Fails if a parameter was not used: it is unknown or of the wrong type.
     void finish() const;
+    /// Fails if a parameter has a name that is not in `names`: finish() does not judge what comes from an Attribute
+    /// directive, because a default need not suit every kind of shape, light ...
+    void check_names(std::span<const std::string_view> names) const;
     /// Adds the defaults of Attribute directives that this list does not set itself.
     void add_defaults(const ParameterList& defaults);
     /// For the Attribute directive: later values replace earlier ones.
@@ -66,6 +70,7 @@ class ParameterList {
 
   private:
     const Parameter& expect_one(const Parameter& p, size_t count) const;
+    [[noreturn]] void fail_unknown(const Parameter& p) const;
 
     Location where_;
     std::string what_;

@@ -6,6 +6,22 @@
 namespace lightloom::import {
 namespace {
 
+// Every name that some kind of shape, light, material or texture asks for: an Attribute directive may set no other.
+constexpr std::string_view kShapeNames[] = {
+    "alpha", "radius", "zmin", "zmax", "phimax", "innerradius", "height", "P", "N", "S", "uv", "indices", "faceIndices",
+    "filename", "displacement", "edgelength", "emissionfilename"};
+constexpr std::string_view kLightNames[] = {
+    "I", "L", "scale", "power", "illuminance", "from", "to", "coneangle", "conedeltaangle", "filename", "portal",
+    "twosided"};
+constexpr std::string_view kMaterialNames[] = {
+    "type", "normalmap", "displacement", "reflectance", "transmittance", "scale", "eta", "k", "interface.eta",
+    "conductor.eta", "conductor.k", "roughness", "uroughness", "vroughness", "interface.roughness",
+    "interface.uroughness", "interface.vroughness", "conductor.roughness", "conductor.uroughness",
+    "conductor.vroughness", "remaproughness", "thickness", "maxdepth", "nsamples", "g", "albedo", "materials", "amount"};
+constexpr std::string_view kTextureNames[] = {
+    "value", "tex", "tex1", "tex2", "scale", "amount", "dimension", "mapping", "uscale", "vscale", "udelta", "vdelta",
+    "filename", "filter", "maxanisotropy", "wrap", "encoding", "invert"};
+
 std::string read_string(Tokenizer* tokens, const Location& where, const std::string& word) {
     const Token token = tokens->next();
     if (token.kind != TokenKind::kString) fail(where, word + " needs a quoted string");
@@ -101,6 +117,8 @@ bool Parser::transformation(Tokenizer* tokens, const std::string& word, const Lo
         transform(where, [&](const Mat4& m) { return m * rotation(v[0], v[1], v[2], v[3]); });
     } else if (word == "LookAt") {
         const auto v = read_numbers(tokens, where, word, 9);
+        if (!within_bounds(vec3(v, 0)) || !within_bounds(vec3(v, 3)))
+            fail(where, "LookAt: the eye or the target lies beyond 1e15; scale the scene down");
         const std::optional<Mat4> look = look_at(vec3(v, 0), vec3(v, 3), vec3(v, 6));
         if (!look) fail(where, "LookAt: the eye equals the target, or the up vector is parallel to the view direction");
         transform(where, [&](const Mat4& m) { return m * *look; });
@@ -244,8 +262,13 @@ void Parser::attribute(Tokenizer* tokens, const Location& where) {
     if (target != "shape" && target != "light" && target != "material" && target != "medium" && target != "texture")
         fail(where, "Attribute " + quoted(target) + ": the target must be shape, light, material, medium or texture");
     const std::string what = "Attribute " + quoted(target);
-    state_.attributes.try_emplace(target, ParameterList(where, what))
-        .first->second.override_with(ParameterList::parse(tokens, where, what));
+    const ParameterList list = ParameterList::parse(tokens, where, what);
+    // No directive reads the parameters of a medium.
+    if (target == "shape") list.check_names(kShapeNames);
+    if (target == "light") list.check_names(kLightNames);
+    if (target == "material") list.check_names(kMaterialNames);
+    if (target == "texture") list.check_names(kTextureNames);
+    state_.attributes.try_emplace(target, ParameterList(where, what)).first->second.override_with(list);
 }
 
 void Parser::require_world(const Location& where, const std::string& word, bool wanted) const {

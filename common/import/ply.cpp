@@ -330,6 +330,10 @@ Status Reader::faces(const Element& element, PlyMesh* mesh) {
             if (count < 3)
                 return invalid_argument("the PLY face " + std::to_string(i) + " has " + std::to_string(int64_t(count)) +
                                         " vertices; it needs three or more");
+            // Up to the first polygon, every face is the triangle of the same number.
+            const bool polygons = count > 3 || !mesh->faces.empty();
+            while (polygons && mesh->faces.size() < mesh->indices.size() / 3)
+                mesh->faces.push_back(uint32_t(mesh->faces.size()));
             uint32_t first = 0, previous = 0;
             for (double corner = 0; corner < count; ++corner) {
                 double number = 0;
@@ -340,6 +344,7 @@ Status Reader::faces(const Element& element, PlyMesh* mesh) {
                                             std::to_string(mesh->positions.size()) + ")");
                 const uint32_t index = uint32_t(number);
                 if (corner >= 2) mesh->indices.insert(mesh->indices.end(), {first, previous, index});
+                if (corner >= 2 && polygons) mesh->faces.push_back(uint32_t(i));
                 if (corner == 0) first = index;
                 previous = index;
             }

@@ -13,6 +13,7 @@ struct PlyMesh {
     std::vector<Vec3> normals;  ///< Empty or one per position, as in the file (not normalised).
     std::vector<Vec2> uvs;      ///< Empty or one per position.
     std::vector<uint32_t> indices;
+    std::vector<uint32_t> faces;                  ///< The face of every triangle; empty if all faces are triangles.
     std::vector<std::string> ignored_properties;  ///< Vertex and face properties that nothing here uses.
 };
 

@@ -47,18 +47,21 @@ TriangleMesh subset(const TriangleMesh& mesh, const std::vector<size_t>& triangl
     return out;
 }
 
-/// As in pbrt, every triangle of a mesh is a light of its own with the given power; triangles of equal area stay
-/// together.
+/// As in pbrt, every triangle, disk, sphere and patch (also a PLY quadrilateral) is a light of its own with the given
+/// power, which the triangles that stand for it share by area; those of equal radiance stay together.
 void add_powered_mesh(Context* context, TriangleMesh mesh, const PendingShape& shape) {
+    const size_t triangles_in_all = mesh.indices.size() / 3;
+    const auto face_of = [&](size_t triangle) { return shape.faces.empty() ? triangle : shape.faces[triangle]; };
+    const size_t count = triangles_in_all == 0 ? 0 : face_of(triangles_in_all - 1) + 1;
+    std::vector<double> areas(count);
+    for (size_t i = 0; i < triangles_in_all; ++i) areas[face_of(i)] += triangle_area(mesh, 3 * i);
     std::map<float, std::vector<size_t>> by_area;
-    for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
-        const double area = triangle_area(mesh, i);
-        if (area > 0) by_area[float(area)].push_back(i);
-    }
-    const size_t count = mesh.indices.size() / 3;
+    for (size_t i = 0; i < triangles_in_all; ++i)
+        if (triangle_area(mesh, 3 * i) > 0) by_area[float(areas[face_of(i)])].push_back(3 * i);
     if (count > 1)
         context->diagnostics.warn(shape.where, "as in pbrt, each of the " + std::to_string(count) +
-                                                   " triangles of this light emits the given power");
+                                                   (shape.faces.empty() ? " triangles" : " faces") +
+                                                   " of this light emits the given power");
     for (const auto& [area, triangles] : by_area) {
         TriangleMesh part = subset(mesh, triangles);
         part.attributes.emission = add_emission(context, area_emission(context, *shape.area_light, double(area)));

@@ -47,6 +47,8 @@ TriangleMesh place(Context* context, const ParameterList& parameters, TriangleMe
         if (!identity) p = state.object_to_world.point(p);
         if (!is_finite(p))
             fail(parameters.where(), parameters.what() + ": a vertex is not finite after its transformation");
+        if (!within_bounds(p))
+            fail(parameters.where(), parameters.what() + ": a vertex lies beyond 1e15; scale the scene down");
     }
     mesh.attributes.flip_normal = state.reverse_orientation != state.object_to_world.swaps_handedness();
     std::vector<Vec3> substitutes;
@@ -118,7 +120,8 @@ TriangleMesh triangle_mesh(Context* context, const ParameterList& parameters, co
     return place(context, parameters, std::move(mesh), state);
 }
 
-TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const ShapeState& state) {
+TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const ShapeState& state,
+                      std::vector<uint32_t>* faces) {
     parameters.refuse("displacement", "displacement changes the geometry; bake it into the mesh");
     parameters.ignore(&context->diagnostics, "edgelength", "it only matters together with displacement");
     const std::string reference = parameters.one_string("filename", "");
@@ -139,6 +142,7 @@ TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const S
     mesh.normals = std::move(ply->normals);
     mesh.uvs = std::move(ply->uvs);
     mesh.indices = std::move(ply->indices);
+    *faces = std::move(ply->faces);
     return place(context, parameters, std::move(mesh), state);
 }
 
@@ -147,7 +151,11 @@ void require_full_turn(const ParameterList& parameters) {
         fail(parameters.where(), parameters.what() + ": a phimax below 360 is not supported; use a triangle mesh");
 }
 
-std::variant<TriangleMesh, Sphere> sphere(Context* context, const ParameterList& parameters, const ShapeState& state) {
+/// All triangles are parts of one shape.
+void join(const TriangleMesh& mesh, std::vector<uint32_t>* faces) { faces->assign(mesh.indices.size() / 3, 0); }
+
+std::variant<TriangleMesh, Sphere> sphere(Context* context, const ParameterList& parameters, const ShapeState& state,
+                                          std::vector<uint32_t>* faces) {
     const float radius = parameters.one_float("radius", 1);
     if (!(radius > 0)) fail(parameters.where(), parameters.what() + ": the radius must be positive");
     if (parameters.one_float("zmin", -radius) > -radius || parameters.one_float("zmax", radius) < radius)
@@ -161,13 +169,17 @@ std::variant<TriangleMesh, Sphere> sphere(Context* context, const ParameterList&
         context->diagnostics.warn(parameters.where(),
                                   parameters.what() + ": its transformation is not a similarity, so it becomes " +
                                       std::to_string(kEllipsoidTriangles) + " triangles with smooth normals");
-        return place(context, parameters, tessellate_sphere(radius), state);
+        TriangleMesh mesh = tessellate_sphere(radius);
+        join(mesh, faces);
+        return place(context, parameters, std::move(mesh), state);
     }
     Sphere s;
     s.centre = state.object_to_world.point({0, 0, 0});
     s.radius = float(double(radius) * *scale);
     if (!is_finite(s.centre) || !std::isfinite(s.radius) || !(s.radius > 0))
         fail(parameters.where(), parameters.what() + ": its transformed centre or radius is not a usable number");
+    if (!within_bounds(s.centre) || s.radius > kMaxCoordinate)
+        fail(parameters.where(), parameters.what() + ": its centre or radius lies beyond 1e15; scale the scene down");
     Vec3 axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     for (Vec3& axis : axes) {
         axis = state.object_to_world.vector(axis);
@@ -178,7 +190,8 @@ std::variant<TriangleMesh, Sphere> sphere(Context* context, const ParameterList&
     return s;
 }
 
-TriangleMesh disk(Context* context, const ParameterList& parameters, const ShapeState& state) {
+TriangleMesh disk(Context* context, const ParameterList& parameters, const ShapeState& state,
+                  std::vector<uint32_t>* faces) {
     const float radius = parameters.one_float("radius", 1), inner = parameters.one_float("innerradius", 0);
     const float height = parameters.one_float("height", 0);
     if (!(radius > 0) || !(inner >= 0) || !(inner < radius))
@@ -187,14 +200,17 @@ TriangleMesh disk(Context* context, const ParameterList& parameters, const Shape
     context->diagnostics.warn(parameters.where(),
                               parameters.what() + ": disks become a ring of " + std::to_string(kDiskSegments) +
                                   " segments of exactly the disk's area; the rim is true to 0.03 % of the radius");
-    return place(context, parameters, tessellate_disk(radius, inner, height), state);
+    TriangleMesh mesh = tessellate_disk(radius, inner, height);
+    join(mesh, faces);
+    return place(context, parameters, std::move(mesh), state);
 }
 
-TriangleMesh bilinear_mesh(Context* context, const ParameterList& parameters, const ShapeState& state) {
+TriangleMesh bilinear_mesh(Context* context, const ParameterList& parameters, const ShapeState& state,
+                           std::vector<uint32_t>* faces) {
     parameters.refuse("emissionfilename", "images on area lights are not supported; give the light a constant L");
     parameters.ignore(&context->diagnostics, "faceIndices", "no texture here is looked up by face");
     bool curved = false;
-    TriangleMesh mesh = tessellate_patches(read_mesh(parameters, 4), &curved);
+    TriangleMesh mesh = tessellate_patches(read_mesh(parameters, 4), &curved, faces);
     if (curved)
         context->diagnostics.warn(parameters.where(), parameters.what() +
                                                           ": a patch that is no parallelogram becomes a grid of " +
@@ -206,12 +222,14 @@ TriangleMesh bilinear_mesh(Context* context, const ParameterList& parameters, co
 }  // namespace
 
 std::variant<TriangleMesh, Sphere> make_shape(Context* context, const std::string& kind,
-                                              const ParameterList& parameters, const ShapeState& state) {
+                                              const ParameterList& parameters, const ShapeState& state,
+                                              std::vector<uint32_t>* faces) {
+    faces->clear();
     if (kind == "trianglemesh") return triangle_mesh(context, parameters, state);
-    if (kind == "plymesh") return ply_mesh(context, parameters, state);
-    if (kind == "sphere") return sphere(context, parameters, state);
-    if (kind == "disk") return disk(context, parameters, state);
-    if (kind == "bilinearmesh") return bilinear_mesh(context, parameters, state);
+    if (kind == "plymesh") return ply_mesh(context, parameters, state, faces);
+    if (kind == "sphere") return sphere(context, parameters, state, faces);
+    if (kind == "disk") return disk(context, parameters, state, faces);
+    if (kind == "bilinearmesh") return bilinear_mesh(context, parameters, state, faces);
     fail(parameters.where(),
          parameters.what() + " is not supported; use trianglemesh, plymesh, sphere, disk or bilinearmesh");
 }

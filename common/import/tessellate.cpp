@@ -78,7 +78,7 @@ T bilinear(const T* c, float u, float v) {
 
 }  // namespace
 
-TriangleMesh tessellate_patches(const TriangleMesh& patches, bool* curved) {
+TriangleMesh tessellate_patches(const TriangleMesh& patches, bool* curved, std::vector<uint32_t>* faces) {
     constexpr Vec2 kCorners[4] = {{0, 0}, {1, 0}, {0, 1}, {1, 1}};
     TriangleMesh mesh;
     for (size_t face = 0; face + 3 < patches.indices.size(); face += 4) {
@@ -112,6 +112,7 @@ TriangleMesh tessellate_patches(const TriangleMesh& patches, bool* curved) {
                 const uint32_t a = base + j * (steps + 1) + i, b = a + steps + 1;
                 mesh.indices.insert(mesh.indices.end(), {a, a + 1, b + 1, a, b + 1, b});
             }
+        faces->resize(mesh.indices.size() / 3, uint32_t(face / 4));
     }
     return mesh;
 }

@@ -23,7 +23,7 @@ TriangleMesh tessellate_disk(float radius, float inner_radius, float height);
 TriangleMesh tessellate_sphere(float radius);
 
 /// Four corners per face (p00, p10, p01, p11) to triangles. A parallelogram becomes two, which is exact; any other
-/// patch a grid, and then `*curved` is set.
-TriangleMesh tessellate_patches(const TriangleMesh& patches, bool* curved);
+/// patch a grid, and then `*curved` is set. `*faces` gets the number of the patch of every triangle.
+TriangleMesh tessellate_patches(const TriangleMesh& patches, bool* curved, std::vector<uint32_t>* faces);
 
 }  // namespace lightloom::import

@@ -110,7 +110,19 @@ TEST(ImportMaterial, WhatIsNotModelledIsNamed) {
     expect_error("Material \"conductor\" \"spectrum eta\" \"metal-Xx-eta\"", {"metal-Xx"});
     expect_error("Material \"dielectric\" \"float roughness\" 2", {"[0, 1]"});
     expect_error("Material \"dielectric\" \"float eta\" 0", {"index"});
-    expect_warning("Material \"coateddiffuse\" \"float g\" 0.1", "medium");
+    for (const std::string kind : {"coateddiffuse", "coatedconductor"}) {
+        const std::string coat = "Material \"" + kind + "\" ";
+        expect_error(coat + "\"float g\" 0.1", {"scene.pbrt:3", "float g", "medium"});
+        expect_error(coat + "\"rgb albedo\" [0 0.1 0]", {"scene.pbrt:3", "rgb albedo", "medium"});
+        expect_error(coat + "\"texture albedo\" \"t\"", {"texture albedo", "medium"});
+        EXPECT_TRUE(world(coat + "\"float g\" 0 \"rgb albedo\" [0 0 0]").warnings.empty());
+        for (const char* name : {"maxdepth", "nsamples"}) {
+            expect_error(coat + "\"integer " + name + "\" 10001", {"scene.pbrt:3", name, "10000"});
+            expect_error(coat + "\"integer " + name + "\" 0", {name, "between 1"});
+        }
+    }
+    expect_warning("Material \"coatedconductor\" \"integer maxdepth\" 7", "maxdepth");
+    expect_warning("Material \"coateddiffuse\" \"integer nsamples\" 4", "nsamples");
     const Material coat =
         material_of(world("Material \"coateddiffuse\" \"float thickness\" 0.1 \"integer maxdepth\" 7" + kShape));
     EXPECT_EQ(coat.thickness, 0.1f);
@@ -243,6 +255,65 @@ TEST(ImportLight, AreaLights) {
     expect_error("AreaLightSource \"diffuse\" Shape \"sphere\" \"float alpha\" 0", {"alpha 0"});
     expect_error("AreaLightSource \"diffuse\" Shape \"sphere\" \"float alpha\" 0.5", {"emitting shape with an alpha"});
     expect_error("AreaLightSource \"diffuse\" \"rgb L\" [1e30 1 1] \"float scale\" 1e30" + kShape, {"finite"});
+}
+
+/// pi times radiance times area over the triangles of all meshes from `first` on; also that they have one radiance.
+double power_of(const SceneDescription& d, bool* even) {
+    double power = 0;
+    float least = INFINITY, most = 0;
+    for (const TriangleMesh& mesh : d.meshes) {
+        const float radiance = d.emissions.at(size_t(mesh.attributes.emission)).radiance.g;
+        least = std::fmin(least, radiance);
+        most = std::fmax(most, radiance);
+        for (size_t i = 0; i < mesh.indices.size(); i += 3) {
+            const Vec3& a = mesh.positions[mesh.indices[i]];
+            const Vec3 u = mesh.positions[mesh.indices[i + 1]] - a, v = mesh.positions[mesh.indices[i + 2]] - a;
+            power += 3.14159265 * double(radiance) * 0.5 * double(length(cross(u, v)));
+        }
+    }
+    *even = most - least <= 1e-6f * most;
+    return power;
+}
+
+TEST(ImportLight, PowerIsThatOfTheWholeShape) {
+    const std::string light = "AreaLightSource \"diffuse\" \"float power\" 10 ";
+    const std::string square = "Shape \"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 1 0 2 1 0";
+    const std::string header =
+        "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 3\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n4 3 0\n0 1 0\n9 0 0\n9 9 0\n";
+    struct Case {
+        std::string shape;
+        double shapes;
+        bool even;
+    };
+    for (const Case& c : {Case{"Shape \"disk\" \"float radius\" 3", 1, true},
+                          Case{"Shape \"disk\" \"float radius\" 3 \"float innerradius\" 1", 1, true},
+                          Case{"Scale 1 2 3 Shape \"sphere\"", 1, true},
+                          Case{square + "]", 1, true},
+                          Case{"Shape \"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 1 0 1 1 1]", 1, true},
+                          Case{square + " 9 9 0 9 9 5] \"integer indices\" [0 1 2 3 1 3 4 5]", 2, false},
+                          Case{"Shape \"plymesh\" \"string filename\" \"a.ply\"", 3, false}}) {
+        bool even = false;
+        const SceneDescription d = world(light + c.shape, {{"a.ply", header + "3 0 1 3\n4 0 1 2 3\n3 1 4 5\n"}});
+        EXPECT_NEAR(power_of(d, &even) / (10 * c.shapes), 1, 1e-5) << c.shape;
+        EXPECT_EQ(even, c.even) << c.shape;
+    }
+    // A two-sided one sends half of its power to either side.
+    bool even = false;
+    const SceneDescription d =
+        world("AreaLightSource \"diffuse\" \"float power\" 10 \"bool twosided\" true Shape \"disk\"");
+    EXPECT_NEAR(power_of(d, &even), 5, 1e-4);
+    const SceneDescription two = world(light + square + " 9 9 0 9 9 5] \"integer indices\" [0 1 2 3 1 3 4 5]");
+    EXPECT_NE(two.warnings.at(1).find("each of the 2 faces"), std::string::npos) << two.warnings.at(1);
+}
+
+TEST(ImportLight, PositionsAreBounded) {
+    for (const std::string kind : {"point", "spot"}) {
+        const std::string light = "LightSource \"" + kind + "\" ";
+        expect_error(light + "\"point3 from\" [1e19 0 0]", {"scene.pbrt:3", kind.c_str(), "1e15", "scale the scene"});
+        expect_error("Translate 0 0 -1e16 " + light, {"scene.pbrt:3", "1e15"});
+        EXPECT_TRUE(import_world(light + "\"point3 from\" [1e14 0 0]").ok());
+    }
 }
 
 TEST(ImportLight, PointSpotAndDistant) {

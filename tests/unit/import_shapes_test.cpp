@@ -53,6 +53,9 @@ TEST(ImportMesh, Errors) {
     expect_error("Shape \"trianglemesh\"", {"point3 P"});
     expect_error("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"normal N\" [0 0 1]", {"1 normals for 3"});
     expect_error("Scale 1e10 1 1 Shape \"trianglemesh\" \"point3 P\" [0 0 0 1e30 0 0 0 1 0]", {"not finite"});
+    expect_error("Translate 1e16 0 0 Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0]", {"scene.pbrt:3", "1e15"});
+    expect_error("Translate 1e16 0 0 Shape \"sphere\"", {"scene.pbrt:3", "1e15"});
+    expect_error("Shape \"sphere\" \"float radius\" 1e16", {"scene.pbrt:3", "1e15"});
     expect_error("Shape \"curve\"", {"curve", "not supported"});
     expect_warning("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"vector3 S\" [1 0 0 1 0 0 1 0 0]", "S");
 }
@@ -155,6 +158,14 @@ TEST(Ply, AllFormatsAgree) {
         import::read_ply(ascii_header("5", "2") + "0 0 0\n1 0 0\n1 1 0\n0 1 0\n-1 .5 0\n5 0 1 2 3 4\n3 0 1 2");
     ASSERT_TRUE(ascii.ok()) << ascii.status().message();
     EXPECT_EQ(ascii->indices.size(), 12u);
+    EXPECT_EQ(ascii->faces, (std::vector<uint32_t>{0, 0, 0, 1}));
+    const auto mixed = import::read_ply(ascii_header("4", "4") + "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+                                        "3 0 1 2\n3 0 2 3\n4 0 1 2 3\n3 0 1 2");
+    ASSERT_TRUE(mixed.ok()) << mixed.status().message();
+    EXPECT_EQ(mixed->faces, (std::vector<uint32_t>{0, 1, 2, 2, 3}));
+    const auto triangles = import::read_ply(ascii_header("3", "1") + "0 0 0\n1 0 0\n1 1 0\n3 0 1 2");
+    ASSERT_TRUE(triangles.ok()) << triangles.status().message();
+    EXPECT_TRUE(triangles->faces.empty());
     const SceneDescription d =
         world("Shape \"plymesh\" \"string filename\" \"a.ply.gz\" Shape \"plymesh\" \"string filename\" \"a.ply\"",
               {{"a.ply.gz", gzip(binary_quad(false))}, {"a.ply", binary_quad(true)}});

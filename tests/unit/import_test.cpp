@@ -1,5 +1,8 @@
 // Directives, graphics state, parameters, camera and film.
 
+#include "common/film/partial_exr.h"
+#include "common/import/context.h"
+#include "common/path/path_view.h"
 #include "import_testing.h"
 
 namespace lightloom {
@@ -78,6 +81,11 @@ TEST(ImportState, AttributesAreDefaultsThatAShapeMayOverride) {
     EXPECT_EQ(d.textures[size_t(d.spheres[1].attributes.alpha)].value.r, 0.5f);
     EXPECT_EQ(d.spheres[2].attributes.alpha, kNone);
     expect_error("Attribute \"hat\" \"float radius\" 3", {"hat"});
+    for (const std::string target : {"shape", "light", "material", "texture"})
+        expect_error("\nAttribute \"" + target + "\"\n\"float sclae\" 3\n" + kTriangle,
+                     {"scene.pbrt:5", target.c_str(), "unknown parameter", "float sclae"});
+    // What suits another kind of light is no mistake.
+    EXPECT_TRUE(import_world("Attribute \"light\" \"float coneangle\" 20 LightSource \"point\"", {}, true).ok());
 }
 
 TEST(ImportState, ObjectsAreInstanced) {
@@ -201,6 +209,57 @@ TEST(ImportOptions, CameraFilmAndDepth) {
     EXPECT_EQ(d.max_depth, 9);
 }
 
+TEST(ImportOptions, LimitsAreThoseOfTheRenderer) {
+    static_assert(import::kMaxDepth == kMaxEdges - 1 && import::kMaxFilmPixels == kMaxPartialPixels);
+    const auto accepted = [](const std::string& text) {
+        const auto scene = import_text("PixelFilter \"box\" " + text + " WorldBegin");
+        EXPECT_TRUE(scene.ok()) << scene.status().message();
+    };
+    accepted("Integrator \"path\" \"integer maxdepth\" 255");
+    accepted("Film \"rgb\" \"integer xresolution\" 10000 \"integer yresolution\" 7669");
+    // A crop is what must fit.
+    accepted("Film \"rgb\" \"integer xresolution\" 60000 \"integer yresolution\" 60000 \"float cropwindow\" [0 .1 0 .1]");
+}
+
+TEST(ImportOptions, CamerasStayWithinSinglePrecision) {
+    const auto camera = [](const std::string& options, const std::string& before = "") {
+        return import_text(before + "\nCamera \"perspective\" " + options + " WorldBegin");
+    };
+    const auto refused = [&](const char* part, const std::string& options, const std::string& before = "") {
+        const auto scene = camera(options, before);
+        ASSERT_FALSE(scene.ok()) << before << options;
+        EXPECT_NE(scene.status().message().find("scene.pbrt:2: Camera"), std::string::npos) << scene.status().message();
+        EXPECT_NE(scene.status().message().find(part), std::string::npos) << scene.status().message();
+    };
+    const auto lens = [](const std::string& radius, const std::string& distance) {
+        return "\"float lensradius\" " + radius + " \"float focaldistance\" " + distance;
+    };
+    refused("lensradius", lens("0.1", "1e20"));
+    refused("lensradius", lens("0.1", "3e38"));
+    refused("lensradius", lens("1e19", "1"));
+    refused("lensradius", lens("1e-38", "1e-38"));
+    refused("lensradius", lens("1", "1e-10"));
+    refused("lensradius", lens("0.1", "1e6"), "Scale 1e-12 1e-12 1e-12");
+    EXPECT_TRUE(camera(lens("0.1", "1e14")).ok());
+    EXPECT_TRUE(camera(lens("0", "3e38")).ok());  // A pinhole has no focus.
+    for (const std::string look : {"1e18 0 0  0 0 0", "1e19 0 0  0 0 0", "0 0 0  0 0 3e38"}) {
+        const auto scene = camera("", "LookAt " + look + "  0 1 0");
+        ASSERT_FALSE(scene.ok()) << look;
+        EXPECT_NE(scene.status().message().find("scene.pbrt:1: LookAt: the eye or the target lies beyond 1e15"),
+                  std::string::npos)
+            << scene.status().message();
+    }
+    refused("position", "", "Translate 0 0 1e16");
+    refused("scales", "", "Scale 1e-17 1e-17 1e-17");
+    refused("scales", "", "Scale 1e17 1e17 1e17");
+    for (const std::string window : {"-1e20 1e20 -1 1", "-1 1 -1e20 1e20", "-1e-20 1e-20 -1 1", "-1 1 1e7 2e7"})
+        refused("screenwindow", "\"float screenwindow\" [" + window + "]");
+    refused("frameaspectratio", "\"float frameaspectratio\" 1e20");
+    refused("frameaspectratio", "\"float frameaspectratio\" 1e-20");
+    refused("fov", "\"float fov\" 1e-20");
+    EXPECT_TRUE(camera("\"float fov\" 1 \"float screenwindow\" [-100 100 -50 50]").ok());
+}
+
 TEST(ImportOptions, DefaultsAreThoseOfPbrt) {
     const auto scene = import_text("WorldBegin");
     ASSERT_TRUE(scene.ok());
@@ -233,6 +292,11 @@ TEST(ImportOptions, UnsupportedOnesAreNamed) {
     refused("Camera \"spherical\"", "perspective");
     refused("Camera \"perspective\" \"float fov\" 180", "fov");
     refused("Film \"gbuffer\"", "rgb");
+    refused("\nFilm \"rgb\" \"integer xresolution\" 10000 \"integer yresolution\" 7670", "scene.pbrt:2");
+    refused("Film \"rgb\" \"integer xresolution\" 10000 \"integer yresolution\" 7670", "76695843");
+    refused("\nIntegrator \"path\" \"integer maxdepth\" 256", "scene.pbrt:2");
+    refused("Integrator \"path\" \"integer maxdepth\" 256", "between 0 and 255, not 256");
+    refused("Integrator \"path\" \"integer maxdepth\" -1", "between 0 and 255, not -1");
     refused("Film \"rgb\" \"integer xresolution\" 0", "resolution");
     refused("Film \"rgb\" \"integer xresolution\" 2000000000", "resolution");
     refused("Film \"rgb\" \"string sensor\" \"canon_eos_5d\"", "sensor");
