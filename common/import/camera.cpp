@@ -15,7 +15,7 @@ void check_camera(const ParameterList& p, const PerspectiveCamera& camera) {
     const auto& m = camera.camera_to_world.m;
     if (!within_bounds({float(m[0][3]), float(m[1][3]), float(m[2][3])}))
         fail(p.where(), p.what() + ": its position lies beyond 1e15; scale the scene down");
-    constexpr double kLongest = double(kMaxCoordinate), kShortest = 1 / kLongest;
+    constexpr double kLongest = 1.001 * double(kMaxCoordinate), kShortest = 1 / kLongest;  // what rounds to the bounds too
     const auto usable = [](double length) { return length >= kShortest && length <= kLongest; };
     double scale = 0;
     for (int j = 0; j < 3; ++j) {
