@@ -13,6 +13,8 @@ namespace {
 
 constexpr size_t kClassifierEnds = 60000;  ///< Enough for 1000 centroids and their borders.
 
+constexpr uint64_t kFewestNodes = 4;  ///< On average, in a subspace that the data tell from others.
+
 constexpr uint64_t kMaxGammaCells = uint64_t(1) << 24;  ///< 64 MB in single precision.
 
 class Stopwatch {
@@ -152,9 +154,9 @@ GammaDataset gamma_dataset(const TrainingData& d, const std::vector<double>& bri
         if (stop.stop_requested()) return out;
         const TrainingPath& p = d.paths[x];
         while (part < d.part_ends.size() && x >= d.part_ends[part]) ++part;
-        if (!d.in_range(p)) continue;
         const TrainingVertex* v = &d.vertices[p.first_vertex];
-        if (const Vec3& hit = v[p.vertex_count - 2].position; !(hit == first_hit)) first_hit = hit, ++sample;
+        if (const Vec3& hit = v[std::max(p.vertex_count, 2u) - 2].position; !(hit == first_hit)) first_hit = hit, ++sample;
+        if (!d.in_range(p)) continue;
         GammaPath path;
         path.batch = part;
         path.sample = sample;
@@ -216,8 +218,9 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
     tables.gamma = train_gamma(dataset, gamma, &report->gamma);
     if (stop.stop_requested()) return cancelled;
     report->gamma_seconds = watch.lap();
-    const uint32_t light = std::min(tables.light_count, report->gamma.light_resolution);
-    const uint32_t eye = std::min(tables.eye_count, report->gamma.eye_resolution);
+    const uint32_t supported = uint32_t(std::max<uint64_t>(1, report->nodes / kFewestNodes));
+    const uint32_t light = std::min({tables.light_count, report->gamma.light_resolution, supported});
+    const uint32_t eye = std::min({tables.eye_count, report->gamma.eye_resolution, supported});
     if (report->note.empty() && (2 * light <= options.light_subspaces || 2 * eye <= options.eye_subspaces))
         report->note = "the training set tells " + std::to_string(light) + " light and " + std::to_string(eye) +
                        " eye subspaces apart, of " + std::to_string(options.light_subspaces) + " and " +
