@@ -30,7 +30,7 @@ declare -A dictionary=([pbrt]="-dict=$root/tests/fuzz/pbrt.dict" [ply]=)
 for target in pbrt ply; do
     mkdir "$corpus/$target"
     (cd "$corpus" && "$root/build/fuzz/bin/${target}_fuzz" -max_total_time="$seconds" -rss_limit_mb=2048 -timeout=20 \
-        -verbosity=0 -print_funcs=0 ${dictionary[target]} -print_final_stats=1 "$corpus/$target" "$root/tests/fuzz/corpus/$target")
+        -verbosity=0 -print_funcs=0 ${dictionary[$target]} -print_final_stats=1 "$corpus/$target" "$root/tests/fuzz/corpus/$target")
 done
 
 # Last and alone: the statistical tests use all processors themselves.
