@@ -32,14 +32,16 @@ std::string line_of(const JobInfo& job, int percent) {
     return line;
 }
 
-/// "tracing training paths 65536/200000  ETA 12 s"
+/// "tracing training paths 65536/200000  ETA 12 s", "learning the tables 40 %  ETA 2 s"
 std::string phase_line(const JobInfo& job) {
     std::string line = phase_text(job);
+    const bool learning = job.phase == PreparePhase::kLearning;
     if (job.phase == PreparePhase::kTracing) {
         line += ' ';
         line += std::to_string(job.phase_done) + "/" + std::to_string(job.phase_total);
     }
-    if (job.phase_done == 0 && job.unit_leased == 0 && job.phase_total > 0) line += "  waiting for a worker";
+    if (learning && job.phase_total > 0) line += ' ' + std::to_string(100 * job.phase_done / job.phase_total) + " %";
+    if (!learning && job.phase_done == 0 && job.unit_leased == 0 && job.phase_total > 0) line += "  waiting for a worker";
     if (job.eta_seconds >= 0) line += "  ETA " + duration_text(job.eta_seconds);
     return line;
 }
@@ -117,7 +119,7 @@ void Progress::show(const JobInfo& job) {
         std::fflush(stderr);
         open_ = true;
     } else if (job.state == JobState::kPreparing &&
-               (new_phase || (job.phase == PreparePhase::kTracing && waited >= kPlainInterval))) {
+               (new_phase || (job.phase_total > 0 && waited >= kPlainInterval))) {
         last_ = now;
         std::fprintf(stderr, "%s\n", phase_line(job).c_str());
     } else if (new_state && job.state == JobState::kRunning && job.tables.asset.size_bytes > 0) {

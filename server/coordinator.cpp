@@ -17,6 +17,7 @@ namespace lightloom {
 namespace {
 
 constexpr std::chrono::milliseconds kTick(20);
+constexpr double kLearningSteps = 1000;  ///< Into which progress of learning is divided.
 
 std::string utc_now() {
     const std::time_t now = std::time(nullptr);
@@ -289,8 +290,16 @@ JobInfo Coordinator::snapshot(const JobRecord& job) const {
     info.duplicates_different = job.duplicates_different;
     info.tables = job.tables;
     info.phase = job.phase;
-    if (job.maker) info.waits_for = job.maker->id;
-    if (job.training) {
+    if (job.maker) {
+        info.waits_for = job.maker->id;
+        info.eta_seconds = snapshot(*job.maker).eta_seconds;
+    }
+    if (job.phase == PreparePhase::kLearning && job.state == JobState::kPreparing) {
+        info.phase_total = kLearningSteps;
+        info.phase_done = uint64_t(kLearningSteps * job.learned_share);
+        if (job.learned_share > 0)
+            info.eta_seconds = seconds_between(job.learning_begin, now) * (1 - job.learned_share) / job.learned_share;
+    } else if (job.training) {
         info.unit_leased = job.training->leased_count();
         const TrainingWork& work = job.training_work;
         info.phase_total = work.total_samples;

@@ -68,6 +68,8 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
                 info.trace_seconds = seconds_between(job.training_begin, options_.clock()) - learning_seconds(info);
                 info.capped_by_time_limit = job.capped_by_time_limit;
                 job.phase = PreparePhase::kLearning;
+                job.learning_begin = options_.clock();
+                job.learned_share = 0;
                 changed(job);
             }
         }
@@ -80,7 +82,12 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
         const auto parameters = TransportParameters::read(render_settings(spec));
         if (!parameters.ok()) return parameters.status();
         TrainingReport report;
-        const auto tables = train_tables(*data, emitters, parameters->training, stop, &report);
+        const auto progress = [&](double share) {
+            const std::lock_guard lock(mutex_);
+            job.learned_share = share;
+            changed(job);
+        };
+        const auto tables = train_tables(*data, emitters, parameters->training, {stop, progress}, &report);
         if (!tables.ok()) return tables.status();
         info.training_samples += data->samples;
         info.classifier_seconds += report.classifier_seconds;
@@ -199,7 +206,7 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
     if (!parameters.ok()) return parameters.status();
     const auto begin = Clock::now();
     TrainingReport report;
-    const auto tables = train_tables(probe, scene.emitters(), parameters->training, stop, &report);
+    const auto tables = train_tables(probe, scene.emitters(), parameters->training, {stop, {}}, &report);
     if (!tables.ok()) return tables.status();
     const double learned = seconds_since(begin), samples = double(std::max<uint64_t>(1, probe.samples));
     const uint64_t wanted = parameters->training_samples;

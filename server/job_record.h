@@ -74,6 +74,8 @@ struct Coordinator::JobRecord {
     bool makes_tables = false;          ///< It probes, traces and learns itself.
     std::shared_ptr<JobRecord> maker;   ///< Makes the same tables; this job waits for them.
     TimePoint training_begin;           ///< The first training unit was leased; unset before.
+    TimePoint learning_begin;           ///< Of the phase kLearning.
+    double learned_share = 0;           ///< Of that phase, about.
     TablesInfo tables;
     Digest tables_asset;                ///< Of the tables that the job names, or is about to; zero before.
 

@@ -38,8 +38,14 @@ struct TrainingReport {
     std::string note;  ///< One line when the tables are simpler than asked or data were left out; empty otherwise.
 };
 
+/// How others follow a training, and end it.
+struct TrainingControl {
+    std::stop_token stop;
+    std::function<void(double)> progress;  ///< Optional; called now and then with the share of the time that has passed, about.
+};
+
 /// kCancelled within about a second of a stop request; otherwise always valid tables, whatever the data hold.
 Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& emitters, const TrainingOptions& options,
-                                    std::stop_token stop, TrainingReport* report);
+                                    const TrainingControl& control, TrainingReport* report);
 
 }  // namespace lightloom

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <utility>
 
@@ -168,6 +169,20 @@ class LevelProblem {
 constexpr double kStrengths[] = {0.01, 0.1, 1, 10};
 constexpr int kCoarseSteps = 4, kStepsPerStrength = 4, kFinalSteps = 3;
 
+/// Steps of the finest two levels, which take nearly all the time, and what has been done of them.
+class Steps {
+  public:
+    Steps(bool two_levels, const std::function<void(double)>& report)
+        : total_((two_levels ? 2 : 1) * int(std::size(kStrengths)) * kStepsPerStrength + kFinalSteps), report_(report) {}
+    void done_on(uint32_t bits) {
+        if (bits <= 2 && report_) report_(double(++done_) / total_);
+    }
+
+  private:
+    int total_, done_ = 0;
+    const std::function<void(double)>& report_;
+};
+
 std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& options, GammaReport* report) {
     // A light sub-path that made paths in both parts would confirm itself: whole batches judge, where there are enough of them.
     // Where there are few, samples do: a guided round's still share light sub-paths then, and the prior comes out weaker.
@@ -189,6 +204,7 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
     // From about 16 subspaces a side to the finest, a quarter of a subspace's size at a time.
     uint32_t bits = 0;
     while ((std::max(data.light_count, data.eye_count) >> bits) > 16) bits += 2;
+    Steps steps(bits > 0, options.progress);
     LevelProblem problem(data, bits, options.mix);
     std::vector<float> prior = problem.flat_prior(), b = prior;
     report->uniform_loss = problem.loss(prior, judge);
@@ -205,6 +221,7 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
             for (int i = 0; i < (bits > 2 ? kCoarseSteps : kStepsPerStrength); ++i) {
                 if (options.stop.stop_requested()) return b;
                 problem.improve(&candidate, prior, lambda, train, &room);
+                steps.done_on(bits);
             }
             const double loss = problem.loss(candidate, judge);
             if (loss < level_loss) level_loss = loss, strength = lambda, best_b = std::move(candidate);
@@ -217,8 +234,10 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
             b = std::move(best_b);
             // What judged may teach as well once the choice is made.
             if (finest)
-                for (int i = 0; i < kFinalSteps && !options.stop.stop_requested(); ++i)
+                for (int i = 0; i < kFinalSteps && !options.stop.stop_requested(); ++i) {
                     problem.improve(&b, prior, strength, all, &room);
+                    steps.done_on(bits);
+                }
         } else {
             b = prior;  // finer subspaces than the data support: keep the coarser model, lifted
         }

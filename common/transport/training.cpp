@@ -329,7 +329,7 @@ Result<SubspaceTables> make_tables(const Scene& scene, const RenderSettings& set
             if (!unit.ok()) return unit.status();
             LL_RETURN_IF_ERROR(data.append(*unit));
         }
-        Result<SubspaceTables> trained = train_tables(data, scene.emitters(), parameters->training, stop, report);
+        Result<SubspaceTables> trained = train_tables(data, scene.emitters(), parameters->training, {stop, {}}, report);
         if (!trained.ok()) return trained.status();
         tables = *std::move(trained);
     }

@@ -111,7 +111,7 @@ struct JobInfo {
     uint64_t duplicates_same = 0, duplicates_different = 0;
     double prepare_seconds = 0, finish_seconds = 0;
     PreparePhase phase = PreparePhase::kReadingScene;  ///< In kPreparing.
-    uint64_t phase_done = 0, phase_total = 0;          ///< Training samples.
+    uint64_t phase_done = 0, phase_total = 0;          ///< Training samples; in kLearning thousandths of the work.
     std::string waits_for;                             ///< The job that makes the tables, in kWaitingForTables.
     TablesInfo tables;
 };

@@ -309,7 +309,7 @@ TEST(Training, ActsOnAStopRequestWithinASecond) {
                 stop.request_stop();
             });
             TrainingReport report;
-            const Result<SubspaceTables> tables = train_tables(data, scene->emitters(), options, stop.get_token(), &report);
+            const Result<SubspaceTables> tables = train_tables(data, scene->emitters(), options, {stop.get_token(), {}}, &report);
             const auto answered = std::chrono::steady_clock::now();
             clock.join();
             EXPECT_LT(answered - asked, std::chrono::seconds(1)) << milliseconds;
@@ -317,6 +317,20 @@ TEST(Training, ActsOnAStopRequestWithinASecond) {
             EXPECT_EQ(tables.status().code(), StatusCode::kCancelled) << milliseconds;
         }
     }
+}
+
+/// Whoever waits sees how far it is: ascending shares, up to the last few steps (which finer subspaces than
+/// the data support do not take), a few per cent at a time.
+TEST(Training, TellsHowFarItIs) {
+    const auto scene = testing::glossy();
+    const TrainingData data = small_data(scene, 4096);
+    std::vector<double> shares{0};
+    TrainingReport report;
+    ASSERT_TRUE(train_tables(data, scene->emitters(), {}, {{}, [&](double share) { shares.push_back(share); }}, &report).ok());
+    EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+    EXPECT_GT(shares.back(), 0.9);
+    EXPECT_LE(shares.back(), 1);
+    for (size_t i = 1; i < shares.size(); ++i) EXPECT_LE(shares[i] - shares[i - 1], 0.11);
 }
 
 /// Training twice, on one thread and on two, makes the same bytes; another seed others.
