@@ -12,6 +12,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+std::string refuse_negative(const std::string& text) {
+    return text.starts_with('-') ? "\"" + text + "\" is negative; a seed is a whole number from 0" : std::string();
+}
+
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 }  // namespace
@@ -25,7 +29,8 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
     command.add_option("--max-depth", options.max_depth, "Bounces; paths have up to this + 1 edges (default: the scene's)")
         ->check(CLI::Range(0, kMaxEdges - 1));
     command.add_option("--resolution", options.resolution, "WIDTHxHEIGHT in pixels (default: the scene's)");
-    command.add_option("--seed", options.seed, "Another seed makes another, independent image")->capture_default_str();
+    command.add_option("--seed", options.seed, "Another seed makes another, independent image")->capture_default_str()
+        ->check(CLI::Validator(refuse_negative, "", "whole"));  // CLI11 would wrap it around
 }
 
 CLI::Option* add_half_setting(CLI::App& command, JobOptions& options) {
@@ -78,7 +83,9 @@ Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
         const size_t equals = setting.find('=');
         if (equals == std::string::npos || equals == 0)
             return invalid_argument("--set takes KEY=VALUE, not \"" + setting + "\"");
-        spec.parameters[setting.substr(0, equals)] = setting.substr(equals + 1);
+        const std::string key = setting.substr(0, equals);
+        if (!spec.parameters.emplace(key, setting.substr(equals + 1)).second)
+            return invalid_argument("--set " + key + " is given twice; which value is meant?");
     }
     const auto algorithm = find_algorithm(spec.algorithm);
     if (!algorithm.ok()) return invalid_argument(algorithm.status().message());

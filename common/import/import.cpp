@@ -18,6 +18,7 @@ Result<ImportedScene> import_from(FileSource* files, const std::string& name, co
                                  "the picture is a little sharper");
     resolve_shapes(&context);
     context.scene.film.exposure_scale = context.exposure_time * context.iso / 100;
+    LL_RETURN_IF_ERROR(validate(context.scene));
     context.scene.warnings = context.diagnostics.messages();
     return ImportedScene{std::move(context.scene), files->files()};
 } catch (const ImportFailure& failure) {

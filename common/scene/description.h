@@ -1,12 +1,12 @@
 #pragma once
 // SceneDescription: what an importer produces and Scene::build() consumes. Plain data, in world space, in the units of the
-// scene file. Every reference is an index into one of the vectors; an importer guarantees that indices are in range, that
-// all numbers are finite, and that matrices are invertible (Scene::build() checks again and reports, it never crashes).
+// scene file. Every reference is an index into one of the vectors.
 
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "common/core/result.h"
 #include "common/core/transform.h"
 #include "common/core/vec.h"
 #include "common/scene/image.h"
@@ -173,5 +173,9 @@ struct SceneDescription {
     int samples_per_pixel = 16;         ///< What the file asks for; the command line may override.
     std::vector<std::string> warnings;  ///< Named warnings: "file:line: what was ignored and why that matters".
 };
+
+/// What rendering relies on: indices in range, finite numbers, areas within single precision, invertible matrices.
+/// kInvalidArgument names the first shape that breaks it, with its place in the scene file. import_pbrt() and Scene::build() check it.
+Status validate(const SceneDescription& description);
 
 }  // namespace lightloom

@@ -76,7 +76,6 @@ class Scene {
 
   private:
     Scene() = default;
-    Status check() const;
     void collect_emitters(std::vector<Emitter>* emitters);
     float smallest_reach(const Bounds3& bounds) const;
     void summarise();

@@ -1,8 +1,7 @@
 #pragma once
-// What this build computes light with, and the golden units that prove it on this host.
+// What this build computes light with, and the proof that it does so on this host.
 
 #include "common/core/result.h"
-#include "common/scene/description.h"
 #include "common/work/service.h"
 
 namespace lightloom {
@@ -14,14 +13,6 @@ extern const char* const kTools;
 
 /// Compiler, instruction set, contraction, ray tracer with its instruction set.
 std::string math_profile();
-
-/// A room with one area light, one diffuse-transmitting curtain and a sphere: enough to reach the camera, both walks, area light
-/// sampling, textures and triangle and sphere intersection.
-SceneDescription golden_scene();
-
-/// Renders one 32 x 32 unit of the golden scene per algorithm of the catalog and digests the partials. Takes well under a
-/// second; the result is a constant of (build, correct host).
-Result<Digest> golden_unit_digest();
 
 /// The identity of this process; renders the golden units once.
 Result<BuildIdentity> build_identity();

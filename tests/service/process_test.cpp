@@ -273,6 +273,8 @@ TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
     EXPECT_EQ(run({"render", "no-such-scene.pbrt"}), 2);
     EXPECT_EQ(run({"render", kScene, "--algorithm", "no-such"}), 2);
     EXPECT_EQ(run({"render", kScene, "--set", "no-such=1"}), 2);
+    EXPECT_EQ(run({"render", kScene, "--set", "rr-min=1", "--set", "rr-min=0.5"}), 2);
+    EXPECT_EQ(run({"render", kScene, "--seed", "-1"}), 2);
     EXPECT_EQ(run({"render", kScene, "--resolution", "12"}), 2);
     EXPECT_EQ(run({"render", kScene, "--spp", "1", "--time", "1"}), 2);
     EXPECT_EQ(run({"submit", kScene, "--detach", "--half"}), 2);

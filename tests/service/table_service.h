@@ -9,7 +9,7 @@
 
 #include "common/film/atomic_file.h"
 #include "common/transport/training.h"
-#include "common/work/identity.h"
+#include "common/work/golden.h"
 #include "server/grpc_services.h"
 #include "server/results.h"
 #include "server/scene_reader.h"

@@ -8,7 +8,7 @@
 
 #include "common/core/distributions.h"
 #include "common/core/rng.h"
-#include "common/work/identity.h"
+#include "common/work/golden.h"
 
 namespace lightloom::client {
 namespace {

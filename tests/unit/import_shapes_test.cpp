@@ -56,6 +56,8 @@ TEST(ImportMesh, Errors) {
     expect_error("Translate 1e16 0 0 Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0]", {"scene.pbrt:3", "1e15"});
     expect_error("Translate 1e16 0 0 Shape \"sphere\"", {"scene.pbrt:3", "1e15"});
     expect_error("Shape \"sphere\" \"float radius\" 1e16", {"scene.pbrt:3", "1e15"});
+    expect_error("Shape \"trianglemesh\" \"point3 P\" [-1e14 0 0 1e14 0 0 0 1e14 1e14]", {"scene.pbrt:3", "too large"});
+    expect_error("Shape \"sphere\" \"float radius\" 1e-22", {"scene.pbrt:3", "too small"});
     expect_error("Shape \"curve\"", {"curve", "not supported"});
     expect_warning("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"vector3 S\" [1 0 0 1 0 0 1 0 0]", "S");
 }

@@ -8,7 +8,10 @@
 #include <filesystem>
 #include <fstream>
 
+#include "common/scene/scene.h"
+#include "common/transport/renderer.h"
 #include "common/work/asset.h"
+#include "common/work/golden.h"
 #include "common/work/wire.h"
 
 namespace lightloom {
@@ -265,6 +268,50 @@ TEST(Wire, SpecAndUnitsSurviveTheRoundTrip) {
     message.mutable_spec()->mutable_scene_root()->set_sha256("short");
     EXPECT_EQ(wire::get(message).status().code(), StatusCode::kInvalidArgument);
     EXPECT_FALSE(wire::get(v1::SubmitResultResponse()).ok()) << "UNSPECIFIED must be refused";
+}
+
+/// A kind that no golden unit computes could differ between two hosts unseen.
+TEST(Golden, ItsScenesHoldEveryKindOfMaterialTextureShapeAndLight) {
+    const SceneDescription room = golden_scene(), court = golden_courtyard();
+    const auto materials = [](MaterialKind kind) {
+        return [kind](const SceneDescription& d) {
+            return std::any_of(d.materials.begin(), d.materials.end(), [&](const Material& m) { return m.kind == kind; });
+        };
+    };
+    for (int kind = 0; kind <= int(MaterialKind::kMix); ++kind)
+        EXPECT_TRUE(materials(MaterialKind(kind))(room) || materials(MaterialKind(kind))(court)) << kind;
+    for (int kind = 0; kind <= int(TextureKind::kImage); ++kind) {
+        const auto is = [&](const TextureNode& t) { return t.kind == TextureKind(kind); };
+        EXPECT_TRUE(std::any_of(room.textures.begin(), room.textures.end(), is) ||
+                    std::any_of(court.textures.begin(), court.textures.end(), is)) << kind;
+    }
+    EXPECT_FALSE(court.instances.empty() || court.spheres.empty() || court.meshes.empty());
+    EXPECT_FALSE(court.point_lights.empty() || court.spot_lights.empty() || court.distant_lights.empty() ||
+                 court.infinite_lights.empty() || court.infinite_lights[0].image == kNone);
+    EXPECT_GT(court.camera.lens_radius, 0);
+    EXPECT_NE(court.objects[0].meshes[0].attributes.alpha, kNone);
+}
+
+/// All of it is lit, and two ways of rendering it agree, or there would be nothing to compare on two hosts.
+TEST(Golden, TheCourtyardIsLitEverywhereAndPathAndBdptAgree) {
+    const std::shared_ptr<const Scene> scene = std::move(Scene::build(golden_courtyard())).value();
+    double means[2] = {};
+    for (const bool bdpt : {false, true}) {
+        const auto renderer = Renderer::create(scene, {.algorithm = bdpt ? "bdpt" : "path", .seed = 3, .max_depth = 6}, nullptr);
+        ASSERT_TRUE(renderer.ok()) << renderer.status().message();
+        const Rect& crop = scene->frame().crop;
+        const UnitWork work{.iteration_count = 64, .tile = crop, .light_path_count = bdpt ? uint64_t(crop.area()) * 64 : 0};
+        const auto partial = (*renderer)->render(work, {});
+        ASSERT_TRUE(partial.ok());
+        size_t dark = 0;
+        for (size_t i = 0; i + 2 < partial->camera.size(); i += 3) {
+            dark += !(partial->camera[i] > 0);
+            means[bdpt] += partial->camera[i + 1];
+        }
+        EXPECT_EQ(dark, 0u);
+        for (const SplatSum& s : partial->splats) means[bdpt] += s.rgb[1] / double(crop.area());  // one light path per sample
+    }
+    EXPECT_NEAR(means[1] / means[0], 1, 0.05);
 }
 
 }  // namespace

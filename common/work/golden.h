@@ -1,0 +1,21 @@
+#pragma once
+// Scenes whose units prove that a host computes light as the others do.
+
+#include "common/core/digest.h"
+#include "common/core/result.h"
+#include "common/scene/description.h"
+
+namespace lightloom {
+
+/// A room with one area light, one diffuse-transmitting curtain, metal and glass: closed, and easy to connect.
+SceneDescription golden_scene();
+
+/// The rest of what computes light: an environment image, point, spot and distant lights, a sphere that shines, a two-sided light,
+/// instances, cut-outs, image textures, coats, rough glass, a pane, a mix of materials and a thin lens.
+SceneDescription golden_courtyard();
+
+/// Renders one 32 x 32 unit of both per algorithm of the catalog, with the tables that it needs, and digests tables and
+/// partials. Takes about a second; the result is a constant of (build, correct host).
+Result<Digest> golden_unit_digest();
+
+}  // namespace lightloom
