@@ -1,5 +1,6 @@
 lightloom_test(subspace_weights_test LINK lt_transport)
 lightloom_test(light_cache_test LINK lt_transport)
+lightloom_test(draw_test LINK lt_transport)
 lightloom_test(tables_test LINK lt_transport)
 find_package(TBB REQUIRED)
 lightloom_test(gamma_test LINK lt_core TBB::tbb)

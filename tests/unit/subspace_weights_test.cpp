@@ -203,13 +203,19 @@ TEST(Labels, PermutedWithTheirRowsKeepEveryWeight) {
     testing::RandomTableOptions options;
     options.source_cells = 1;  // one cell: its number may be any
     const SubspaceTables tables = random_tables(scene->emitters(), 8, options);
-    const uint32_t n = tables.light_count;
-    const auto renamed = [n](uint32_t i) { return (5 * i + 3) % n; };  // 5 and 12 have no common factor
+    const uint32_t n = tables.light_count, m = tables.eye_count;
+    ASSERT_TRUE(n % 5 != 0 && m % 7 != 0) << "no permutation";
+    const auto renamed = [n](uint32_t i) { return (5 * i + 3) % n; };
+    const auto renamed_eye = [m](uint32_t j) { return (7 * j + 2) % m; };
+    const auto with_names = [](const SubspaceTree& tree, const auto& name) {
+        std::vector<SubspaceTree::Node> nodes = tree.nodes();
+        for (SubspaceTree::Node& node : nodes)
+            if (node.axis() == SubspaceTree::kLeaf) node = SubspaceTree::make_leaf(name(node.child()));
+        return SubspaceTree(std::move(nodes));
+    };
     SubspaceTables other = tables;
-    std::vector<SubspaceTree::Node> nodes = tables.light_tree.nodes();
-    for (SubspaceTree::Node& node : nodes)
-        if (node.axis() == SubspaceTree::kLeaf) node = SubspaceTree::make_leaf(renamed(node.child()));
-    other.light_tree = SubspaceTree(std::move(nodes));
+    other.light_tree = with_names(tables.light_tree, renamed);
+    other.eye_tree = with_names(tables.eye_tree, renamed_eye);
     std::vector<LightDivision::Cells> cells = tables.division.cells();
     for (LightDivision::Cells& c : cells) {
         ASSERT_EQ(c.side, 1);
@@ -218,7 +224,7 @@ TEST(Labels, PermutedWithTheirRowsKeepEveryWeight) {
     other.division = LightDivision(std::move(cells));
     for (uint32_t i = 0; i < n; ++i) {
         other.energy[renamed(i)] = tables.energy[i];
-        for (uint32_t j = 0; j < tables.eye_count; ++j) other.gamma[size_t(j) * n + renamed(i)] = tables.column(j)[i];
+        for (uint32_t j = 0; j < m; ++j) other.gamma[size_t(renamed_eye(j)) * n + renamed(i)] = tables.column(j)[i];
     }
     ASSERT_TRUE(other.validate(scene->emitters()).ok());
     const SubspaceSelection a = selection_of(*scene, tables, 3, 0), b = selection_of(*scene, other, 3, 0);

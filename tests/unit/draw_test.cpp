@@ -1,0 +1,81 @@
+// What a camera vertex draws from a unit's cache: every prefix with the probability by which its contribution is divided, whatever
+// the tables, the windows and the number of connections.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "tests/support/random_tables.h"
+#include "tests/support/table_render.h"
+#include "tests/support/test_scenes.h"
+
+namespace lightloom {
+namespace {
+
+/// Given the cache, the expected sum over the draws of scale / r is 1 / M_i for each of its prefixes, M_i the light sub-paths that
+/// subspace i may reach into: with algorithms.md 1.1 that makes the estimator the mean over the cache.
+TEST(Draws, AreScaledByTheirProbability) {
+    const auto scene = testing::glossy();
+    testing::RandomTableOptions random;
+    random.max_window = 4;
+    random.spread = 3;
+    const SubspaceTables tables = testing::random_tables(scene->emitters(), 21, random);
+    for (const int connections : {1, 3, 7}) {
+        testing::CacheOptions options;
+        options.connections = connections;
+        options.paths = 25;
+        const SpcbptAlgorithm<> algorithm{
+            {testing::subspace_selection(*scene, tables, options), connections}, Heuristic::kBalance, options.paths};
+        UnitPreparation preparation;
+        const auto state = algorithm.prepare({*scene, 77, 6, {}, testing::frame_with_paths(*scene, 1, 0), {}}, &preparation);
+        // By place in the index: the prefix, and what one draw of it adds on average.
+        std::map<std::pair<uint32_t, uint32_t>, uint32_t> subspace_of;
+        for (uint32_t i = 0; i < tables.light_count; ++i) {
+            const auto& s = state.index.subspaces[i];
+            for (uint32_t c = s.begin; c < s.begin + s.count; ++c) {
+                const LightCandidate& p = state.index.candidates[c].prefix;
+                subspace_of[{p.first_vertex, p.s}] = i;
+            }
+        }
+        ASSERT_EQ(subspace_of.size(), state.index.candidates.size());
+        ASSERT_GT(subspace_of.size(), 100u);
+        for (const uint32_t eye : {0u, tables.eye_count - 1}) {
+            PathVertex v;
+            v.label = uint16_t(eye);
+            Rng rng({5, Stage::kTraining, eye, uint64_t(connections)});
+            constexpr int kDraws = 400000;
+            struct Sums {
+                double sum = 0, square = 0;
+            };
+            std::map<const PathVertex*, std::map<int, Sums>> found;
+            for (int d = 0; d < kDraws; ++d) {
+                LightPick picks[kMaxConnections];
+                const int count = algorithm.method.draw(state.cache, state.index, v, [&] { return rng.uniform2(); }, rng, 6, picks);
+                ASSERT_LE(count, connections);
+                std::map<std::pair<const PathVertex*, int>, double> once;  // draws of one vertex are not independent
+                for (int n = 0; n < count; ++n)
+                    once[{picks[n].y, picks[n].s}] += double(algorithm.method.inverse_density(picks[n]));
+                for (const auto& [prefix, value] : once) {
+                    Sums& s = found[prefix.first][prefix.second];
+                    s.sum += value, s.square += value * value;
+                }
+            }
+            int tested = 0;
+            double worst = 0;
+            for (const auto& [place, i] : subspace_of) {
+                const double expected = 1 / (double(options.paths) * tables.window[i]);
+                const Sums& s = found[state.cache.at(place.first)][int(place.second)];
+                const double mean = s.sum / kDraws, error = std::sqrt((s.square / kDraws - mean * mean) / kDraws);
+                if (!(error < 0.05 * expected)) continue;  // drawn too rarely to be normal
+                ++tested;
+                worst = std::max(worst, std::fabs(mean - expected) / error);
+            }
+            EXPECT_GT(tested, 50) << connections << " connections, eye subspace " << eye;
+            EXPECT_LT(worst, 4.7) << connections << " connections, eye subspace " << eye;  // 1e-3 over some hundred prefixes
+        }
+    }
+}
+
+}  // namespace
+}  // namespace lightloom
