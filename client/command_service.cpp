@@ -130,8 +130,9 @@ void add_service_commands(CLI::App& app, int* exit_code) {
         command->footer(kSubmitFooter);
         add_render_settings(*command, options->job);
         add_output_settings(*command, options->job);
-        command->add_flag("--detach", options->detach, "Print the job's id and return at once")
-            ->excludes(command->get_option("--half"));  // `fetch` has its own
+        auto* detach = command->add_flag("--detach", options->detach, "Print the job's id and return at once");
+        for (const char* later : {"--output", "--half", "--png", "--json"})  // `fetch` has its own
+            detach->excludes(command->get_option(later));
     }
     {
         const auto [command, options] = add("watch", "Show a job's progress until it ends", watch_job);
@@ -142,8 +143,7 @@ void add_service_commands(CLI::App& app, int* exit_code) {
         const auto [command, options] = add("fetch", "Write the image and manifest of a finished job", fetch_job);
         command->add_option("JOB", options->job_id, "Id from `submit --detach` or `list`")->required();
         command->add_option("-o,--output", options->job.output, "EXR to write (default: JOB.exr)");
-        add_half_setting(*command, options->job);
-        command->add_option("--png", options->job.png, "Also write an 8-bit sRGB picture");
+        add_image_settings(*command, options->job);
         command->add_option("--json", options->job.json, "Write statistics to this file");
         command->add_flag("-q,--quiet", options->job.quiet, "Errors only");
         command->add_flag("--strict", options->job.strict, "Exit with 3 if samples were dropped");

@@ -33,18 +33,18 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
         ->check(CLI::Validator(refuse_negative, "", "whole"));  // CLI11 would wrap it around
 }
 
-CLI::Option* add_half_setting(CLI::App& command, JobOptions& options) {
-    return command.add_flag("--half", options.half,
-                            "Write colour as half floats; refused where a value is beyond their range, and nothing is lost");
+void add_image_settings(CLI::App& command, JobOptions& options) {
+    command.add_flag("--half", options.half,
+                     "Write colour as half floats; refused where a value is beyond their range, and nothing is lost");
+    auto* png = command.add_option("--png", options.png, "Also write an 8-bit sRGB picture");
+    command.add_option("--exposure", options.exposure, "Stops by which the picture is brightened (the EXR never is)")
+        ->check(CLI::Range(-30.0, 30.0))->needs(png);
 }
 
 void add_output_settings(CLI::App& command, JobOptions& options) {
     command.add_option("-o,--output", options.output, "EXR to write; the manifest goes beside it (default: SCENE's name.exr)");
-    command.add_option("--png", options.png, "Also write an 8-bit sRGB picture");
-    command.add_option("--exposure", options.exposure, "Stops by which the picture is brightened (the EXR never is)")
-        ->check(CLI::Range(-30.0, 30.0));
+    add_image_settings(command, options);
     command.add_flag("--layers", options.layers, "Also store albedo, normal and depth of what the camera sees first");
-    add_half_setting(command, options);
     auto* spp = command.add_option("--spp", options.samples_per_pixel, "Samples per pixel (default: the scene's)")
                     ->check(CLI::Range(1u, 1u << 24));
     command.add_option("--time", options.time_seconds,

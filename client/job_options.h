@@ -29,8 +29,8 @@ struct JobOptions {
 
 /// Scene, algorithm, depth, resolution, seed and parameters.
 void add_render_settings(CLI::App& command, JobOptions& options);
-/// --half, for every command that writes an image.
-CLI::Option* add_half_setting(CLI::App& command, JobOptions& options);
+/// --half, --png and --exposure, for every command that writes an image.
+void add_image_settings(CLI::App& command, JobOptions& options);
 /// Output, bounds, statistics.
 void add_output_settings(CLI::App& command, JobOptions& options);
 

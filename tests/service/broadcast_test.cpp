@@ -283,6 +283,33 @@ TEST(TrainingBudget, AProbeIsTimedOnAWarmWorker) {
     EXPECT_LT(port.first_trace_seconds, kColdSeconds);
 }
 
+/// What the probe cost, and what the chosen set will cost at that rate, fit into the tenth.
+TEST(TrainingBudget, ProbeAndTrainingTakeATenthOfTheLimitAtMost) {
+    for (const bool guided : {false, true}) {
+        for (const double limit : {10.0, 25.0, 60.0}) {
+            TableService service;
+            JobSpec timed = guided ? service.guided_spec(0) : service.table_spec(0);
+            timed.time_limit_seconds = limit;
+            timed.parameters.erase("training-paths");
+            const std::string id = service.submit_training(timed);
+            const std::string worker = service.add_worker();
+            const auto probe = service.lease(worker);
+            ASSERT_EQ(probe.size(), 1u);
+            ASSERT_EQ(probe[0].unit.key.kind, UnitKind::kProbe);
+            constexpr double kSeconds = 0.1;  // which give() says that the tracing took
+            const double per_sample = kSeconds / double(probe[0].unit.training.sample_count);
+            service.give(worker, probe[0], traced(probe[0]));
+            const JobInfo info = service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing; });
+            const double chosen = std::stod(info.spec.parameters.at("training-paths"));
+            const bool two_rounds = guided && chosen > double(kTrainingUnitSamples);  // a smaller set has no pilot
+            const double cost = chosen * per_sample * (1 + kLearningOverTracing) * (two_rounds ? kGuidedCost : 1);
+            EXPECT_LE(kSeconds + cost, kTrainingShare * limit) << guided << ' ' << limit;
+            // How much more than the least depends on what the probe's learning took, on a clock.
+            EXPECT_GE(chosen, limit > 50 ? 32768 : double(kMinTrainingSamples)) << guided << ' ' << limit;
+        }
+    }
+}
+
 TEST(TrainingBudget, ATimeLimitedJobRecordsWhatItTrainedAndCanBeRenderedAgain) {
     TableService service([](CoordinatorOptions& o) { o.clock = [] { return std::chrono::steady_clock::now(); }; });
     LightCrew crew;

@@ -277,7 +277,9 @@ TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
     EXPECT_EQ(run({"render", kScene, "--seed", "-1"}), 2);
     EXPECT_EQ(run({"render", kScene, "--resolution", "12"}), 2);
     EXPECT_EQ(run({"render", kScene, "--spp", "1", "--time", "1"}), 2);
-    EXPECT_EQ(run({"submit", kScene, "--detach", "--half"}), 2);
+    EXPECT_EQ(run({"render", kScene, "--exposure", "1"}), 2) << "of which picture?";
+    for (const char* later : {"--half", "-o=x.exr", "--png=x.png", "--json=x.json"})
+        EXPECT_EQ(run({"submit", kScene, "--detach", later}), 2) << later;
     EXPECT_EQ(run({"no-such-command"}), 2);
     EXPECT_EQ(run({"list", "--server", "127.0.0.1:1"}), 4);
     EXPECT_EQ(run({"--help"}), 0);
