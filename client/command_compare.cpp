@@ -6,6 +6,7 @@
 #include <string>
 
 #include "client/commands.h"
+#include "client/validators.h"
 #include "common/film/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "common/film/metrics.h"
@@ -168,10 +169,10 @@ void add_compare_command(CLI::App& app, int* exit_code) {
         ->type_name("PNG");
     command->add_option("--heat-range", options->heat_range, "Relative error that gets the full colour")
         ->capture_default_str()
-        ->check(CLI::Range(1e-6, 1e6));
+        ->check(number_between(1e-6, 1e6));
     command->add_option("--trim", options->trim_percent, "Percentage of the largest terms that the trimmed relMSE drops")
         ->capture_default_str()
-        ->check(CLI::Range(0.0, 99.9));
+        ->check(number_between(0.0, 99.9));
     command->add_option("--regions", options->regions, "Also print the mean ratio of every cell of a grid, for example 3x3")
         ->type_name("CxR");
     command->footer("Exit code 0 if the images could be compared, 2 if a file cannot be read or the frames differ.");

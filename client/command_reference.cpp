@@ -13,6 +13,7 @@
 #include "client/job_options.h"
 #include "client/progress.h"
 #include "client/run_job.h"
+#include "client/validators.h"
 #include "common/film/atomic_file.h"
 #include "common/work/identity.h"
 #include "server/results.h"
@@ -82,7 +83,7 @@ nlohmann::ordered_json describe(const ReferenceOptions& options, const JobSpec& 
 
 int reference(ReferenceOptions& options) {
     (void)interrupt_token();
-    if (Status s = check_outputs(options.job); !s.ok()) return report_error(s);
+    if (Status s = check_outputs(options.job, ".json"); !s.ok()) return report_error(s);
     AlgorithmChoice checker_choice;
     if (!options.cross_check.empty()) {
         auto parsed = parse_algorithm(options.cross_check);
@@ -107,6 +108,12 @@ int reference(ReferenceOptions& options) {
     spec->frame = scene->frame();
     if (spec->frame.crop.width() < kCheckColumns || spec->frame.crop.height() < kCheckRows)
         return report_error(invalid_argument("a reference has at least 3 x 3 pixels"));
+
+    const Plan plan(scene->frame(), light_paths_per_pixel(**algorithm, *parse_parameters(**algorithm, spec->parameters)));
+    const uint64_t fewest = plan.group(kLeastGroups - 1).first_iteration + 1;
+    if (!checker_choice.name.empty() && spec->samples_per_pixel > 0 && spec->samples_per_pixel < fewest)
+        return report_error(invalid_argument("--cross-check needs --spp " + std::to_string(fewest) + " at least: " +
+                                             std::to_string(kLeastGroups) + " groups of iterations, to know the error"));
 
     const RenderSettings settings{spec->algorithm, spec->parameters, spec->seed, spec->max_depth};
     const auto preparation = prepare(*scene, settings, interrupt_token());
@@ -172,11 +179,11 @@ void add_reference_command(CLI::App& app, int* exit_code) {
     auto* spp = command->add_option("--spp", options->job.samples_per_pixel, "Samples per pixel")
                     ->check(CLI::Range(1u, 1u << 24));
     auto* time = command->add_option("--time", options->job.time_seconds, "Render for this many seconds")
-                     ->check(CLI::Range(0.001, 30 * 86400.0))->excludes(spp);
+                     ->check(number_between(0.001, 30 * 86400.0))->excludes(spp);
     command->add_option("--cross-check", options->cross_check, "Another algorithm, NAME[:KEY=VALUE]..., that must agree");
     command->add_option("--cross-time", options->cross_time,
                         "Seconds for its image, and as many again for the path lengths of both")
-        ->capture_default_str()->check(CLI::Range(0.001, 30 * 86400.0));
+        ->capture_default_str()->check(number_between(0.001, 30 * 86400.0));
     command->add_option("--threads", options->threads, "Threads (default: all processors)")->check(CLI::Range(1, 1024));
     command->add_flag("-q,--quiet", options->job.quiet, "No progress; errors and the cross-check only");
     command->callback([options, spp, time, exit_code] {

@@ -50,6 +50,9 @@ Result<WorkUnit> find_unit(const ReplayOptions& options, const Plan& plan, uint6
                                     std::to_string(iterations) + " samples per pixel has no such group");
         return plan.units(group_of_job(plan, group, options.spp))[tile];
     }
+    if (options.spp > 0 && iteration >= options.spp)
+        return invalid_argument("--iteration " + std::to_string(iteration) + ": a job of " + std::to_string(options.spp) +
+                                " samples per pixel has iterations 0 to " + std::to_string(options.spp - 1));
     for (uint32_t g = 0;; ++g) {
         const Group group = group_of_job(plan, g, options.spp);
         if (iteration >= group.first_iteration + group.iteration_count) continue;
@@ -132,7 +135,8 @@ void add_replay_command(CLI::App& app, int* exit_code) {
                       ->expected(2)->delimiter(',');
     auto* unit = command->add_option("--unit", options->unit, "GROUP,TILE: the whole unit instead of one sample")
                      ->expected(2)->delimiter(',');
-    command->add_option("--spp", options->spp, "Samples per pixel of the job, if it was bounded by them");
+    command->add_option("--spp", options->spp, "Samples per pixel of the job, if it was bounded by them")
+        ->check(CLI::Range(uint64_t(1), uint64_t(JobSpec::kMaxSamplesPerPixel)));
     iteration->needs(pixel);
     pixel->excludes(unit);
     command->add_flag("--strict", options->job.strict, "Exit with 3 if samples were dropped");

@@ -101,9 +101,13 @@ int fetch_job(const ServiceOptions& options) {
     if (!job.ok()) return service_error(options, job.status());
     JobOptions output = options.job;
     if (output.output.empty()) output.output = options.job_id + ".exr";
-    if (job->state != JobState::kSucceeded)
-        return report_error(failed_precondition("job " + options.job_id + " is " + std::string(to_string(job->state)) +
-                                                (job->message.empty() ? "" : ": " + job->message)));
+    if (job->state != JobState::kSucceeded) {
+        const std::string what = "job " + options.job_id + " is " + std::string(to_string(job->state)) +
+                                 (job->message.empty() ? "" : ": " + job->message);
+        if (job->state == JobState::kCancelled) return report_error({StatusCode::kCancelled, what});
+        const bool over = is_terminal(job->state);
+        return report_error(failed_precondition(over ? what : what + "; `lightloom watch " + options.job_id + "` waits for it"));
+    }
     return fetch(port, *job, output, {}, AfterFetch::kImageStays);
 }
 

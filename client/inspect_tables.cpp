@@ -146,9 +146,9 @@ Result<TableFile> read_tables(const std::string& path, const Scene& scene) {
     auto bytes = read_file(path);
     if (!bytes.ok()) return bytes.status();
     const auto content = tables_of_file(*std::move(bytes));
-    if (!content.ok()) return data_loss(path + ": " + content.status().message());
+    if (!content.ok()) return invalid_argument(path + ": " + content.status().message());
     auto tables = parse_tables(*content);
-    if (!tables.ok()) return data_loss(path + ": " + tables.status().message());
+    if (!tables.ok()) return invalid_argument(path + ": " + tables.status().message());
     if (const Status s = tables->validate(scene.emitters()); !s.ok())
         return invalid_argument(path + ": the tables are not those of this scene: " + s.message());
     return TableFile{*std::move(tables), sha256(*content), content->size()};

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "client/commands.h"
+#include "client/validators.h"
 #include "common/path/path_view.h"
 #include "common/transport/catalog.h"
 
@@ -11,10 +12,6 @@ namespace lightloom::client {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-std::string refuse_negative(const std::string& text) {
-    return text.starts_with('-') ? "\"" + text + "\" is negative; a seed is a whole number from 0" : std::string();
-}
 
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
@@ -30,7 +27,7 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
         ->check(CLI::Range(0, kMaxEdges - 1));
     command.add_option("--resolution", options.resolution, "WIDTHxHEIGHT in pixels (default: the scene's)");
     command.add_option("--seed", options.seed, "Another seed makes another, independent image")->capture_default_str()
-        ->check(CLI::Validator(refuse_negative, "", "whole"));  // CLI11 would wrap it around
+        ->check(whole_number());
 }
 
 void add_image_settings(CLI::App& command, JobOptions& options) {
@@ -38,7 +35,7 @@ void add_image_settings(CLI::App& command, JobOptions& options) {
                      "Write colour as half floats; refused where a value is beyond their range, and nothing is lost");
     auto* png = command.add_option("--png", options.png, "Also write an 8-bit sRGB picture");
     command.add_option("--exposure", options.exposure, "Stops by which the picture is brightened (the EXR never is)")
-        ->check(CLI::Range(-30.0, 30.0))->needs(png);
+        ->check(number_between(-30.0, 30.0))->needs(png);
 }
 
 void add_output_settings(CLI::App& command, JobOptions& options) {
@@ -49,7 +46,7 @@ void add_output_settings(CLI::App& command, JobOptions& options) {
                     ->check(CLI::Range(1u, 1u << 24));
     command.add_option("--time", options.time_seconds,
                        "Stop after this many seconds of rendering, at a boundary that --spp can reproduce")
-        ->check(CLI::Range(0.001, 30 * 86400.0))->excludes(spp);
+        ->check(number_between(0.001, 30 * 86400.0))->excludes(spp);
     command.add_option("--json", options.json, "Write statistics to this file");
     command.add_flag("-q,--quiet", options.quiet, "No progress; errors only");
     command.add_flag("--strict", options.strict,
@@ -96,6 +93,10 @@ Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
     spec.samples_per_pixel = options.samples_per_pixel;
     if (spec.samples_per_pixel == 0 && spec.time_limit_seconds == 0)
         spec.samples_per_pixel = uint32_t(std::max(1, scene.imported.description.samples_per_pixel));
+    if (spec.samples_per_pixel > JobSpec::kMaxSamplesPerPixel)
+        return invalid_argument(options.scene + ": its sampler asks for " + std::to_string(spec.samples_per_pixel) +
+                                " samples per pixel, more than the " + std::to_string(JobSpec::kMaxSamplesPerPixel) +
+                                " of a job; give --spp");
     spec.max_depth = options.max_depth;
     spec.first_hit_layers = options.layers;
     if (!options.resolution.empty()) {

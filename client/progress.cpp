@@ -119,7 +119,7 @@ void Progress::show(const JobInfo& job) {
         std::fflush(stderr);
         open_ = true;
     } else if (job.state == JobState::kPreparing &&
-               (new_phase || (job.phase_total > 0 && waited >= kPlainInterval))) {
+               (new_phase || (waited >= kPlainInterval && (job.phase_total > 0 || job.eta_seconds >= 0)))) {
         last_ = now;
         std::fprintf(stderr, "%s\n", phase_line(job).c_str());
     } else if (new_state && job.state == JobState::kRunning && job.tables.asset.size_bytes > 0) {

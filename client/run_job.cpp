@@ -22,6 +22,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
 
+constexpr const char* kFloatInstead = ".float.exr";  ///< Where halves cannot hold a rendered image.
+
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 std::string random_id() {
@@ -120,13 +122,16 @@ std::stop_token interrupt_token() {
     return source.get_token();
 }
 
-Status check_outputs(const JobOptions& options) {
+Status check_outputs(const JobOptions& options, const char* beside) {
     const std::filesystem::path output = output_path(options);
-    std::filesystem::path manifest = output;
-    manifest.replace_extension(".manifest.json");
+    const auto with = [&](const char* extension) { return std::filesystem::path(output).replace_extension(extension).string(); };
     std::vector<std::filesystem::path> taken;
     if (!options.scene.empty()) taken.push_back(options.scene);
-    for (const std::string& path : {output.string(), manifest.string(), options.png, options.json}) {
+    std::error_code unknown;
+    if (std::filesystem::is_other(std::filesystem::status(output, unknown)))
+        return invalid_argument(output.string() + ": is a device or a pipe, beside which no manifest can lie; give a file name");
+    for (const std::string& path :
+         {output.string(), with(beside), options.half ? with(kFloatInstead) : std::string(), options.png, options.json}) {
         if (path.empty()) continue;
         std::error_code ignored;
         const auto status = std::filesystem::status(path, ignored);
@@ -186,7 +191,7 @@ Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool
     if (status.code() == StatusCode::kCancelled) {
         if (cancel_on_interrupt) {
             const auto cancelled = port.cancel_job(job_id);
-            if (!cancelled.ok()) return cancelled.status();
+            if (!cancelled.ok() || cancelled->state == JobState::kSucceeded) return cancelled;  // it had just ended
         }
         return Status(StatusCode::kCancelled,
                       "interrupted; job " + job_id + (cancel_on_interrupt ? " was cancelled" : " goes on"));
@@ -217,7 +222,7 @@ int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTi
             return report_error(failed_precondition(halves.status().message() + "; nothing is lost: `lightloom fetch " +
                                                     job.job_id + "` without --half writes it as float"));
         } else {
-            output.replace_extension(".float.exr");
+            output.replace_extension(kFloatInstead);
             half_refused = failed_precondition(halves.status().message() +
                                                "; so that nothing is lost it was written as float to " + output.string());
         }

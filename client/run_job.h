@@ -17,8 +17,8 @@ struct ClientTimes {
 };
 
 /// Whether the files that options ask for can be written, tried out with empty ones: a typing error in -o must show before
-/// hours of rendering, not after them.
-Status check_outputs(const JobOptions& options);
+/// hours of rendering, not after them. `beside` replaces the image's extension in the name of what describes it.
+Status check_outputs(const JobOptions& options, const char* beside = ".manifest.json");
 /// Sends what the coordinator lacks of the scene's files.
 Status upload_scene(JobPort& port, const LocalScene& scene);
 /// Submits under a fresh request id.

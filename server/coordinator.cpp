@@ -297,8 +297,11 @@ JobInfo Coordinator::snapshot(const JobRecord& job) const {
     if (job.phase == PreparePhase::kLearning && job.state == JobState::kPreparing) {
         info.phase_total = kLearningSteps;
         info.phase_done = uint64_t(kLearningSteps * job.learned_share);
-        if (job.learned_share > 0)
-            info.eta_seconds = seconds_between(job.learning_begin, now) * (1 - job.learned_share) / job.learned_share;
+        if (job.learned_share > 0) {
+            const double took = seconds_between(job.learning_begin, job.learned_share_at);
+            info.eta_seconds = std::max(0.0, took * (1 - job.learned_share) / job.learned_share -
+                                                 seconds_between(job.learned_share_at, now));
+        }
     } else if (job.training) {
         info.unit_leased = job.training->leased_count();
         const TrainingWork& work = job.training_work;

@@ -124,6 +124,8 @@ class Coordinator {
     Status prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait);
     std::shared_ptr<JobRecord> find_maker(const JobRecord& job) const;
     void resume_waiting(const std::shared_ptr<JobRecord>& job);
+    /// changed(), for those as well that wait for this job's tables.
+    void prepared_further(JobRecord& job);
     Status take_over_tables(JobRecord& job);
     void open_training(JobRecord& job, UnitKind kind, const TrainingWork& work);
     Status finish_tables(JobRecord& job, const JobSpec& spec, const SubspaceTables& tables, const TrainingReport& report,

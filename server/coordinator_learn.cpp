@@ -84,8 +84,10 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
         TrainingReport report;
         const auto progress = [&](double share) {
             const std::lock_guard lock(mutex_);
+            if (job.state != JobState::kPreparing) return;
             job.learned_share = share;
-            changed(job);
+            job.learned_share_at = options_.clock();
+            prepared_further(job);
         };
         const auto tables = train_tables(*data, emitters, parameters->training, {stop, progress}, &report);
         if (!tables.ok()) return tables.status();

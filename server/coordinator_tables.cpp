@@ -118,6 +118,12 @@ void Coordinator::resume_waiting(const std::shared_ptr<JobRecord>& job) {
                [this, &record](std::stop_token) { return take_over_tables(record); });
 }
 
+void Coordinator::prepared_further(JobRecord& job) {
+    changed(job);
+    for (const auto& other : jobs_)
+        if (other->maker.get() == &job) changed(*other);
+}
+
 Status Coordinator::take_over_tables(JobRecord& job) {
     JobSpec spec;
     SceneFacts facts;
@@ -254,7 +260,7 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
     }
     job->training_parts[reference.key.group] = {*std::move(data), payload.size(), trace_seconds};
     job->traced_seconds += trace_seconds;
-    changed(*job);
+    prepared_further(*job);
     work_changed_.notify_all();
     return SubmitAck{SubmitOutcome::kAccepted, {}};
 }

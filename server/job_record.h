@@ -75,6 +75,7 @@ struct Coordinator::JobRecord {
     std::shared_ptr<JobRecord> maker;   ///< Makes the same tables; this job waits for them.
     TimePoint training_begin;           ///< The first training unit was leased; unset before.
     TimePoint learning_begin;           ///< Of the phase kLearning.
+    TimePoint learned_share_at;         ///< When `learned_share` was last heard of.
     double learned_share = 0;           ///< Of that phase, about.
     TablesInfo tables;
     Digest tables_asset;                ///< Of the tables that the job names, or is about to; zero before.

@@ -7,6 +7,8 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -17,6 +19,7 @@
 #include "common/work/identity.h"
 #include "server/data_lock.h"
 #include "server/grpc_services.h"
+#include "server/host_port.h"
 #include "server/local_ports.h"
 #include "server/scene_reader.h"
 #include "server/status_http.h"
@@ -38,11 +41,6 @@ Connections are plain text without authentication, so other than loopback addres
 in a network in which everybody may render.
 
 Exit codes: 0 stopped as asked, 1 failed to start, 2 bad command line.)";
-
-bool is_loopback(const std::string& address) {
-    return address.starts_with("127.") || address.starts_with("localhost:") || address.starts_with("[::1]:") ||
-           address.starts_with("unix:");
-}
 
 /// A worker inside of the coordinator's process. Ends, after the unit in work, with its owner.
 class OwnWorker {
@@ -86,12 +84,15 @@ int main(int argc, char** argv) {
                    "such job) and the table cache (tables/)")->capture_default_str();
     app.add_option("--status", status, "HOST:PORT of the status page (/healthz, /api/v1/status), or off")->capture_default_str();
     app.add_option("--lease", lease, "Seconds without a heartbeat after which a unit goes to another worker")
-        ->check(CLI::Range(0.2, 3600.0))->capture_default_str();
+        ->check(CLI::Range(0.2, 3600.0))->capture_default_str()
+        ->check([](const std::string& text) {  // which a range lets pass
+            return std::isnan(std::strtod(text.c_str(), nullptr)) ? "\"" + text + "\" is not a number" : std::string();
+        });
     app.add_option("--threads", threads, "Threads with which the coordinator itself traces and renders; 0 leaves that to workers")
         ->check(CLI::Range(0, 1024))->capture_default_str();
     app.add_option("--table-cache-size", table_cache_mb,
                    "MB of the table cache: learned tables that later jobs find again, also after a restart; those used "
-                   "least recently go first; 0 keeps none")->capture_default_str();
+                   "least recently go first; 0 keeps none")->check(CLI::Range(uint64_t(0), uint64_t(1) << 30))->capture_default_str();
     app.add_option("--port-file", port_file, "Write \"GRPC_PORT STATUS_PORT\" here once both listen");
     app.add_flag("--allow-plaintext", plaintext, "Listen on other than loopback addresses");
     app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
@@ -105,9 +106,17 @@ int main(int argc, char** argv) {
         std::cerr << "unknown log level \"" << level << "\"\n";
         return 2;
     }
-    if (!plaintext && !(is_loopback(listen) && (status == "off" || is_loopback(status)))) {
-        std::cerr << "refusing to listen beyond loopback without --allow-plaintext: connections have no protection\n";
-        return 2;
+    for (const auto& [option, address] : {std::pair{"--listen", &listen}, {"--status", &status}}) {
+        if (address == &status && status == "off") continue;
+        const auto parsed = parse_host_port(*address, option);
+        if (!parsed.ok()) {
+            std::cerr << parsed.status().message() << '\n';
+            return 2;
+        }
+        if (!plaintext && !is_loopback(*parsed)) {
+            std::cerr << "refusing to listen beyond loopback without --allow-plaintext: connections have no protection\n";
+            return 2;
+        }
     }
     sigset_t signals;
     sigemptyset(&signals);

@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "server/host_port.h"
+
 namespace lightloom {
 namespace {
 
@@ -156,18 +158,11 @@ StatusHttp::~StatusHttp() {
 int StatusHttp::port() const { return impl_->acceptor.local_endpoint().port(); }
 
 Result<std::unique_ptr<StatusHttp>> StatusHttp::start(const Coordinator& coordinator, const std::string& address) {
-    const size_t colon = address.rfind(':');
-    if (colon == std::string::npos) return invalid_argument("a status address is HOST:PORT, not \"" + address + "\"");
-    std::string host = address.substr(0, colon);
-    if (host == "localhost") host = "127.0.0.1";
-    if (host.size() > 1 && host.front() == '[') host = host.substr(1, host.size() - 2);
+    const auto parsed = parse_host_port(address, "--status");
+    if (!parsed.ok()) return parsed.status();
     auto impl = std::make_unique<Impl>(coordinator);
     beast::error_code error;
-    const auto ip = asio::ip::make_address(host, error);
-    const int port = std::atoi(address.c_str() + colon + 1);
-    if (error || port < 0 || port > 65535)
-        return invalid_argument("a status address is a literal address and a port, not \"" + address + "\"");
-    const tcp::endpoint endpoint(ip, uint16_t(port));
+    const tcp::endpoint endpoint(asio::ip::make_address(parsed->host == "localhost" ? "127.0.0.1" : parsed->host), parsed->port);
     impl->acceptor.open(endpoint.protocol(), error);
     if (!error) impl->acceptor.set_option(asio::socket_base::reuse_address(true), error);
     if (!error) impl->acceptor.bind(endpoint, error);

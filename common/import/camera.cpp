@@ -23,6 +23,8 @@ void check_camera(const ParameterList& p, const PerspectiveCamera& camera) {
         if (!usable(scale))
             fail(p.where(), p.what() + ": its transformation scales by less than 1e-15 or more than 1e15; remove the scale");
     }
+    if (!keeps_angles(camera.camera_to_world))
+        fail(p.where(), p.what() + ": its transformation shears or scales axes differently; use fov or screenwindow instead");
     // Steeper rays than this come from no pixel of a usable picture, and the renderer takes them for sideways ones.
     constexpr double kSteepest = 1e6;
     if (camera.lens_radius > 0) {

@@ -18,6 +18,8 @@ Result<ImportedScene> import_from(FileSource* files, const std::string& name, co
                                  "the picture is a little sharper");
     resolve_shapes(&context);
     context.scene.film.exposure_scale = context.exposure_time * context.iso / 100;
+    if (!(context.scene.film.exposure_scale >= 0 && context.scene.film.exposure_scale <= kMaxCoordinate))
+        fail(main, "iso and the shutter's time multiply the picture by more than 1e15; lower them");
     LL_RETURN_IF_ERROR(validate(context.scene));
     context.scene.warnings = context.diagnostics.messages();
     return ImportedScene{std::move(context.scene), files->files()};

@@ -21,9 +21,7 @@ Result<Camera> Camera::create(const PerspectiveCamera& source, int width, int he
     c.up_ = column(1) / sy;
     c.forward_ = column(2) / sz;
     c.position_ = column(3);
-    const float tolerance = 1e-4f;
-    if (std::fabs(sx / sz - 1) > tolerance || std::fabs(sy / sz - 1) > tolerance || abs_dot(c.right_, c.up_) > tolerance ||
-        abs_dot(c.right_, c.forward_) > tolerance || abs_dot(c.up_, c.forward_) > tolerance)
+    if (!keeps_angles(source.camera_to_world))
         return invalid_argument("the camera transformation must not shear or scale axes differently; use fov or screenwindow");
     c.width_ = width;
     c.height_ = height;

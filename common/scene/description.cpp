@@ -68,6 +68,16 @@ struct Checker {
 
 }  // namespace
 
+bool keeps_angles(const Mat4& transformation) {
+    const auto& m = transformation.m;
+    const auto column = [&](int j) { return Vec3{float(m[0][j]), float(m[1][j]), float(m[2][j])}; };
+    const float sx = length(column(0)), sy = length(column(1)), sz = length(column(2));
+    const Vec3 x = column(0) / sx, y = column(1) / sy, z = column(2) / sz;
+    constexpr float kTolerance = 1e-4f;
+    return std::fabs(sx / sz - 1) <= kTolerance && std::fabs(sy / sz - 1) <= kTolerance && abs_dot(x, y) <= kTolerance &&
+           abs_dot(x, z) <= kTolerance && abs_dot(y, z) <= kTolerance;
+}
+
 Status validate(const SceneDescription& description) {
     const Checker checker{description};
     for (const TriangleMesh& m : description.meshes) LL_RETURN_IF_ERROR(checker.mesh(m, true));

@@ -174,8 +174,12 @@ struct SceneDescription {
     std::vector<std::string> warnings;  ///< Named warnings: "file:line: what was ignored and why that matters".
 };
 
-/// What rendering relies on: indices in range, finite numbers, areas within single precision, invertible matrices.
-/// kInvalidArgument names the first shape that breaks it, with its place in the scene file. import_pbrt() and Scene::build() check it.
+/// What rendering relies on in shapes, instances, and the strength of area and infinite lights: indices in range, finite numbers,
+/// areas within single precision, invertible matrices. kInvalidArgument names the first that breaks it, a shape with its place in the
+/// scene file. import_pbrt() and Scene::build() check it; everything else is the importer's to guarantee.
 Status validate(const SceneDescription& description);
+
+/// Whether a transformation is made of rotations, translations, reflections and one scale for all axes, as a camera's must be.
+bool keeps_angles(const Mat4& transformation);
 
 }  // namespace lightloom

@@ -269,6 +269,7 @@ std::vector<float> train_adam(const GammaDataset& data, const GammaOptions& opti
         for (size_t begin = 0; begin < order.size(); begin += kBatch) {
             if (options.stop.stop_requested()) return b;
             const size_t end = std::min(order.size(), begin + kBatch);
+            if (options.progress) options.progress((epoch + double(begin) / double(order.size())) / kEpochs);
             problem.gradient(b, &order[begin], order.data() + end, &g);
             power1 *= kBeta1, power2 *= kBeta2;
             const double scale = 1 / double(end - begin);

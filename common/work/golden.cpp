@@ -37,6 +37,13 @@ struct GoldenBuilder {
         scene.images.push_back(std::move(i));
         return int32_t(scene.images.size() - 1);
     }
+    /// Stores an image as 8-bit files are: codes, and what each of them means.
+    void code(int32_t index) {
+        Image& i = scene.images[size_t(index)];
+        for (size_t c = 0; c < i.decode.size(); ++c) i.decode[c] = float(c * c) / (255.0f * 255.0f);
+        for (const float value : i.floats) i.bytes.push_back(uint8_t(value * 255));
+        i.floats.clear();
+    }
     /// A parallelogram from p0 along a and b; its normal is cross(a, b).
     static TriangleMesh parallelogram(Vec3 p0, Vec3 a, Vec3 b, MaterialId m, int32_t emission = kNone) {
         TriangleMesh mesh;
@@ -97,8 +104,11 @@ SceneDescription golden_courtyard() {
     const TextureId white = g.constant(Rgb(0.7f)), tenth = g.constant(Rgb(0.1f)), third = g.constant(Rgb(0.3f));
     const auto texel = [](int x, int y, int c) { return 0.1f + 0.1f * float((3 * x + 5 * y + 7 * c) % 8); };
     const TextureId picture = g.texture({.kind = TextureKind::kImage, .image = g.image(8, 3, texel), .scale = 0.9f, .su = 3, .sv = 2});
-    const TextureId grille = g.texture({.kind = TextureKind::kImage, .image = g.image(4, 1, texel), .wrap = WrapMode::kClamp,
-                                        .invert = true});
+    const int32_t coded = g.image(4, 1, texel);
+    g.code(coded);
+    const TextureId grille =
+        g.texture({.kind = TextureKind::kImage, .image = coded, .wrap = WrapMode::kClamp, .nearest = true, .invert = true});
+    const TextureId label = g.texture({.kind = TextureKind::kImage, .image = coded, .wrap = WrapMode::kBlack, .su = 2, .sv = 2});
     const TextureId blend = g.texture({.kind = TextureKind::kMix, .a = picture, .b = g.constant({0.2f, 0.5f, 0.3f}), .amount = third});
     const TextureId shade = g.texture({.kind = TextureKind::kScale, .a = blend, .b = white});
 
@@ -108,8 +118,10 @@ SceneDescription golden_courtyard() {
     const MaterialId varnish = g.material({.kind = MaterialKind::kCoatedConductor, .eta = g.constant({0.2f, 0.9f, 1.1f}),
                                            .k = g.constant({3.9f, 2.4f, 2.2f}), .roughness_u = tenth, .roughness_v = tenth,
                                            .base_roughness_u = third, .base_roughness_v = tenth});
+    const MaterialId poster = g.material({.kind = MaterialKind::kDiffuse, .reflectance = label});
     const MaterialId copper = g.material({.kind = MaterialKind::kConductor, .eta = g.constant({0.2f, 0.9f, 1.1f}),
-                                          .k = g.constant({3.9f, 2.4f, 2.2f}), .roughness_u = third, .roughness_v = tenth});
+                                          .k = g.constant({3.9f, 2.4f, 2.2f}), .roughness_u = third, .roughness_v = tenth,
+                                          .remap_roughness = false});
     const MaterialId frosted = g.material({.kind = MaterialKind::kDielectric, .roughness_u = tenth, .roughness_v = tenth, .ior = 1.4f});
     const MaterialId pane = g.material({.kind = MaterialKind::kThinDielectric, .ior = 1.5f});
     const MaterialId patina = g.material({.kind = MaterialKind::kMix, .mix_a = copper, .mix_b = lacquer, .mix_amount = third});
@@ -118,9 +130,16 @@ SceneDescription golden_courtyard() {
     g.scene.emissions.push_back({.radiance = {2, 3, 4}, .two_sided = true});
     g.quad({-2, 0, -2}, {0, 0, 4}, {4, 0, 0}, ground);
     g.quad({-2, 0, 2}, {0, 2.5f, 0}, {4, 0, 0}, lacquer);
+    // Normals that are not those of the plane, and one that points to the other side.
+    g.scene.meshes.back().normals = {normalize(Vec3{-0.3f, 0, -1}), normalize(Vec3{-0.3f, 0.2f, -1}),
+                                     normalize(Vec3{0.3f, 0.2f, -1}), normalize(Vec3{0.3f, 0, -1})};
+    g.quad({-1.2f, 0.1f, 1.6f}, {0.8f, 0, 0}, {0, 0.8f, 0.1f}, poster);
+    g.scene.meshes.back().attributes.flip_normal = true;
     g.quad({0.6f, 0, -0.3f}, {0.8f, 0, 0.4f}, {0, 1.4f, 0}, pane);
     g.quad({-1.6f, 0.4f, 0.2f}, {0, 1, 0}, {0.3f, 0, 0.8f}, ground, 1);
     g.sphere({-0.7f, 0.45f, 0}, 0.45f, varnish);
+    g.sphere({-0.1f, 1.3f, 0.9f}, 0.3f, ground);
+    g.scene.spheres.back().orientation = Frame(normalize(Vec3{0.5f, 1, 0.3f}));
     g.sphere({0.3f, 0.3f, -0.6f}, 0.3f, frosted);
     g.sphere({0.9f, 1.8f, 0.6f}, 0.15f, ground, 0);
     g.scene.objects.push_back({.name = "screen", .meshes = {}, .spheres = {}});
@@ -139,6 +158,7 @@ SceneDescription golden_courtyard() {
     g.scene.spot_lights.push_back(spot);
     g.scene.distant_lights.push_back({normalize(Vec3{0.4f, -1, 0.3f}), {0.4f, 0.35f, 0.3f}});
     g.scene.infinite_lights.push_back({rotation(40, 1, 0, 0), Rgb(0.6f), g.image(16, 3, texel)});
+    g.scene.infinite_lights.push_back({rotation(0, 1, 0, 0), {0.05f, 0.06f, 0.08f}, kNone});
 
     g.scene.camera.camera_to_world = *inverse(*look_at({0.2f, 1.2f, -3}, {0, 0.7f, 0}, {0, 1, 0}));
     g.scene.camera.fov_degrees = 55;

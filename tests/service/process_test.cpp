@@ -274,7 +274,17 @@ TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
     EXPECT_EQ(run({"render", kScene, "--algorithm", "no-such"}), 2);
     EXPECT_EQ(run({"render", kScene, "--set", "no-such=1"}), 2);
     EXPECT_EQ(run({"render", kScene, "--set", "rr-min=1", "--set", "rr-min=0.5"}), 2);
-    EXPECT_EQ(run({"render", kScene, "--seed", "-1"}), 2);
+    for (const char* seed : {"-1", " -1", "010", "18446744073709551616", "1.5"})
+        EXPECT_EQ(run({"render", kScene, "--seed", seed}), 2) << seed;
+    EXPECT_EQ(run({"render", kScene, "--time", "nan"}), 2);
+    EXPECT_EQ(run({"render", kScene, "-o", "/dev/null"}), 2) << "where would its manifest go?";
+    EXPECT_EQ(run({"reference", kScene, "--spp", "1", "-o", "own.json"}), 2) << "its description would take its place";
+    EXPECT_EQ(run({"replay", kScene, "--pixel", "1,1", "--iteration", "5", "--spp", "2"}), 2);
+    const auto serve = [&](std::vector<std::string> arguments) { return Process("lightloom-server", arguments, log).wait(); };
+    EXPECT_EQ(serve({"--listen", "127.0.0.1"}), 2);
+    EXPECT_EQ(serve({"--status", "127.0.0.1:94x"}), 2);
+    EXPECT_EQ(serve({"--listen", "0.0.0.0:0"}), 2) << "beyond loopback";
+    EXPECT_EQ(serve({"--lease", "nan"}), 2);
     EXPECT_EQ(run({"render", kScene, "--resolution", "12"}), 2);
     EXPECT_EQ(run({"render", kScene, "--spp", "1", "--time", "1"}), 2);
     EXPECT_EQ(run({"render", kScene, "--exposure", "1"}), 2) << "of which picture?";

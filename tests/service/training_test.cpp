@@ -168,7 +168,9 @@ TEST(Tables, AnEqualJobWaitsForThemInsteadOfTrainingToo) {
     EXPECT_EQ(held.size(), 3u) << "of the first only";
     for (const auto& [worker, lease] : held) {
         EXPECT_EQ(lease.job_id, first);
+        const uint64_t before = service.coordinator->get_job(second)->revision;
         EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
+        EXPECT_GT(service.coordinator->get_job(second)->revision, before) << "who watches it sees how far the other is";
     }
     const auto running = [](const JobInfo& j) { return j.state == JobState::kRunning; };
     const JobInfo made = service.wait(first, running), taken = service.wait(second, running);

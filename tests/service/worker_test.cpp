@@ -8,6 +8,7 @@
 
 #include "client/grpc_job_port.h"
 #include "server/grpc_services.h"
+#include "server/host_port.h"
 #include "server/status_http.h"
 #include "tests/service/fake.h"
 #include "tests/service/forwarding_port.h"
@@ -162,6 +163,15 @@ TEST(StatusPage, AnswersGetAndSurvivesNonsense) {
     EXPECT_EQ(http(status->port(), "\x01\x02nonsense\r\n\r\n").find("200"), std::string::npos);
     EXPECT_NE(get("/healthz").find("200 OK"), std::string::npos);
     EXPECT_EQ(StatusHttp::start(*service.coordinator, "nonsense").status().code(), StatusCode::kInvalidArgument);
+}
+
+TEST(Addresses, AreHostsAndPortsAndNothingElse) {
+    for (const char* wrong : {"", "127.0.0.1", "127.0.0.1:", "127.0.0.1:65536", "127.0.0.1:-1", "127.0.0.1:8x", "::1:80", "[127.0.0.1]:80",
+                              "127.example:80", "[localhost]:80"})
+        EXPECT_FALSE(parse_host_port(wrong, "--x").ok()) << wrong;
+    for (const auto& [text, loopback] : {std::pair{"127.0.0.1:0", true}, {"localhost:65535", true}, {"[::1]:80", true}, {"127.1.2.3:80", true},
+                                         {"0.0.0.0:80", false}, {"[::]:80", false}, {"10.0.0.1:80", false}})
+        EXPECT_EQ(is_loopback(*parse_host_port(text, "--x")), loopback) << text;
 }
 
 TEST(Workers, AStoppedWorkerFinishesOrReleasesAndOthersGoOn) {

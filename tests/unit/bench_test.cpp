@@ -153,6 +153,11 @@ TEST(BenchHistory, ATornLastLineIsIgnoredWhereverItIsCut) {
     EXPECT_EQ(parse_history(whole + last.substr(0, last.size() - 1), "f", {"a", "b"})->kept, whole + last);
 }
 
+TEST(BenchHistory, AFileOfSomethingElseIsLeftAlone) {
+    for (const std::string text : {"my only notes\n", "my only notes", "{\"run\":\n", "{}\n"})
+        EXPECT_EQ(parse_history(text, "notes", {"a"}).status().code(), StatusCode::kInvalidArgument) << text;
+}
+
 TEST(BenchHistory, DamageElsewhereIsNamed) {
     for (const std::string damaged : {"{\"run\":\"a\",", "[]", "17", "{\"done\":true}", "{\"run\":3}"}) {
         const auto history = parse_history("{\"run\":\"a\"}\n" + damaged + "\n{\"run\":\"a\"}\n", "runs.jsonl", {"a"});

@@ -252,6 +252,9 @@ TEST(ImportOptions, CamerasStayWithinSinglePrecision) {
     refused("position", "", "Translate 0 0 1e16");
     refused("scales", "", "Scale 1e-17 1e-17 1e-17");
     refused("scales", "", "Scale 1e17 1e17 1e17");
+    refused("shears", "", "Scale 1 2 1");
+    refused("shears", "", "Transform [1 0 0 0  0.5 1 0 0  0 0 1 0  0 0 0 1]");
+    EXPECT_TRUE(camera("", "Rotate 30 1 2 3 Scale -2 2 2").ok());
     for (const std::string window : {"-1e20 1e20 -1 1", "-1 1 -1e20 1e20", "-1e-20 1e-20 -1 1", "-1 1 1e7 2e7"})
         refused("screenwindow", "\"float screenwindow\" [" + window + "]");
     refused("frameaspectratio", "\"float frameaspectratio\" 1e20");

@@ -1,0 +1,23 @@
+#pragma once
+// Addresses of the command line: HOST:PORT, with [::1] for IPv6.
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "common/core/result.h"
+
+namespace lightloom {
+
+struct HostPort {
+    std::string host;  ///< A literal address or "localhost"; without brackets.
+    uint16_t port = 0; ///< 0: any free one.
+};
+
+/// kInvalidArgument where `text` is anything else; `option` is named in the message.
+Result<HostPort> parse_host_port(std::string_view text, std::string_view option);
+
+/// Whether only processes of this host can reach it.
+bool is_loopback(const HostPort& address);
+
+}  // namespace lightloom
