@@ -102,9 +102,10 @@ Result<Parts> split(std::string_view bytes) {
 }  // namespace
 
 Digest table_key(const BuildIdentity& identity, const JobSpec& spec) {
-    std::string text = "lightloom-tables-key 1\n";
+    std::string text = "lightloom-tables-key 2\n";
     put(text, "build", identity.build_id);
     put(text, "profile", identity.math_profile);
+    put(text, "golden", identity.golden_digest.hex());  // builds of the same sources that compute otherwise
     put(text, "algorithm", spec.algorithm);
     for (const auto& [name, value] : spec.parameters) put(text, "set " + name, value);
     put(text, "seed", std::to_string(spec.seed));

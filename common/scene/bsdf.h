@@ -16,6 +16,7 @@
 
 #include "common/core/math.h"
 #include "common/core/vec.h"
+#include "common/scene/sampling.h"
 
 namespace lightloom {
 
@@ -86,13 +87,6 @@ struct Bsdf {
     bool sample_other(const Vec3& wo, float lobe, Vec2 u, TransportMode mode, BsdfSample* out) const;
 };
 static_assert(std::is_trivially_copyable_v<Bsdf> && sizeof(Bsdf) <= 112);
-
-/// Cosine-distributed unit vector around +z (density cos / pi) from `u` in [0,1)^2.
-inline Vec3 sample_cosine_hemisphere(Vec2 u) {
-    const math::SinCos azimuth = math::sincos_turns(u.x);
-    const float radius = std::sqrt(u.y);
-    return {radius * float(azimuth.cos), radius * float(azimuth.sin), std::sqrt(1 - u.y)};
-}
 
 /// Lambertian, on whichever side wo is. Albedo per channel, clamped to [0, 1] as in pbrt.
 Bsdf make_diffuse(const Rgb& reflectance);

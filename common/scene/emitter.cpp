@@ -108,7 +108,7 @@ bool EmitterSet::sample_emission(double pick, Vec2 u_position, Vec2 u_direction,
                 out->position = e.position + n * e.radius;
                 out->normal = e.inward ? -n : n;
             }
-            Vec3 local = sample_cosine_hemisphere(u_direction);
+            Vec3 local = sample_cosine_hemisphere_concentric(u_direction);
             if (e.two_sided && rest < 0.5f) local.z = -local.z;
             out->direction = Frame(out->normal).to_world(local);
             break;

@@ -72,7 +72,7 @@ Vec3 sample_sphere(Vec2 u) {
     return {r * float(sc.cos), r * float(sc.sin), z};
 }
 
-Vec3 sample_cosine_hemisphere(Vec2 u) {
+Vec3 sample_cosine_hemisphere_concentric(Vec2 u) {
     const Vec2 d = sample_disk(u);
     return {d.x, d.y, safe_sqrt(1 - d.x * d.x - d.y * d.y)};
 }

@@ -1,6 +1,7 @@
 #pragma once
 // Discrete and warped sampling that several emitters share.
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -48,8 +49,14 @@ class AliasTable {
 Vec2 sample_disk(Vec2 u);
 /// Uniform on the unit sphere; density 1 / (4 pi).
 Vec3 sample_sphere(Vec2 u);
-/// Cosine-weighted on the upper hemisphere (z up); density cos / pi.
-Vec3 sample_cosine_hemisphere(Vec2 u);
+/// Cosine-weighted on the upper hemisphere (z up); density cos / pi. `u` in [0, 1)^2, polar mapping.
+inline Vec3 sample_cosine_hemisphere(Vec2 u) {
+    const math::SinCos azimuth = math::sincos_turns(u.x);
+    const float radius = std::sqrt(u.y);
+    return {radius * float(azimuth.cos), radius * float(azimuth.sin), std::sqrt(1 - u.y)};
+}
+/// The same through sample_disk(), which tears neighbours apart less: for points that are stratified.
+Vec3 sample_cosine_hemisphere_concentric(Vec2 u);
 /// Uniform barycentric weights (b1, b2) of a triangle.
 Vec2 sample_triangle(Vec2 u);
 

@@ -221,7 +221,7 @@ TEST(Processes, TablesAreKeptForTheNextRenderAndCanBeInspected) {
     for (const char* picture : {"-kappa-eye.png", "-kappa-light.png", "-gamma.png", "-q.png"})
         EXPECT_TRUE(read_file(service.path("seen") + picture)->starts_with("\x89PNG")) << picture;
     std::ofstream(file, std::ios::app) << "x";
-    EXPECT_EQ(Process("lightloom", {"inspect", kScene, "--quiet", "--tables", file}, service.path("damaged.log")).wait(), 1);
+    EXPECT_EQ(Process("lightloom", {"inspect", kScene, "--quiet", "--tables", file}, service.path("damaged.log")).wait(), 2);
     EXPECT_EQ(embedded(service, 1, 2, job), first) << "damaged tables are made again";
     EXPECT_FALSE(Json::parse(*read_file(service.path("statistics.json")))["tables"]["from_cache"].get<bool>());
 }

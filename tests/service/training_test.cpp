@@ -279,6 +279,7 @@ TEST(TableCache, EachPartOfTheKeyMatters) {
     };
     changed([](BuildIdentity& i, JobSpec&) { i.build_id += "x"; });
     changed([](BuildIdentity& i, JobSpec&) { i.math_profile += "x"; });
+    changed([](BuildIdentity& i, JobSpec&) { i.golden_digest = sha256("other"); });
     changed([](BuildIdentity&, JobSpec& s) { s.algorithm = "lvcbpt"; });
     changed([](BuildIdentity&, JobSpec& s) { s.seed = 1; });
     changed([](BuildIdentity&, JobSpec& s) { s.max_depth = 6; });
