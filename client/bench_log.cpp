@@ -74,7 +74,7 @@ Result<BenchHistory> parse_history(std::string_view text, const std::string& fil
         Json json = Json::parse(line, nullptr, false);
         const auto run = json.is_object() ? json.find("run") : json.end();
         if (!json.is_object() || run == json.end() || !run->is_string()) {
-            if (!whole && line.starts_with('{')) break;  // what a killed benchmark was writing
+            if (!whole && line.starts_with('{') && json.is_discarded()) break;  // what a killed benchmark was writing
             return invalid_argument(file_name + ":" + std::to_string(number) +
                                     ": not a line of a benchmark; repair the file or give another name");
         }

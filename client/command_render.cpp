@@ -60,6 +60,7 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, c
     if (!scene.ok()) return report_error(scene.status());
     const auto spec = make_spec(options, *scene);
     if (!spec.ok()) return report_error(spec.status());
+    if (Status s = check_bound(options, *spec); !s.ok()) return report_error(s);
     const auto facts = scene_facts(scene->imported.description, *spec);
     if (!facts.ok()) return report_error(facts.status());
     const ScratchDirectory scratch;

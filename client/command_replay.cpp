@@ -6,6 +6,7 @@
 
 #include "client/commands.h"
 #include "client/job_options.h"
+#include "client/validators.h"
 #include "common/scene/scene.h"
 #include "common/transport/renderer.h"
 #include "common/transport/training.h"
@@ -130,7 +131,7 @@ void add_replay_command(CLI::App& app, int* exit_code) {
     command->footer(kFooter);
     add_render_settings(*command, options->job);
     auto* iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, from 0")
-                          ->check(CLI::Range(uint64_t(0), uint64_t(JobSpec::kMaxSamplesPerPixel - 1)));
+                          ->check(whole_number())->check(CLI::Range(uint64_t(0), uint64_t(JobSpec::kMaxSamplesPerPixel - 1)));
     auto* pixel = command->add_option("--pixel", options->pixel, "X,Y in full-frame pixels, 0,0 at the top left")
                       ->expected(2)->delimiter(',');
     auto* unit = command->add_option("--unit", options->unit, "GROUP,TILE: the whole unit instead of one sample")

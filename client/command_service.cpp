@@ -54,6 +54,7 @@ int submit_job(const ServiceOptions& options) {
     if (!scene.ok()) return report_error(scene.status());
     const auto spec = make_spec(options.job, *scene);
     if (!spec.ok()) return report_error(spec.status());
+    if (Status s = check_bound(options.job, *spec); !s.ok()) return report_error(s);
     ClientTimes times{.import_seconds = scene->import_seconds, .digest_seconds = scene->digest_seconds};
     auto begin = std::chrono::steady_clock::now();
     if (Status s = upload_scene(port, *scene); !s.ok()) return service_error(options, s);

@@ -1,5 +1,6 @@
 #include "client/job_options.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 
@@ -43,7 +44,7 @@ void add_output_settings(CLI::App& command, JobOptions& options) {
     add_image_settings(command, options);
     command.add_flag("--layers", options.layers, "Also store albedo, normal and depth of what the camera sees first");
     auto* spp = command.add_option("--spp", options.samples_per_pixel, "Samples per pixel (default: the scene's)")
-                    ->check(CLI::Range(1u, 1u << 24));
+                    ->check(whole_number())->check(CLI::Range(1u, 1u << 24));
     command.add_option("--time", options.time_seconds,
                        "Stop after this many seconds of rendering, at a boundary that --spp can reproduce")
         ->check(number_between(0.001, 30 * 86400.0))->excludes(spp);
@@ -73,6 +74,12 @@ Result<LocalScene> load_scene(const JobOptions& options) {
     return scene;
 }
 
+Status check_bound(const JobOptions& options, const JobSpec& spec) {
+    if (spec.samples_per_pixel <= JobSpec::kMaxSamplesPerPixel) return {};
+    return invalid_argument(options.scene + ": its sampler asks for more samples per pixel than the " +
+                            std::to_string(JobSpec::kMaxSamplesPerPixel) + " of a job; give --spp");
+}
+
 Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
     JobSpec spec;
     spec.algorithm = options.algorithm;
@@ -92,11 +99,7 @@ Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
     spec.time_limit_seconds = options.time_seconds;
     spec.samples_per_pixel = options.samples_per_pixel;
     if (spec.samples_per_pixel == 0 && spec.time_limit_seconds == 0)
-        spec.samples_per_pixel = uint32_t(std::max(1, scene.imported.description.samples_per_pixel));
-    if (spec.samples_per_pixel > JobSpec::kMaxSamplesPerPixel)
-        return invalid_argument(options.scene + ": its sampler asks for " + std::to_string(spec.samples_per_pixel) +
-                                " samples per pixel, more than the " + std::to_string(JobSpec::kMaxSamplesPerPixel) +
-                                " of a job; give --spp");
+        spec.samples_per_pixel = uint32_t(std::clamp<int64_t>(scene.imported.description.samples_per_pixel, 1, int64_t(JobSpec::kMaxSamplesPerPixel) + 1));
     spec.max_depth = options.max_depth;
     spec.first_hit_layers = options.layers;
     if (!options.resolution.empty()) {

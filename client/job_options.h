@@ -47,6 +47,8 @@ Result<LocalScene> load_scene(const JobOptions& options);
 
 /// What the options ask for, with the scene's samples per pixel where they leave the bound open.
 Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene);
+/// kInvalidArgument where the scene, not the options, asks for more samples than a job may have.
+Status check_bound(const JobOptions& options, const JobSpec& spec);
 std::filesystem::path output_path(const JobOptions& options);
 
 /// "lightloom: message" on standard error; the exit code that fits.

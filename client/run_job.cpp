@@ -192,6 +192,8 @@ Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool
         if (cancel_on_interrupt) {
             const auto cancelled = port.cancel_job(job_id);
             if (!cancelled.ok() || cancelled->state == JobState::kSucceeded) return cancelled;  // it had just ended
+            if (cancelled->state == JobState::kFailed)
+                return Status(StatusCode::kAborted, "job " + job_id + " failed: " + cancelled->message);
         }
         return Status(StatusCode::kCancelled,
                       "interrupted; job " + job_id + (cancel_on_interrupt ? " was cancelled" : " goes on"));

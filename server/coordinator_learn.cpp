@@ -70,7 +70,7 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
                 job.phase = PreparePhase::kLearning;
                 job.learning_begin = options_.clock();
                 job.learned_share = 0;
-                changed(job);
+                prepared_further(job);
             }
         }
         if (kind == UnitKind::kProbe) {

@@ -69,7 +69,7 @@ void Coordinator::open_training(JobRecord& job, UnitKind kind, const TrainingWor
     job.training_bytes = 0;
     job.traced_seconds = 0;
     job.phase = kind == UnitKind::kProbe ? PreparePhase::kProbing : PreparePhase::kTracing;
-    changed(job);
+    prepared_further(job);
     work_changed_.notify_all();
 }
 

@@ -7,7 +7,7 @@ namespace lightloom {
 
 Result<HostPort> parse_host_port(std::string_view text, std::string_view option) {
     const auto wrong = [&] {
-        return invalid_argument(std::string(option) + " takes HOST:PORT, a literal address or localhost and a port from 0 to 65535, not \"" +
+        return invalid_argument(std::string(option) + " takes HOST:PORT with a port from 0 to 65535 and [] around an IPv6 address, not \"" +
                                 std::string(text) + "\"");
     };
     const size_t colon = text.rfind(':');
@@ -19,10 +19,9 @@ Result<HostPort> parse_host_port(std::string_view text, std::string_view option)
     if (error != std::errc() || stop != end) return wrong();
     const bool brackets = out.host.size() > 2 && out.host.front() == '[' && out.host.back() == ']';
     if (brackets) out.host = out.host.substr(1, out.host.size() - 2);
-    boost::system::error_code unknown;
-    const auto address = boost::asio::ip::make_address(out.host, unknown);
-    if (out.host == "localhost" && !brackets) return out;
-    if (unknown || address.is_v6() != brackets) return wrong();
+    boost::system::error_code name;
+    const auto address = boost::asio::ip::make_address(out.host, name);
+    if (out.host.empty() || (name ? brackets || out.host.find(':') != std::string::npos : address.is_v6() != brackets)) return wrong();
     return out;
 }
 

@@ -10,8 +10,8 @@
 namespace lightloom {
 
 struct HostPort {
-    std::string host;  ///< A literal address or "localhost"; without brackets.
-    uint16_t port = 0; ///< 0: any free one.
+    std::string host;   ///< A literal address, "localhost", or another name; without brackets.
+    uint16_t port = 0;  ///< 0: any free one.
 };
 
 /// kInvalidArgument where `text` is anything else; `option` is named in the message.

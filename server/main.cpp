@@ -107,7 +107,7 @@ int main(int argc, char** argv) {
         return 2;
     }
     for (const auto& [option, address] : {std::pair{"--listen", &listen}, {"--status", &status}}) {
-        if (address == &status && status == "off") continue;
+        if ((address == &status && status == "off") || (address == &listen && listen.starts_with("unix:"))) continue;
         const auto parsed = parse_host_port(*address, option);
         if (!parsed.ok()) {
             std::cerr << parsed.status().message() << '\n';

@@ -162,7 +162,9 @@ Result<std::unique_ptr<StatusHttp>> StatusHttp::start(const Coordinator& coordin
     if (!parsed.ok()) return parsed.status();
     auto impl = std::make_unique<Impl>(coordinator);
     beast::error_code error;
-    const tcp::endpoint endpoint(asio::ip::make_address(parsed->host == "localhost" ? "127.0.0.1" : parsed->host), parsed->port);
+    const auto literal = asio::ip::make_address(parsed->host == "localhost" ? "127.0.0.1" : parsed->host, error);
+    if (error) return invalid_argument("--status takes a literal address or localhost, not \"" + parsed->host + "\"");
+    const tcp::endpoint endpoint(literal, parsed->port);
     impl->acceptor.open(endpoint.protocol(), error);
     if (!error) impl->acceptor.set_option(asio::socket_base::reuse_address(true), error);
     if (!error) impl->acceptor.bind(endpoint, error);

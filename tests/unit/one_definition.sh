@@ -7,7 +7,9 @@ set -eu
 for archive in "$@"; do
     [ -f "$archive" ] || { echo "$archive does not exist"; exit 1; }
 done
-twice=$(nm "$@" | awk 'NF == 3 && ($2 == "T" || $2 == "W") { print $2, $3 }' | sort -u |
+symbols=$(nm "$@")
+[ -n "$symbols" ] || { echo "nm shows no symbol"; exit 1; }
+twice=$(printf '%s\n' "$symbols" | awk 'NF == 3 && ($2 == "T" || $2 == "W") { print $2, $3 }' | sort -u |
         awk '{ kinds[$2] = kinds[$2] $1 } END { for (name in kinds) if (kinds[name] ~ /T/ && kinds[name] ~ /W/) print name }' |
         c++filt | sort)
 if [ -n "$twice" ]; then

@@ -306,7 +306,7 @@ Digest unit_digest(SceneDescription description) {
     return hash.finish();
 }
 
-/// What changes nothing proves nothing: each shape, light, constant, image and index of refraction alone makes another unit.
+/// What changes nothing proves nothing: each shape, light, texture, image and kind of material alone makes another unit.
 TEST(Golden, EveryPartOfTheCourtyardShowsInItsUnit) {
     const SceneDescription court = golden_courtyard();
     const Digest whole = unit_digest(court);
