@@ -14,7 +14,7 @@
 #include "client/commands.h"
 #include "client/job_options.h"
 #include "client/run_job.h"
-#include "client/validators.h"
+#include "common/core/cli_numbers.h"
 #include "common/film/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "common/path/path_view.h"
@@ -233,8 +233,9 @@ void add_bench_command(CLI::App& app, int* exit_code) {
     auto* time = command->add_option("--time", options->time, "Seconds that a run may take")
                      ->check(number_between(0.001, 30 * 86400.0));
     auto* spp = command->add_option("--spp", options->spp, "Iterations (samples per pixel) that a run may take")
-                    ->check(CLI::Range(1u, 1u << 24));
-    command->add_option("--seeds", options->seeds, "Runs of each algorithm")->capture_default_str()->check(CLI::Range(1, 1000));
+                    ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
+    command->add_option("--seeds", options->seeds, "Runs of each algorithm")->capture_default_str()
+        ->check(whole_number_between(1, 1000));
     command->add_option("--seed", options->scene.seed, "The first run's; the others follow it")->capture_default_str()
         ->check(whole_number());
     command->add_option("--threshold", options->threshold, "MAPE in percent at which time is taken")
@@ -244,8 +245,8 @@ void add_bench_command(CLI::App& app, int* exit_code) {
         ->type_name("SECONDS")->check(number_between(0, 30 * 86400.0));
     command->add_option("--resolution", options->scene.resolution, "WIDTHxHEIGHT in pixels (default: the reference's)");
     command->add_option("--max-depth", options->scene.max_depth, "Bounces (default: the scene's)")
-        ->check(CLI::Range(0, kMaxEdges - 1));
-    command->add_option("--threads", options->threads, "Threads (default: all processors)")->check(CLI::Range(1, 1024));
+        ->check(whole_number_between(0, kMaxEdges - 1));
+    command->add_option("--threads", options->threads, "Threads (default: all processors)")->check(whole_number_between(1, 1024));
     command->add_option("--slice", options->slice, "Seconds that a run gets before the next one's turn")
         ->capture_default_str()->check(number_between(0.001, 86400.0));
     command->add_flag("-q,--quiet", options->scene.quiet, "The table and errors only");

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "client/commands.h"
-#include "client/validators.h"
+#include "common/core/cli_numbers.h"
 #include "common/film/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "common/film/metrics.h"

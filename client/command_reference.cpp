@@ -13,7 +13,7 @@
 #include "client/job_options.h"
 #include "client/progress.h"
 #include "client/run_job.h"
-#include "client/validators.h"
+#include "common/core/cli_numbers.h"
 #include "common/film/atomic_file.h"
 #include "common/work/identity.h"
 #include "server/results.h"
@@ -177,14 +177,14 @@ void add_reference_command(CLI::App& app, int* exit_code) {
     add_render_settings(*command, options->job);
     command->add_option("-o,--output", options->job.output, "EXR to write; its description goes beside it as .json")->required();
     auto* spp = command->add_option("--spp", options->job.samples_per_pixel, "Samples per pixel")
-                    ->check(CLI::Range(1u, 1u << 24));
+                    ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     auto* time = command->add_option("--time", options->job.time_seconds, "Render for this many seconds")
                      ->check(number_between(0.001, 30 * 86400.0))->excludes(spp);
     command->add_option("--cross-check", options->cross_check, "Another algorithm, NAME[:KEY=VALUE]..., that must agree");
     command->add_option("--cross-time", options->cross_time,
                         "Seconds for its image, and as many again for the path lengths of both")
         ->capture_default_str()->check(number_between(0.001, 30 * 86400.0));
-    command->add_option("--threads", options->threads, "Threads (default: all processors)")->check(CLI::Range(1, 1024));
+    command->add_option("--threads", options->threads, "Threads (default: all processors)")->check(whole_number_between(1, 1024));
     command->add_flag("-q,--quiet", options->job.quiet, "No progress; errors and the cross-check only");
     command->callback([options, spp, time, exit_code] {
         if (spp->count() + time->count() == 0) throw CLI::RequiredError("--time or --spp");

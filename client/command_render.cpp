@@ -12,6 +12,7 @@
 
 #include "client/commands.h"
 #include "client/run_job.h"
+#include "common/core/cli_numbers.h"
 #include "common/work/identity.h"
 #include "server/local_ports.h"
 #include "server/scene_reader.h"
@@ -140,16 +141,16 @@ void add_render_command(CLI::App& app, int* exit_code) {
     add_render_settings(*command, options->job);
     add_output_settings(*command, options->job);
     command->add_option("--threads", options->threads, "Threads of each worker (default: all processors, shared out)")
-        ->check(CLI::Range(1, 1024));
+        ->check(whole_number_between(1, 1024));
     command->add_option("--workers", options->workers, "Embedded workers; the bytes do not depend on it")
-        ->check(CLI::Range(1, 256))->capture_default_str();
+        ->check(whole_number_between(1, 256))->capture_default_str();
     command->add_option("--table-cache", options->cache.directory,
                         "Directory in which learned tables are kept for the next render, or off; it holds nothing else, no "
                         "scene files and no images")
         ->envname("LIGHTLOOM_TABLE_CACHE")->capture_default_str();
     command->add_option("--table-cache-size", options->cache.megabytes,
                         "MB that it may hold; the tables used least recently go first")
-        ->check(CLI::Range(uint64_t(1), uint64_t(1) << 30))->capture_default_str();
+        ->check(whole_number_between(1, uint64_t(1) << 30))->capture_default_str();
     command->callback([options, exit_code] {
         uint32_t threads = options->threads;
         if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency() / options->workers);

@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "client/commands.h"
-#include "client/validators.h"
+#include "common/core/cli_numbers.h"
 #include "common/path/path_view.h"
 #include "common/transport/catalog.h"
 
@@ -25,7 +25,7 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
     command.add_option("--set", options.settings, "Parameter of the algorithm, KEY=VALUE; may be repeated")->take_all()
         ->allow_extra_args(false);
     command.add_option("--max-depth", options.max_depth, "Bounces; paths have up to this + 1 edges (default: the scene's)")
-        ->check(CLI::Range(0, kMaxEdges - 1));
+        ->check(whole_number_between(0, kMaxEdges - 1));
     command.add_option("--resolution", options.resolution, "WIDTHxHEIGHT in pixels (default: the scene's)");
     command.add_option("--seed", options.seed, "Another seed makes another, independent image")->capture_default_str()
         ->check(whole_number());
@@ -44,7 +44,7 @@ void add_output_settings(CLI::App& command, JobOptions& options) {
     add_image_settings(command, options);
     command.add_flag("--layers", options.layers, "Also store albedo, normal and depth of what the camera sees first");
     auto* spp = command.add_option("--spp", options.samples_per_pixel, "Samples per pixel (default: the scene's)")
-                    ->check(whole_number())->check(CLI::Range(1u, 1u << 24));
+                    ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     command.add_option("--time", options.time_seconds,
                        "Stop after this many seconds of rendering, at a boundary that --spp can reproduce")
         ->check(number_between(0.001, 30 * 86400.0))->excludes(spp);

@@ -33,12 +33,8 @@ int main(int argc, char** argv) {
     int exit_code = kSuccess;
     add_render_command(app, &exit_code);
     add_service_commands(app, &exit_code);
-#ifdef LIGHTLOOM_HAS_INSPECT
     add_inspect_command(app, &exit_code);
-#endif
-#ifdef LIGHTLOOM_HAS_COMPARE
     add_compare_command(app, &exit_code);
-#endif
     add_algorithms_command(app, &exit_code);
     add_replay_command(app, &exit_code);
     add_bench_command(app, &exit_code);

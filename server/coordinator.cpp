@@ -296,18 +296,12 @@ JobInfo Coordinator::snapshot(const JobRecord& job) const {
     }
     if (job.phase == PreparePhase::kLearning && job.state == JobState::kPreparing) {
         info.phase_total = kLearningSteps;
-        info.phase_done = uint64_t(kLearningSteps * job.learned_share);
-        if (job.learned_share > 0) {
-            const double took = seconds_between(job.learning_begin, job.learned_share_at);
-            info.eta_seconds = std::max(0.0, took * (1 - job.learned_share) / job.learned_share -
-                                                 seconds_between(job.learned_share_at, now));
-        }
-    } else if (job.training) {
-        info.unit_leased = job.training->leased_count();
-        const TrainingWork& work = job.training_work;
-        info.phase_total = work.total_samples;
-        info.phase_done =
-            work.first_sample + std::min(work.sample_count, uint64_t(job.training->done_count()) * kTrainingUnitSamples);
+        info.phase_done = uint64_t(kLearningSteps * job.learning.share);
+        if (const auto left = job.learning.seconds_left(now)) info.eta_seconds = *left;
+    } else if (job.round) {
+        info.unit_leased = job.round->units().leased_count();
+        info.phase_total = job.round->work().total_samples;
+        info.phase_done = job.round->samples_done();
         if (job.phase == PreparePhase::kTracing && info.phase_done > 0)
             info.eta_seconds = seconds_between(job.training_begin, now) * double(info.phase_total - info.phase_done) /
                                double(info.phase_done);

@@ -63,13 +63,12 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
             const std::lock_guard lock(mutex_);
             if (job.state != JobState::kPreparing) return over();
             spec = job.spec;
-            kind = job.training_kind;
+            kind = job.round->kind();
             if (kind != UnitKind::kProbe) {
                 info.trace_seconds = seconds_between(job.training_begin, options_.clock()) - learning_seconds(info);
                 info.capped_by_time_limit = job.capped_by_time_limit;
                 job.phase = PreparePhase::kLearning;
-                job.learning_begin = options_.clock();
-                job.learned_share = 0;
+                job.learning = {.begin = options_.clock(), .share = 0, .heard = {}};
                 prepared_further(job);
             }
         }
@@ -85,8 +84,8 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
         const auto progress = [&](double share) {
             const std::lock_guard lock(mutex_);
             if (job.state != JobState::kPreparing) return;
-            job.learned_share = share;
-            job.learned_share_at = options_.clock();
+            job.learning.share = share;
+            job.learning.heard = options_.clock();
             prepared_further(job);
         };
         const auto tables = train_tables(*data, emitters, parameters->training, {stop, progress}, &report);
@@ -141,47 +140,33 @@ Status Coordinator::open_guided_round(JobRecord& job, const SubspaceTables& pilo
     LL_RETURN_IF_ERROR(store_tables(digest, *bytes));
     const std::lock_guard lock(mutex_);
     if (job.state != JobState::kPreparing) return drop_tables(digest), over();
-    const uint64_t total = job.training_work.total_samples, first = job.training_work.sample_count;
+    const uint64_t total = job.round->work().total_samples, first = job.round->work().sample_count;
     open_training(job, UnitKind::kTraining, {first, total - first, total});
     return {};
 }
 
 Result<TrainingData> Coordinator::collect_training(JobRecord& job, size_t emitter_count, std::stop_token stop) {
     std::unique_lock lock(mutex_);
+    const auto alive = [&] { return job.state == JobState::kPreparing && !stop.stop_requested(); };
     for (;;) {
-        const auto alive = [&] { return job.state == JobState::kPreparing && !stop.stop_requested(); };
-        const auto complete = [&] { return job.training->done_count() == job.training->group_total(); };
-        work_changed_.wait_for(lock, kPoll, [&] { return !alive() || complete(); });
+        work_changed_.wait_for(lock, kPoll, [&] { return !alive() || job.round->complete(); });
         if (!alive()) return over();
-        if (!complete()) continue;
-        auto parts = std::move(job.training_parts);
-        const UnitKind kind = job.training_kind;
+        if (!job.round->complete()) continue;
+        auto parts = job.round->take();
         lock.unlock();
         // Digest and size were right; a worker whose data are nonsense all the same loses its unit.
         std::vector<std::pair<uint32_t, Status>> bad;
         for (uint32_t i = 0; i < parts.size(); ++i)
-            if (Status s = parts[i].data->validate(emitter_count); !s.ok()) bad.emplace_back(i, std::move(s));
-        if (bad.empty()) {
-            TrainingData all;
-            for (auto& part : parts) {
-                if (stop.stop_requested()) return over();
-                if (const Status s = all.append(*part.data); !s.ok()) return s;
-                part.data.reset();
-            }
-            return all;
-        }
+            if (Status s = parts[i].data.validate(emitter_count); !s.ok()) bad.emplace_back(i, std::move(s));
+        if (bad.empty()) return join(std::move(parts), stop);
         lock.lock();
-        for (const auto& [unit, why] : bad) {
-            if (!alive()) return over();
-            job.training_bytes -= parts[unit].bytes;
-            job.traced_seconds -= parts[unit].seconds;
-            parts[unit] = {};
-            ++job.rejected;
-            const UnitKey key{unit, 0, kind};
-            unit_failed(job, key, job.training->reopen(key), why);
-        }
         if (!alive()) return over();
-        job.training_parts = std::move(parts);
+        job.round->put_back(std::move(parts));
+        for (const auto& [unit, why] : bad) {
+            ++job.rejected;
+            unit_failed(job, {unit, 0, job.round->kind()}, job.round->refuse(unit), why);
+            if (!alive()) return over();  // the unit has failed too often
+        }
     }
 }
 
@@ -196,7 +181,7 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
         if (job.state != JobState::kPreparing) return over();
         spec = job.spec;
         facts = job.facts;
-        traced = job.traced_seconds;
+        traced = job.round->traced_seconds();
         const TimePoint now = options_.clock();
         for (const auto& w : workers_) {
             if (w->left || seconds_between(w->last_heard, now) > options_.lease_seconds) continue;

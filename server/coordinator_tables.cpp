@@ -21,53 +21,29 @@ uint64_t training_samples(const JobSpec& spec) {
     return uint64_t(parameter_value(**algorithm, *parse_parameters(**algorithm, spec.parameters), kTrainingPaths));
 }
 
-/// Light sub-paths with which a unit measures Q. The job's parameters have been read before: they are valid.
-uint64_t energy_paths(const JobSpec& spec, const TrainingWork& work) {
-    const auto p = TransportParameters::read(render_settings(spec));
-    return p->energy_paths_before(work.first_sample + work.sample_count) - p->energy_paths_before(work.first_sample);
-}
-
-/// Above any data that the unit can have: the paths of samples, one more that their light sub-path may leave, and the light
-/// sub-paths, each of the greatest length, and a sum per block of the frame.
-uint64_t largest_training_payload(const JobSpec& spec, const TrainingWork& work) {
-    const FrameLayout& frame = spec.frame;
-    const uint64_t most_blocks = work.total_samples + uint64_t(frame.crop.width() + frame.crop.height() + 1);
-    const uint64_t blocks = std::min(uint64_t(frame.crop.area()), most_blocks);
-    const uint64_t path = sizeof(TrainingPath) + uint64_t(spec.max_depth + 3) * sizeof(TrainingVertex);
-    const uint64_t paths = (kTrainingPathsPerSample + 1) * work.sample_count + energy_paths(spec, work);
-    return 256 + blocks * sizeof(double) + paths * path;
-}
-
 }  // namespace
 
 UnitTable* Coordinator::open_table(JobRecord& job) {
     if (job.state == JobState::kRunning) return &*job.units;
-    return job.state == JobState::kPreparing && job.training ? &*job.training : nullptr;
+    return job.state == JobState::kPreparing && job.round ? &job.round->units() : nullptr;
 }
 
 UnitTable* Coordinator::table_for(JobRecord& job, UnitKind kind) {
     UnitTable* const table = open_table(job);
-    const UnitKind open = job.state == JobState::kRunning ? UnitKind::kRender : job.training_kind;
+    if (!table) return nullptr;
+    const UnitKind open = job.state == JobState::kRunning ? UnitKind::kRender : job.round->kind();
     return kind == open ? table : nullptr;
 }
 
 void Coordinator::discard_training(JobRecord& job) {
-    discarded_.push_back(std::make_shared<std::vector<JobRecord::TrainingPart>>(std::move(job.training_parts)));
-    discarded_.push_back(std::make_shared<SceneFacts>(std::move(job.facts)));
-    job.training_parts.clear();
-    job.facts = {};
-    job.training.reset();
+    discarded_.push_back(std::make_shared<SceneFacts>(std::exchange(job.facts, {})));
+    if (!job.round) return;
+    discarded_.push_back(std::make_shared<TrainingRound>(*std::move(job.round)));
+    job.round.reset();
 }
 
 void Coordinator::open_training(JobRecord& job, UnitKind kind, const TrainingWork& work) {
-    job.training.reset();
-    job.training.emplace(Plan::training(kind, work), work.sample_count, UINT32_MAX, options_.shuffle_seed);
-    job.training_kind = kind;
-    job.training_work = work;
-    job.training_parts.clear();
-    job.training_parts.resize(job.training->group_total());
-    job.training_bytes = 0;
-    job.traced_seconds = 0;
+    job.round.emplace(kind, work, options_.shuffle_seed);
     job.phase = kind == UnitKind::kProbe ? PreparePhase::kProbing : PreparePhase::kTracing;
     prepared_further(job);
     work_changed_.notify_all();
@@ -249,17 +225,15 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
         return SubmitAck{SubmitOutcome::kRejected, problem.message()};
     }
     if (auto answer = repeated_result(*job, *units, reference.key, *worker, digest)) return *std::move(answer);
-    job->training_bytes += payload.size();
-    // Units differ little in size: a set that is far too large shows before hours were spent on it.
-    const double projected = double(job->training_bytes) * units->group_total() / double(units->done_count());
-    if (job->training_bytes > options_.training_bytes || projected > 1.25 * double(options_.training_bytes)) {
+    TrainingRound& round = *job->round;
+    round.add(reference.key.group, {*std::move(data), payload.size(), trace_seconds});
+    // A set that is far too large shows before hours were spent on it.
+    if (round.bytes() > options_.training_bytes || round.projected_bytes() > 1.25 * double(options_.training_bytes)) {
         fail_job(*job, {StatusCode::kResourceExhausted,
                         "the training data need more than the " + std::to_string(options_.training_bytes >> 20) +
                             " MiB that a job may have; choose fewer training-paths or energy-paths"});
         return SubmitAck{SubmitOutcome::kRejected, job->message};
     }
-    job->training_parts[reference.key.group] = {*std::move(data), payload.size(), trace_seconds};
-    job->traced_seconds += trace_seconds;
     prepared_further(*job);
     work_changed_.notify_all();
     return SubmitAck{SubmitOutcome::kAccepted, {}};

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "server/coordinator.h"
+#include "server/training_round.h"
 
 namespace lightloom {
 
@@ -56,17 +57,7 @@ struct Coordinator::JobRecord {
     std::filesystem::path directory;
     PreparePhase phase = PreparePhase::kReadingScene;
     SceneFacts facts;                   ///< From the reading of the scene until the units are planned.
-    std::optional<UnitTable> training;  ///< Units of kind `training_kind`, in kPreparing.
-    UnitKind training_kind = UnitKind::kTraining;
-    TrainingWork training_work;         ///< What of the set these units trace.
-    struct TrainingPart {
-        std::optional<TrainingData> data;
-        uint64_t bytes = 0;   ///< As it came.
-        double seconds = 0;   ///< That the worker took.
-    };
-    std::vector<TrainingPart> training_parts;  ///< By unit.
-    uint64_t training_bytes = 0;        ///< Of these.
-    double traced_seconds = 0;          ///< Of the workers, over these.
+    std::optional<TrainingRound> round; ///< In kPreparing, of a job that makes tables.
     AssetReference guide;               ///< Tables that the training units read; empty for pilots and probes.
     std::shared_ptr<const std::string> guide_bytes;  ///< Of these, should the disk lose them.
     bool capped_by_time_limit = false;
@@ -74,15 +65,23 @@ struct Coordinator::JobRecord {
     bool makes_tables = false;          ///< It probes, traces and learns itself.
     std::shared_ptr<JobRecord> maker;   ///< Makes the same tables; this job waits for them.
     TimePoint training_begin;           ///< The first training unit was leased; unset before.
-    TimePoint learning_begin;           ///< Of the phase kLearning.
-    TimePoint learned_share_at;         ///< When `learned_share` was last heard of.
-    double learned_share = 0;           ///< Of that phase, about.
+    struct Learning {
+        TimePoint begin;   ///< Of the phase kLearning.
+        double share = 0;  ///< Of that phase that is done, about.
+        TimePoint heard;   ///< When the share was that.
+        std::optional<double> seconds_left(TimePoint now) const;
+    } learning;
     TablesInfo tables;
     Digest tables_asset;                ///< Of the tables that the job names, or is about to; zero before.
 
     std::jthread prepare_task, train_task, finish_task;
     int running_tasks = 0;  ///< Of these. A job is forgotten only without any, so that nobody waits for one under the mutex.
 };
+
+inline std::optional<double> Coordinator::JobRecord::Learning::seconds_left(TimePoint now) const {
+    if (!(share > 0)) return std::nullopt;
+    return std::max(0.0, seconds_between(begin, heard) * (1 - share) / share - seconds_between(heard, now));
+}
 
 /// Behind the word "unit", for people.
 inline std::string unit_name(const UnitKey& key) {

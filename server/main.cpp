@@ -14,6 +14,7 @@
 #include <optional>
 #include <thread>
 
+#include "common/core/cli_numbers.h"
 #include "common/core/log.h"
 #include "common/film/atomic_file.h"
 #include "common/work/identity.h"
@@ -84,19 +85,16 @@ int main(int argc, char** argv) {
                    "such job) and the table cache (tables/)")->capture_default_str();
     app.add_option("--status", status, "HOST:PORT of the status page (/healthz, /api/v1/status), or off")->capture_default_str();
     app.add_option("--lease", lease, "Seconds without a heartbeat after which a unit goes to another worker")
-        ->check(CLI::Range(0.2, 3600.0))->capture_default_str()
-        ->check([](const std::string& text) {  // which a range lets pass
-            return std::isnan(std::strtod(text.c_str(), nullptr)) ? "\"" + text + "\" is not a number" : std::string();
-        });
+        ->check(number_between(0.2, 3600))->capture_default_str();
     app.add_option("--threads", threads, "Threads with which the coordinator itself traces and renders; 0 leaves that to workers")
-        ->check(CLI::Range(0, 1024))->capture_default_str();
+        ->check(whole_number_between(0, 1024))->capture_default_str();
     app.add_option("--table-cache-size", table_cache_mb,
                    "MB of the table cache: learned tables that later jobs find again, also after a restart; those used "
-                   "least recently go first; 0 keeps none")->check(CLI::Range(uint64_t(0), uint64_t(1) << 30))->capture_default_str();
+                   "least recently go first; 0 keeps none")->check(whole_number_between(0, uint64_t(1) << 30))->capture_default_str();
     app.add_option("--port-file", port_file, "Write \"GRPC_PORT STATUS_PORT\" here once both listen");
     app.add_flag("--allow-plaintext", plaintext, "Listen on other than loopback addresses");
     app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
-    app.add_option("--shuffle-leases", shuffle, "")->group("");  // tests: lease units in a random order
+    app.add_option("--shuffle-leases", shuffle, "")->group("")->check(whole_number());  // tests: lease units in a random order
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

@@ -12,6 +12,7 @@
 #include <iostream>
 #include <thread>
 
+#include "common/core/cli_numbers.h"
 #include "common/core/log.h"
 #include "common/work/identity.h"
 #include "worker/grpc_worker_port.h"
@@ -51,7 +52,7 @@ int main(int argc, char** argv) {
     std::string cache = default_cache().string();
     uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
     app.add_option("--server", server, "HOST:PORT of the coordinator")->capture_default_str();
-    app.add_option("--threads", threads, "Threads to render with")->check(CLI::Range(1, 1024))->capture_default_str();
+    app.add_option("--threads", threads, "Threads to render with")->check(whole_number_between(1, 1024))->capture_default_str();
     app.add_option("--cache", cache, "Directory for scene files and tables; may be shared by the workers of a host")
         ->capture_default_str();
     app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();

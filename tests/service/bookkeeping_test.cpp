@@ -5,6 +5,7 @@
 #include "common/film/atomic_file.h"
 #include "common/scene/scene.h"
 #include "server/scene_reader.h"
+#include "server/training_round.h"
 #include "tests/service/fake.h"
 
 namespace lightloom {
@@ -77,6 +78,60 @@ Partial splat_of(const WorkUnit& unit, double value) {
     partial.camera.assign(size_t(3 * unit.tile.area()), 0.0);
     partial.splats.push_back({0, {value, 0, 0}});
     return partial;
+}
+
+/// Data that say which unit they are of.
+TrainingRound::Part part_of(uint32_t unit, uint64_t bytes, double seconds) {
+    TrainingPath path;
+    path.estimate = float(unit);
+    TrainingData data;
+    data.blocks_x = data.blocks_y = 1;
+    data.block_sum = {double(unit)};
+    data.samples = 1;
+    data.paths = {path};
+    return {std::move(data), bytes, seconds};
+}
+
+TEST(TrainingRound, CountsWhatCameAndForgetsWhatIsRefused) {
+    constexpr uint64_t kShort = 7, kEarlier = 3 * kTrainingUnitSamples, kCount = 2 * kTrainingUnitSamples + kShort;
+    TrainingRound round(UnitKind::kTraining, {kEarlier, kCount, kEarlier + kCount}, std::nullopt);
+    EXPECT_EQ(round.samples_done(), kEarlier) << "those of the round before";
+    for (uint32_t unit = 0; unit < 3; ++unit) ASSERT_EQ(round.units().lease(0, kNever)->key.group, unit);
+    const auto finish = [&](uint32_t unit) {
+        const UnitKey key{unit, 0, UnitKind::kTraining};
+        ASSERT_EQ(round.units().complete(key, 0, digest_of(key)), UnitTable::Completion::kFirst);
+        round.add(unit, part_of(unit, 100 + unit, 1.5));
+    };
+    finish(2);
+    EXPECT_EQ(round.bytes(), 102u);
+    EXPECT_EQ(round.projected_bytes(), 306);
+    finish(0);
+    EXPECT_FALSE(round.complete());
+    finish(1);
+    EXPECT_TRUE(round.complete());
+    EXPECT_EQ(round.samples_done(), kEarlier + kCount) << "the last unit is short";
+    EXPECT_EQ(round.bytes(), 303u);
+    EXPECT_EQ(round.traced_seconds(), 4.5);
+
+    round.put_back(round.take());
+    EXPECT_EQ(round.refuse(1).total, 1);
+    EXPECT_FALSE(round.complete());
+    EXPECT_EQ(round.bytes(), 202u);
+    EXPECT_EQ(round.traced_seconds(), 3.0);
+    ASSERT_EQ(round.units().lease(1, kNever)->key.group, 1u);
+    finish(1);
+
+    // In the order of the units, not in that of their arrival.
+    const auto all = join(round.take(), {});
+    ASSERT_TRUE(all.ok()) << all.status().message();
+    EXPECT_EQ(all->samples, 3u);
+    ASSERT_EQ(all->paths.size(), 3u);
+    for (uint32_t unit = 0; unit < 3; ++unit) EXPECT_EQ(all->paths[unit].estimate, float(unit));
+    std::stop_source stopped;
+    stopped.request_stop();
+    std::vector<TrainingRound::Part> parts;
+    parts.push_back(part_of(0, 1, 1));
+    EXPECT_EQ(join(std::move(parts), stopped.get_token()).status().code(), StatusCode::kCancelled);
 }
 
 TEST(Reducer, APartialThatLeavesTheRangeAfterWaitingIsTheOneRefused) {

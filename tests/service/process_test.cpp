@@ -277,6 +277,8 @@ TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
     for (const char* seed : {"-1", " -1", "010", "18446744073709551616", "1.5"})
         EXPECT_EQ(run({"render", kScene, "--seed", seed}), 2) << seed;
     EXPECT_EQ(run({"render", kScene, "--time", "nan"}), 2);
+    for (const char* threads : {"02", "0x2", "+2", "-1", "2.0", "0", "1025"})
+        EXPECT_EQ(run({"render", kScene, "--threads", threads}), 2) << threads;
     EXPECT_EQ(run({"render", kScene, "-o", "/dev/null"}), 2) << "where would its manifest go?";
     EXPECT_EQ(run({"reference", kScene, "--spp", "1", "-o", "own.json"}), 2) << "its description would take its place";
     EXPECT_EQ(run({"replay", kScene, "--pixel", "1,1", "--iteration", "5", "--spp", "2"}), 2);

@@ -1,0 +1,66 @@
+#include "server/training_round.h"
+
+#include <algorithm>
+
+#include "common/transport/parameters.h"
+
+namespace lightloom {
+
+TrainingRound::TrainingRound(UnitKind kind, const TrainingWork& work, std::optional<uint64_t> shuffle_seed)
+    : kind_(kind), work_(work), units_(Plan::training(kind, work), work.sample_count, UINT32_MAX, shuffle_seed),
+      parts_(units_.group_total()) {}
+
+uint64_t TrainingRound::samples_done() const {
+    return work_.first_sample + std::min(work_.sample_count, units_.done_count() * kTrainingUnitSamples);
+}
+
+void TrainingRound::add(uint32_t unit, Part part) {
+    bytes_ += part.bytes;
+    traced_seconds_ += part.seconds;
+    parts_[unit] = std::move(part);
+}
+
+double TrainingRound::projected_bytes() const {
+    return double(bytes_) * units_.group_total() / double(units_.done_count());
+}
+
+std::vector<TrainingRound::Part> TrainingRound::take() {
+    auto parts = std::move(parts_);
+    parts_.resize(units_.group_total());
+    return parts;
+}
+
+UnitTable::Failures TrainingRound::refuse(uint32_t unit) {
+    bytes_ -= parts_[unit].bytes;
+    traced_seconds_ -= parts_[unit].seconds;
+    parts_[unit] = {};
+    return units_.reopen({unit, 0, kind_});
+}
+
+Result<TrainingData> join(std::vector<TrainingRound::Part> parts, std::stop_token stop) {
+    TrainingData all;
+    for (TrainingRound::Part& part : parts) {
+        if (stop.stop_requested()) return Status(StatusCode::kCancelled, "stopped while training data were joined");
+        LL_RETURN_IF_ERROR(all.append(part.data));
+        part = {};  // both copies at once are held of one part only
+    }
+    return all;
+}
+
+uint64_t energy_paths(const JobSpec& spec, const TrainingWork& work) {
+    const auto p = TransportParameters::read(render_settings(spec));
+    return p->energy_paths_before(work.first_sample + work.sample_count) - p->energy_paths_before(work.first_sample);
+}
+
+uint64_t largest_training_payload(const JobSpec& spec, const TrainingWork& work) {
+    // The paths of samples, one more that their light sub-path may leave, and the light sub-paths, each of the greatest length,
+    // and a sum per block of the frame.
+    const FrameLayout& frame = spec.frame;
+    const uint64_t most_blocks = work.total_samples + uint64_t(frame.crop.width() + frame.crop.height() + 1);
+    const uint64_t blocks = std::min(uint64_t(frame.crop.area()), most_blocks);
+    const uint64_t path = sizeof(TrainingPath) + uint64_t(spec.max_depth + 3) * sizeof(TrainingVertex);
+    const uint64_t paths = (kTrainingPathsPerSample + 1) * work.sample_count + energy_paths(spec, work);
+    return 256 + blocks * sizeof(double) + paths * path;
+}
+
+}  // namespace lightloom
