@@ -83,7 +83,7 @@ nlohmann::ordered_json describe(const ReferenceOptions& options, const JobSpec& 
 
 int reference(ReferenceOptions& options) {
     (void)interrupt_token();
-    if (Status s = check_outputs(options.job, ".json"); !s.ok()) return report_error(s);
+    if (Status s = check_outputs(options.job, {".json"}); !s.ok()) return report_error(s);
     AlgorithmChoice checker_choice;
     if (!options.cross_check.empty()) {
         auto parsed = parse_algorithm(options.cross_check);

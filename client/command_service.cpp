@@ -49,7 +49,7 @@ int service_error(const ServiceOptions& options, const Status& status) {
 int submit_job(const ServiceOptions& options) {
     GrpcJobPort port = connect(options);
     if (!options.detach)
-        if (Status s = check_outputs(options.job); !s.ok()) return report_error(s);
+        if (Status s = check_outputs(options.job, beside_image(options.job, AfterFetch::kImageStays)); !s.ok()) return report_error(s);
     const auto scene = load_scene(options.job);
     if (!scene.ok()) return report_error(scene.status());
     const auto spec = make_spec(options.job, *scene);
@@ -102,6 +102,7 @@ int fetch_job(const ServiceOptions& options) {
     if (!job.ok()) return service_error(options, job.status());
     JobOptions output = options.job;
     if (output.output.empty()) output.output = options.job_id + ".exr";
+    if (Status s = check_outputs(output, beside_image(output, AfterFetch::kImageStays)); !s.ok()) return report_error(s);
     if (job->state != JobState::kSucceeded) {
         const std::string what = "job " + options.job_id + " is " + std::string(to_string(job->state)) +
                                  (job->message.empty() ? "" : ": " + job->message);
@@ -135,7 +136,7 @@ void add_service_commands(CLI::App& app, int* exit_code) {
         command->footer(kSubmitFooter);
         add_render_settings(*command, options->job);
         add_output_settings(*command, options->job);
-        auto* detach = command->add_flag("--detach", options->detach, "Print the job's id and return at once");
+        auto* detach = command->add_flag("--detach", options->detach, "Print the job's id and return at once; `fetch --strict` tells of dropped samples");
         for (const char* later : {"--output", "--half", "--png", "--json"})  // `fetch` has its own
             detach->excludes(command->get_option(later));
     }

@@ -22,7 +22,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kFloatInstead = ".float.exr";  ///< Where halves cannot hold a rendered image.
+constexpr const char* kManifest = ".manifest.json";
+/// Where halves cannot hold a rendered image.
+constexpr const char *kFloatInstead = ".float.exr", *kFloatManifest = ".float.manifest.json";
 
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
@@ -122,16 +124,22 @@ std::stop_token interrupt_token() {
     return source.get_token();
 }
 
-Status check_outputs(const JobOptions& options, const char* beside) {
+std::vector<const char*> beside_image(const JobOptions& options, AfterFetch after) {
+    if (options.half && after == AfterFetch::kImageGoes) return {kManifest, kFloatInstead, kFloatManifest};
+    return {kManifest};
+}
+
+Status check_outputs(const JobOptions& options, const std::vector<const char*>& beside) {
     const std::filesystem::path output = output_path(options);
-    const auto with = [&](const char* extension) { return std::filesystem::path(output).replace_extension(extension).string(); };
     std::vector<std::filesystem::path> taken;
     if (!options.scene.empty()) taken.push_back(options.scene);
     std::error_code unknown;
     if (std::filesystem::is_other(std::filesystem::status(output, unknown)))
         return invalid_argument(output.string() + ": is a device or a pipe, beside which no manifest can lie; give a file name");
-    for (const std::string& path :
-         {output.string(), with(beside), options.half ? with(kFloatInstead) : std::string(), options.png, options.json}) {
+    std::vector<std::string> paths{output.string()};
+    for (const char* extension : beside) paths.push_back(std::filesystem::path(output).replace_extension(extension).string());
+    paths.insert(paths.end(), {options.png, options.json});
+    for (const std::string& path : paths) {
         if (path.empty()) continue;
         std::error_code ignored;
         const auto status = std::filesystem::status(path, ignored);
@@ -229,8 +237,7 @@ int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTi
                                                "; so that nothing is lost it was written as float to " + output.string());
         }
     }
-    std::filesystem::path manifest_path = output;
-    manifest_path.replace_extension(".manifest.json");
+    const std::filesystem::path manifest_path = std::filesystem::path(output).replace_extension(kManifest);
     Status status = write_file_atomically(output.string(), files.exr);
     if (status.ok()) status = write_file_atomically(manifest_path.string(), files.manifest);
     if (status.ok() && !options.png.empty()) {

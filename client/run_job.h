@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <stop_token>
+#include <vector>
 
 #include "client/job_options.h"
 
@@ -16,17 +17,19 @@ struct ClientTimes {
     double import_seconds = 0, digest_seconds = 0, upload_seconds = 0, wait_seconds = 0, fetch_seconds = 0;
 };
 
+/// Whether the image can be fetched again: not from a service that ends with this process.
+enum class AfterFetch { kImageStays, kImageGoes };
+/// What replaces the image's extension in the names of the other files that fetch() may write.
+std::vector<const char*> beside_image(const JobOptions& options, AfterFetch after);
 /// Whether the files that options ask for can be written, tried out with empty ones: a typing error in -o must show before
-/// hours of rendering, not after them. `beside` replaces the image's extension in the name of what describes it.
-Status check_outputs(const JobOptions& options, const char* beside = ".manifest.json");
+/// hours of rendering, not after them. `beside` replaces the image's extension in the names of those that come with it.
+Status check_outputs(const JobOptions& options, const std::vector<const char*>& beside);
 /// Sends what the coordinator lacks of the scene's files.
 Status upload_scene(JobPort& port, const LocalScene& scene);
 /// Submits under a fresh request id.
 Result<JobInfo> submit(JobPort& port, const JobSpec& spec);
 /// Watches until the end; on an interrupt, cancels the job if `cancel_on_interrupt` is set.
 Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool cancel_on_interrupt);
-/// Whether the image can be fetched again: not from a service that ends with this process.
-enum class AfterFetch { kImageStays, kImageGoes };
 /// Fetches image and manifest of a succeeded job and writes them as options ask; reports dropped samples. Where --half is
 /// refused, an image that would be lost is written as float beside OUTPUT. The exit code.
 int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTimes times, AfterFetch after);

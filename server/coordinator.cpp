@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <random>
 
 #include "common/film/atomic_file.h"
@@ -18,15 +17,6 @@ namespace {
 
 constexpr std::chrono::milliseconds kTick(20);
 constexpr double kLearningSteps = 1000;  ///< Into which progress of learning is divided.
-
-std::string utc_now() {
-    const std::time_t now = std::time(nullptr);
-    std::tm parts{};
-    gmtime_r(&now, &parts);
-    char text[32];
-    std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
-    return text;
-}
 
 /// Ids need only be unique, also across restarts of the coordinator.
 std::string new_id(const char* prefix) {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <new>
 #include <stdexcept>
 #include <system_error>
@@ -18,14 +17,6 @@ namespace lightloom {
 namespace {
 
 constexpr uint64_t kMaxWindow = 256;
-
-std::string utc(std::time_t time) {
-    std::tm parts{};
-    gmtime_r(&time, &parts);
-    char text[32];
-    std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
-    return text;
-}
 
 }  // namespace
 
@@ -173,7 +164,7 @@ Status Coordinator::write_results(JobRecord& job) {
         manifest.job = snapshot(job);
         manifest.identity = options_.identity;
         manifest.created_at = job.created_at;
-        manifest.finished_at = utc(std::time(nullptr));
+        manifest.finished_at = utc_now();
         manifest.groups = job.merged_groups;
         manifest.iterations = job.merged_iterations;
         for (const uint32_t index : job.workers) {

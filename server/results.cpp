@@ -1,6 +1,7 @@
 #include "server/results.h"
 
 #include <algorithm>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "common/film/atomic_file.h"
@@ -47,6 +48,15 @@ Json to_json(const TablesInfo& t) {
               {"gamma", t.gamma_seconds}}},
             {"held_out_loss", {{"uniform", t.uniform_loss}, {"tables", t.loss}, {"prior_strength", t.prior_strength}}},
             {"note", t.note}};
+}
+
+std::string utc_now() {
+    const std::time_t now = std::time(nullptr);
+    std::tm parts{};
+    gmtime_r(&now, &parts);
+    char text[32];
+    std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
+    return text;
 }
 
 std::string replay_command(const JobSpec& spec, const std::string& scene, const ManifestDropped& dropped) {

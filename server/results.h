@@ -39,6 +39,8 @@ struct Manifest {
     uint64_t expired_leases = 0, rejected_results = 0;
 };
 
+/// The time of day, UTC, as manifests show it.
+std::string utc_now();
 /// Command line for a shell that renders one dropped sample again; its unit for a splat, which is known only by where it
 /// would have landed.
 std::string replay_command(const JobSpec& spec, const std::string& scene, const ManifestDropped& dropped);

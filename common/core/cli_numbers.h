@@ -13,15 +13,19 @@ namespace lightloom {
 
 /// A real number of [low, high], as std::from_chars reads it; a leading plus sign is none of it.
 inline CLI::Validator number_between(double low, double high) {
+    const auto shortest = [](double value) {
+        char text[32];
+        return std::string(text, std::to_chars(text, text + sizeof text, value).ptr);
+    };
+    const std::string range = "from " + shortest(low) + " to " + shortest(high);
     return CLI::Validator(
-        [low, high](std::string& text) {
+        [low, high, range](std::string& text) {
             double value = NAN;
             const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
             const bool good = error == std::errc() && end == text.data() + text.size() && value >= low && value <= high;
-            return good ? std::string() : "\"" + text + "\" is no number from " + CLI::detail::to_string(low) + " to " +
-                                              CLI::detail::to_string(high);
+            return good ? std::string() : "\"" + text + "\" is no number " + range;
         },
-        "from " + CLI::detail::to_string(low) + " to " + CLI::detail::to_string(high));
+        range);
 }
 
 /// A whole number of [low, high] in decimal, without sign or leading zeros.

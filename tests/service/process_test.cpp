@@ -96,6 +96,9 @@ TEST(Processes, BytesAreTheSameHoweverAJobIsRun) {
     EXPECT_EQ(service.digest("half"), half);
     EXPECT_EQ(service.manifest("half")["image"]["sha256"].get<std::string>(), half.hex());
     EXPECT_EQ(service.manifest("half")["image"]["float_sha256"].get<std::string>(), reference.hex());
+    EXPECT_EQ(Process("lightloom", {"fetch", id, "--server", service.address(), "-o", service.path("one.exr"), "--json",
+                                    service.path("one.exr")}, service.path("one.log")).wait(), 2) << "which of the two?";
+    EXPECT_FALSE(std::filesystem::exists(service.path("one.exr")));
 }
 
 TEST(Processes, ASecondCoordinatorDoesNotShareADirectory) {
@@ -279,6 +282,7 @@ TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
     EXPECT_EQ(run({"render", kScene, "--time", "nan"}), 2);
     for (const char* threads : {"02", "0x2", "+2", "-1", "2.0", "0", "1025"})
         EXPECT_EQ(run({"render", kScene, "--threads", threads}), 2) << threads;
+    EXPECT_EQ(run({"render", kScene, "--half", "-o", "own.exr", "--json", "own.float.manifest.json"}), 2) << "may be needed";
     EXPECT_EQ(run({"render", kScene, "-o", "/dev/null"}), 2) << "where would its manifest go?";
     EXPECT_EQ(run({"reference", kScene, "--spp", "1", "-o", "own.json"}), 2) << "its description would take its place";
     EXPECT_EQ(run({"replay", kScene, "--pixel", "1,1", "--iteration", "5", "--spp", "2"}), 2);
