@@ -28,7 +28,7 @@ struct SceneFacts {
     float exposure_scale = 1;  ///< Multiplies the developed image.
     int max_depth = 5;         ///< Bounces, if the job leaves them to the scene.
     std::vector<ImageLayer> layers;  ///< First-hit layers, if the job asks for them.
-    /// The built scene, of which learning needs the lights. Called once, and only for a job whose tables have to be made.
+    /// The built scene, of which learning needs the lights. Called only for a job whose tables have to be made; holds no scene.
     std::function<Result<std::shared_ptr<const Scene>>()> build_scene;
 };
 
@@ -123,6 +123,8 @@ class Coordinator {
     void plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables);
     Status prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait);
     std::shared_ptr<JobRecord> find_maker(const JobRecord& job) const;
+    /// True if another job makes the tables of `table_key`: this one waits for them.
+    bool wait_for_maker(JobRecord& job);
     void resume_waiting(const std::shared_ptr<JobRecord>& job);
     /// changed(), for those as well that wait for this job's tables.
     void prepared_further(JobRecord& job);
@@ -139,6 +141,7 @@ class Coordinator {
     Status adopt_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts, std::string_view bytes, TablesInfo tables);
     bool repair_tables(const std::string& job_id);
     void discard_training(JobRecord& job);
+    void discard_round(JobRecord& job);
     /// Removes the asset of an ended job's tables unless another job needs it.
     void drop_tables(const Digest& digest);
     Status store_tables(const Digest& digest, std::string_view bytes);

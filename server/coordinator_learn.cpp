@@ -47,11 +47,6 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
     const auto scene = build_scene();
     if (!scene.ok()) return scene.status();
     const EmitterSet& emitters = (*scene)->emitters();
-    build_scene = {};  // it may hold what the scene was built from
-    {
-        const std::lock_guard lock(mutex_);
-        job.facts.build_scene = {};
-    }
 
     TablesInfo info;  // of both rounds
     for (;;) {
@@ -75,7 +70,7 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
         if (kind == UnitKind::kProbe) {
             LL_RETURN_IF_ERROR(choose_training_samples(job, *data, **scene, stop));
             const std::lock_guard lock(mutex_);
-            if (job.state != JobState::kPreparing) return {};  // it found tables in the cache, or was cancelled
+            if (job.state != JobState::kPreparing || job.maker) return {};  // it has tables or waits for them, or was cancelled
             continue;
         }
         const auto parameters = TransportParameters::read(render_settings(spec));
@@ -224,6 +219,7 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
     const std::lock_guard lock(mutex_);
     if (job.state != JobState::kPreparing) return over();
     job.spec = std::move(spec);
+    if (chosen < wanted && wait_for_maker(job)) return {};
     job.training_begin = options_.clock();
     open_first_round(job);
     return {};

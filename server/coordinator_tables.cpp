@@ -37,6 +37,10 @@ UnitTable* Coordinator::table_for(JobRecord& job, UnitKind kind) {
 
 void Coordinator::discard_training(JobRecord& job) {
     discarded_.push_back(std::make_shared<SceneFacts>(std::exchange(job.facts, {})));
+    discard_round(job);
+}
+
+void Coordinator::discard_round(JobRecord& job) {
     if (!job.round) return;
     discarded_.push_back(std::make_shared<TrainingRound>(*std::move(job.round)));
     job.round.reset();
@@ -53,18 +57,14 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
     if (adopt_cached_tables(job, spec, facts)) return {};
     const std::lock_guard lock(mutex_);
     if (job.state != JobState::kPreparing) return {};
-    // Who chose the training set knows what it costs.
-    const bool open_size = spec.time_limit_seconds > 0 && !job.submitted.parameters.contains(kTrainingPaths);
+    // Who chose the training set knows what it costs; and what a probe has chosen already stays.
+    const bool chosen = job.submitted.parameters.contains(kTrainingPaths) || job.capped_by_time_limit;
+    const bool open_size = spec.time_limit_seconds > 0 && !chosen;
     const uint64_t samples = training_samples(spec);
     job.table_key = table_key(options_.identity, spec);
     job.spec = std::move(spec);
     job.facts = std::move(facts);
-    if (may_wait && (job.maker = find_maker(job))) {
-        job.phase = PreparePhase::kWaitingForTables;
-        spdlog::info("{}: waits for the tables of {}", job.id, job.maker->id);
-        changed(job);
-        return {};
-    }
+    if (may_wait && wait_for_maker(job)) return {};
     job.makes_tables = true;
     if (open_size && samples > kMinTrainingSamples) {
         const auto roomy = uint64_t(std::min(job.spec.time_limit_seconds * kProbeSamplesPerSecond, double(kTrainingUnitSamples)));
@@ -82,6 +82,19 @@ std::shared_ptr<Coordinator::JobRecord> Coordinator::find_maker(const JobRecord&
         if (other.get() != &job && makes && other->table_key == job.table_key) return other;
     }
     return nullptr;
+}
+
+bool Coordinator::wait_for_maker(JobRecord& job) {
+    job.maker = find_maker(job);
+    if (!job.maker) return false;
+    // As before its own tracing, should it have to begin again.
+    job.makes_tables = false;
+    job.training_begin = {};
+    discard_round(job);
+    job.phase = PreparePhase::kWaitingForTables;
+    spdlog::info("{}: waits for the tables of {}", job.id, job.maker->id);
+    changed(job);
+    return true;
 }
 
 void Coordinator::resume_waiting(const std::shared_ptr<JobRecord>& job) {
@@ -121,7 +134,7 @@ Status Coordinator::take_over_tables(JobRecord& job) {
     const auto bytes = assets_.read(tables.asset.digest);
     if (!bytes.ok()) return prepare_tables(job, std::move(spec), std::move(facts), false);
     tables.from_cache = true;
-    tables.capped_by_time_limit = false;
+    tables.capped_by_time_limit = job.capped_by_time_limit;
     return adopt_tables(job, spec, facts, *bytes, std::move(tables));
 }
 

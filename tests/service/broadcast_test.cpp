@@ -309,6 +309,48 @@ TEST(TrainingBudget, ProbeAndTrainingTakeATenthOfTheLimitAtMost) {
     }
 }
 
+/// The second waits for the first's tables twice: for those of the whole set, and, when its own probe has shown that it cannot
+/// afford that either, for those of the set on which both settle.
+TEST(TrainingBudget, JobsThatSettleOnTheSameSetTrainOnce) {
+    for (const bool cancelled : {false, true}) {
+        TableService service;
+        JobSpec timed = service.table_spec(0);
+        timed.time_limit_seconds = 0.5;  // a tenth of which is less than give() says that the probe took
+        timed.parameters.erase("training-paths");
+        const std::string first = service.submit_training(timed), second = service.submit_now(timed);
+        const auto phase = [](PreparePhase p) { return [p](const JobInfo& j) { return j.phase == p; }; };
+        service.wait(second, phase(PreparePhase::kWaitingForTables));
+        auto held = lease_all(service);
+        ASSERT_EQ(held.size(), 1u);
+        service.give(held[0].first, held[0].second, traced(held[0].second));
+        service.wait(first, phase(PreparePhase::kTracing));
+        service.wait(second, phase(PreparePhase::kProbing));
+        held = lease_all(service);
+        ASSERT_EQ(held.size(), 2u);
+        EXPECT_EQ(held[0].second.job_id, first);
+        EXPECT_EQ(held[1].second.job_id, second);
+        service.give(held[1].first, held[1].second, traced(held[1].second));
+        service.wait(second, phase(PreparePhase::kWaitingForTables));
+        EXPECT_EQ(service.coordinator->get_job(second)->waits_for, first);
+        EXPECT_TRUE(lease_all(service).empty());
+        if (cancelled) {
+            ASSERT_TRUE(service.coordinator->cancel_job(first).ok());
+            service.wait(second, phase(PreparePhase::kTracing));
+            held = lease_all(service);
+            ASSERT_EQ(held.size(), 1u);
+        }
+        service.give(held[0].first, held[0].second, traced(held[0].second));
+        const auto running = [](const JobInfo& j) { return j.state == JobState::kRunning; };
+        const JobInfo taken = service.wait(second, running);
+        EXPECT_EQ(taken.state, JobState::kRunning) << taken.message;
+        EXPECT_EQ(taken.tables.from_cache, !cancelled);
+        EXPECT_TRUE(taken.tables.capped_by_time_limit);
+        if (cancelled) continue;
+        const JobInfo made = service.wait(first, running);
+        EXPECT_EQ(taken.tables.asset.digest, made.tables.asset.digest);
+    }
+}
+
 TEST(TrainingBudget, ATimeLimitedJobRecordsWhatItTrainedAndCanBeRenderedAgain) {
     TableService service([](CoordinatorOptions& o) { o.clock = [] { return std::chrono::steady_clock::now(); }; });
     LightCrew crew;
