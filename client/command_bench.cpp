@@ -14,7 +14,7 @@
 #include "client/commands.h"
 #include "client/job_options.h"
 #include "client/run_job.h"
-#include "common/core/cli_numbers.h"
+#include "common/cli/numbers.h"
 #include "common/film/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "common/path/path_view.h"

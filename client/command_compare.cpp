@@ -6,7 +6,7 @@
 #include <string>
 
 #include "client/commands.h"
-#include "common/core/cli_numbers.h"
+#include "common/cli/numbers.h"
 #include "common/film/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "common/film/metrics.h"

@@ -13,7 +13,7 @@
 #include "client/job_options.h"
 #include "client/progress.h"
 #include "client/run_job.h"
-#include "common/core/cli_numbers.h"
+#include "common/cli/numbers.h"
 #include "common/film/atomic_file.h"
 #include "common/work/identity.h"
 #include "server/results.h"

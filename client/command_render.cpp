@@ -12,7 +12,7 @@
 
 #include "client/commands.h"
 #include "client/run_job.h"
-#include "common/core/cli_numbers.h"
+#include "common/cli/numbers.h"
 #include "common/work/identity.h"
 #include "server/local_ports.h"
 #include "server/scene_reader.h"

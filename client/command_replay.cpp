@@ -6,7 +6,7 @@
 
 #include "client/commands.h"
 #include "client/job_options.h"
-#include "common/core/cli_numbers.h"
+#include "common/cli/numbers.h"
 #include "common/scene/scene.h"
 #include "common/transport/renderer.h"
 #include "common/transport/training.h"
@@ -133,9 +133,9 @@ void add_replay_command(CLI::App& app, int* exit_code) {
     auto* iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, from 0")
                           ->check(whole_number_between(0, JobSpec::kMaxSamplesPerPixel - 1));
     auto* pixel = command->add_option("--pixel", options->pixel, "X,Y in full-frame pixels, 0,0 at the top left")
-                      ->expected(2)->delimiter(',');
+                      ->expected(2)->delimiter(',')->check(whole_number_between(0, 65535));
     auto* unit = command->add_option("--unit", options->unit, "GROUP,TILE: the whole unit instead of one sample")
-                     ->expected(2)->delimiter(',');
+                     ->expected(2)->delimiter(',')->check(whole_number_between(0, UINT32_MAX));
     command->add_option("--spp", options->spp, "Samples per pixel of the job, if it was bounded by them")
         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     iteration->needs(pixel);

@@ -102,7 +102,6 @@ int fetch_job(const ServiceOptions& options) {
     if (!job.ok()) return service_error(options, job.status());
     JobOptions output = options.job;
     if (output.output.empty()) output.output = options.job_id + ".exr";
-    if (Status s = check_outputs(output, beside_image(output, AfterFetch::kImageStays)); !s.ok()) return report_error(s);
     if (job->state != JobState::kSucceeded) {
         const std::string what = "job " + options.job_id + " is " + std::string(to_string(job->state)) +
                                  (job->message.empty() ? "" : ": " + job->message);
@@ -110,6 +109,7 @@ int fetch_job(const ServiceOptions& options) {
         const bool over = is_terminal(job->state);
         return report_error(failed_precondition(over ? what : what + "; `lightloom watch " + options.job_id + "` waits for it"));
     }
+    if (Status s = check_outputs(output, beside_image(output, AfterFetch::kImageStays)); !s.ok()) return report_error(s);
     return fetch(port, *job, output, {}, AfterFetch::kImageStays);
 }
 
@@ -136,7 +136,8 @@ void add_service_commands(CLI::App& app, int* exit_code) {
         command->footer(kSubmitFooter);
         add_render_settings(*command, options->job);
         add_output_settings(*command, options->job);
-        auto* detach = command->add_flag("--detach", options->detach, "Print the job's id and return at once; `fetch --strict` tells of dropped samples");
+        auto* detach = command->add_flag("--detach", options->detach,
+                                         "Print the job's id and return at once; `fetch --strict` tells of dropped samples");
         for (const char* later : {"--output", "--half", "--png", "--json"})  // `fetch` has its own
             detach->excludes(command->get_option(later));
     }

@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "client/commands.h"
-#include "common/core/cli_numbers.h"
+#include "common/cli/numbers.h"
 #include "common/path/path_view.h"
 #include "common/transport/catalog.h"
 

@@ -150,8 +150,11 @@ Status check_outputs(const JobOptions& options, const std::vector<const char*>& 
                 return invalid_argument(path + ": is " + (other == options.scene ? "the scene itself" : "another output, too") +
                                         "; give another file name");
         taken.push_back(path);
-        const std::string probe = path + ".probe-" + std::to_string(::getpid());
-        LL_RETURN_IF_ERROR(write_file_atomically(probe, {}));
+        // Where the bytes will go: what a link points to is replaced, not the link.
+        const auto target = std::filesystem::canonical(path, ignored);
+        const std::string probe = (target.empty() ? path : target.string()) + ".probe-" + std::to_string(::getpid());
+        if (const Status s = write_file_atomically(probe, {}); !s.ok())
+            return {s.code(), path + s.message().substr(probe.size())};  // whose message begins with the name
         std::filesystem::remove(probe, ignored);
     }
     return {};

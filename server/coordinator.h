@@ -123,6 +123,9 @@ class Coordinator {
     void plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables);
     Status prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait);
     std::shared_ptr<JobRecord> find_maker(const JobRecord& job) const;
+    /// The job itself, or who makes the tables that it, and those that it waits for, wait for. Jobs never wait in a circle: who
+    /// waits makes no tables, and only makers are waited for.
+    static const std::shared_ptr<JobRecord>& maker_of_last_resort(const std::shared_ptr<JobRecord>& job);
     /// True if another job makes the tables of `table_key`: this one waits for them.
     bool wait_for_maker(JobRecord& job);
     void resume_waiting(const std::shared_ptr<JobRecord>& job);

@@ -84,6 +84,12 @@ std::shared_ptr<Coordinator::JobRecord> Coordinator::find_maker(const JobRecord&
     return nullptr;
 }
 
+const std::shared_ptr<Coordinator::JobRecord>& Coordinator::maker_of_last_resort(const std::shared_ptr<JobRecord>& job) {
+    const std::shared_ptr<JobRecord>* maker = &job;
+    while ((*maker)->maker) maker = &(*maker)->maker;
+    return *maker;
+}
+
 bool Coordinator::wait_for_maker(JobRecord& job) {
     job.maker = find_maker(job);
     if (!job.maker) return false;
@@ -110,17 +116,18 @@ void Coordinator::resume_waiting(const std::shared_ptr<JobRecord>& job) {
 void Coordinator::prepared_further(JobRecord& job) {
     changed(job);
     for (const auto& other : jobs_)
-        if (other->maker.get() == &job) changed(*other);
+        if (other->maker.get() == &job) prepared_further(*other);
 }
 
 Status Coordinator::take_over_tables(JobRecord& job) {
     JobSpec spec;
     SceneFacts facts;
     TablesInfo tables;
+    std::shared_ptr<JobRecord> maker;  // goes without the mutex: it may be the last to know the other job, and joins its tasks
     {
         const std::lock_guard lock(mutex_);
         if (job.state != JobState::kPreparing) return {};
-        const std::shared_ptr<JobRecord> maker = std::move(job.maker);
+        maker = std::move(job.maker);
         if (maker->tables.cache_key == job.table_key) {
             tables = maker->tables;
             job.tables_asset = maker->tables_asset;

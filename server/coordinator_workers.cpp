@@ -54,7 +54,10 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
     if (!worker.held.empty()) {
         for (const auto& other : workers_) idle += other->held.empty() && other->waiting > 0;
     }
-    for (const auto& job : jobs_) {
+    for (const auto& in_line : jobs_) {
+        // A job that waits for tables lends its place to the job that makes them, which may be a younger one.
+        const std::shared_ptr<JobRecord> job = maker_of_last_resort(in_line);
+        if (job != in_line && job->state != JobState::kPreparing) continue;
         UnitTable* const units = open_table(*job);
         if (!units || (!worker.held.empty() && !units->has_more_than(idle))) continue;
         const auto unit = units->lease(worker.index, after(options_.lease_seconds));

@@ -7,14 +7,12 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <optional>
 #include <thread>
 
-#include "common/core/cli_numbers.h"
+#include "common/cli/numbers.h"
 #include "common/core/log.h"
 #include "common/film/atomic_file.h"
 #include "common/work/identity.h"

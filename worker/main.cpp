@@ -12,7 +12,7 @@
 #include <iostream>
 #include <thread>
 
-#include "common/core/cli_numbers.h"
+#include "common/cli/numbers.h"
 #include "common/core/log.h"
 #include "common/work/identity.h"
 #include "worker/grpc_worker_port.h"

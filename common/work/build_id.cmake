@@ -1,5 +1,6 @@
 # cmake -DROOT=... -DVERSION=... -DTOOLS=... -DOUT=... -P build_id.cmake
 file(GLOB_RECURSE sources RELATIVE ${ROOT} ${ROOT}/common/*.h ${ROOT}/common/*.cpp)
+list(FILTER sources EXCLUDE REGEX "^common/cli/")  # computes no light
 list(SORT sources)
 set(text "")
 foreach(source ${sources})

@@ -309,46 +309,82 @@ TEST(TrainingBudget, ProbeAndTrainingTakeATenthOfTheLimitAtMost) {
     }
 }
 
+/// A time-limited job whose probe will say that it can afford the smallest set only.
+JobSpec poor_job(const TableService& service) {
+    JobSpec timed = service.table_spec(0);
+    timed.time_limit_seconds = 0.5;  // a tenth of which is less than give() says that the probe took
+    timed.parameters.erase("training-paths");
+    return timed;
+}
+
+const auto in_phase = [](PreparePhase phase) { return [phase](const JobInfo& job) { return job.phase == phase; }; };
+bool is_running(const JobInfo& job) { return job.state == JobState::kRunning; }
+
 /// The second waits for the first's tables twice: for those of the whole set, and, when its own probe has shown that it cannot
 /// afford that either, for those of the set on which both settle.
 TEST(TrainingBudget, JobsThatSettleOnTheSameSetTrainOnce) {
-    for (const bool cancelled : {false, true}) {
+    for (const char* first_ends : {"well", "cancelled", "failed"}) {
         TableService service;
-        JobSpec timed = service.table_spec(0);
-        timed.time_limit_seconds = 0.5;  // a tenth of which is less than give() says that the probe took
-        timed.parameters.erase("training-paths");
-        const std::string first = service.submit_training(timed), second = service.submit_now(timed);
-        const auto phase = [](PreparePhase p) { return [p](const JobInfo& j) { return j.phase == p; }; };
-        service.wait(second, phase(PreparePhase::kWaitingForTables));
+        const std::string first = service.submit_training(poor_job(service)), second = service.submit_now(poor_job(service));
+        service.wait(second, in_phase(PreparePhase::kWaitingForTables));
         auto held = lease_all(service);
         ASSERT_EQ(held.size(), 1u);
         service.give(held[0].first, held[0].second, traced(held[0].second));
-        service.wait(first, phase(PreparePhase::kTracing));
-        service.wait(second, phase(PreparePhase::kProbing));
+        service.wait(first, in_phase(PreparePhase::kTracing));
+        service.wait(second, in_phase(PreparePhase::kProbing));
         held = lease_all(service);
         ASSERT_EQ(held.size(), 2u);
         EXPECT_EQ(held[0].second.job_id, first);
         EXPECT_EQ(held[1].second.job_id, second);
         service.give(held[1].first, held[1].second, traced(held[1].second));
-        service.wait(second, phase(PreparePhase::kWaitingForTables));
+        service.wait(second, in_phase(PreparePhase::kWaitingForTables));
         EXPECT_EQ(service.coordinator->get_job(second)->waits_for, first);
         EXPECT_TRUE(lease_all(service).empty());
-        if (cancelled) {
-            ASSERT_TRUE(service.coordinator->cancel_job(first).ok());
-            service.wait(second, phase(PreparePhase::kTracing));
+        const bool alone = first_ends != std::string("well");
+        if (alone) {
+            if (first_ends == std::string("cancelled")) {
+                ASSERT_TRUE(service.coordinator->cancel_job(first).ok());
+            } else {
+                ASSERT_TRUE(service.coordinator->release_unit(held[0].first, held[0].second.reference(), invalid_argument("boom")).ok());
+                EXPECT_EQ(service.coordinator->get_job(first)->state, JobState::kFailed);
+            }
+            service.wait(second, in_phase(PreparePhase::kTracing));
             held = lease_all(service);
             ASSERT_EQ(held.size(), 1u);
         }
         service.give(held[0].first, held[0].second, traced(held[0].second));
-        const auto running = [](const JobInfo& j) { return j.state == JobState::kRunning; };
-        const JobInfo taken = service.wait(second, running);
-        EXPECT_EQ(taken.state, JobState::kRunning) << taken.message;
-        EXPECT_EQ(taken.tables.from_cache, !cancelled);
+        const JobInfo taken = service.wait(second, is_running);
+        EXPECT_EQ(taken.tables.from_cache, !alone);
         EXPECT_TRUE(taken.tables.capped_by_time_limit);
-        if (cancelled) continue;
-        const JobInfo made = service.wait(first, running);
-        EXPECT_EQ(taken.tables.asset.digest, made.tables.asset.digest);
+        if (alone) continue;
+        EXPECT_EQ(taken.tables.asset.digest, service.wait(first, is_running).tables.asset.digest);
     }
+}
+
+/// Who waits for a younger job's tables does not wait for what has come in between.
+TEST(TrainingBudget, AJobThatWaitsLendsItsPlaceInTheQueue) {
+    TableService service;
+    const std::string old = service.submit_training(poor_job(service));
+    const std::string between = service.submit_now(service.spec(1000));
+    service.wait(between, is_running);
+    JobSpec same = service.table_spec(1);
+    same.parameters["training-paths"] = std::to_string(kMinTrainingSamples);
+    const std::string young = service.submit_training(same);
+    const std::string worker = service.add_worker();
+    const auto probe = service.lease(worker);
+    ASSERT_EQ(probe.size(), 1u);
+    ASSERT_EQ(probe[0].job_id, old);
+    service.give(worker, probe[0], traced(probe[0]));
+    service.wait(old, [&](const JobInfo& j) { return j.waits_for == young; });
+    const auto next = service.lease(worker);
+    ASSERT_EQ(next.size(), 1u);
+    EXPECT_EQ(next[0].job_id, young);
+    service.give(worker, next[0], traced(next[0]));
+    const JobInfo taken = service.wait(old, is_running), made = service.wait(young, is_running);
+    EXPECT_EQ(taken.tables.asset.digest, made.tables.asset.digest);
+    EXPECT_TRUE(taken.tables.capped_by_time_limit);
+    EXPECT_FALSE(made.tables.capped_by_time_limit);
+    EXPECT_EQ(service.lease(worker).at(0).job_id, old);
 }
 
 TEST(TrainingBudget, ATimeLimitedJobRecordsWhatItTrainedAndCanBeRenderedAgain) {

@@ -10,6 +10,7 @@
 
 #include "client/commands.h"
 #include "client/run_job.h"
+#include "common/cli/numbers.h"
 #include "common/film/atomic_file.h"
 #include "server/data_lock.h"
 #include "server/results.h"
@@ -23,6 +24,21 @@ using client::AfterFetch;
 using testing::FakeService;
 using testing::TempDirectory;
 using Json = nlohmann::json;
+
+TEST(CommandLine, NumbersAreDecimalAndInRange) {
+    const auto accepts = [](const CLI::Validator& check, std::string text) { return check(text).empty(); };
+    const CLI::Validator whole = whole_number_between(1, 1024), real = number_between(-30, 2592000);
+    for (const char* text : {"1", "10", "1024"}) EXPECT_TRUE(accepts(whole, text)) << text;
+    for (const char* text : {"", "0", "1025", "010", "0x10", "+1", "-1", " 1", "1 ", "1.0", "1e2", "nan", "18446744073709551617"})
+        EXPECT_FALSE(accepts(whole, text)) << text;
+    for (const char* text : {"0", "-1.5", ".5", "+1", "+.5", "1e3", "010", "-30", "2592000"}) EXPECT_TRUE(accepts(real, text)) << text;
+    for (const char* text : {"", "+", "+-1", "++1", "nan", "inf", "-30.01", "2592001", "1x", "0x10", "1,5"})
+        EXPECT_FALSE(accepts(real, text)) << text;
+    EXPECT_TRUE(accepts(whole_number(), "0"));
+    EXPECT_TRUE(accepts(whole_number(), "18446744073709551615"));
+    std::string text = "3e6";
+    EXPECT_EQ(real(text), "\"3e6\" is no number from -30 to 2592000");
+}
 
 /// A service that has one finished job, and whose submissions fail as the test says.
 class PlayedPort final : public JobPort {

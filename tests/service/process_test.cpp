@@ -265,6 +265,9 @@ TEST(Processes, SigtermEndsWorkerAndServerCleanly) {
     EXPECT_EQ(client->wait(), 130) << service.log("image");
     EXPECT_EQ(jobs.list_jobs()->front().state, JobState::kCancelled);
     EXPECT_FALSE(std::filesystem::exists(service.path("image.exr")));
+    EXPECT_EQ(Process("lightloom", {"fetch", jobs.list_jobs()->front().job_id, "--server", service.address(), "-o",
+                                    service.path("no/such/place.exr")}, service.path("fetch.log")).wait(), 130)
+        << "that it was cancelled matters more";
     service.server->signal(SIGTERM);
     EXPECT_EQ(service.server->wait(), 0) << service.log("server");
 }
@@ -291,6 +294,8 @@ TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
     EXPECT_EQ(serve({"--status", "127.0.0.1:94x"}), 2);
     EXPECT_EQ(serve({"--listen", "0.0.0.0:0"}), 2) << "beyond loopback";
     EXPECT_EQ(serve({"--lease", "nan"}), 2);
+    EXPECT_EQ(serve({"--threads", "02"}), 2);
+    EXPECT_EQ(Process("lightloom-worker", {"--threads", "0x2"}, log).wait(), 2);
     EXPECT_EQ(run({"render", kScene, "--resolution", "12"}), 2);
     EXPECT_EQ(run({"render", kScene, "--spp", "1", "--time", "1"}), 2);
     EXPECT_EQ(run({"render", kScene, "--exposure", "1"}), 2) << "of which picture?";
@@ -302,6 +307,8 @@ TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
     EXPECT_EQ(run({"algorithms"}), 0);
     EXPECT_EQ(run({"replay", kScene, "--algorithm", "bdpt", "--iteration", "3", "--pixel", "10,10"}), 0);
     EXPECT_EQ(run({"replay", kScene, "--algorithm", "bdpt", "--pixel", "5,3x"}), 2);
+    EXPECT_EQ(run({"replay", kScene, "--algorithm", "bdpt", "--pixel", "010,3"}), 2);
+    EXPECT_EQ(run({"replay", kScene, "--algorithm", "bdpt", "--unit", "00,0"}), 2);
     EXPECT_EQ(run({"replay", kScene, "--algorithm", "bdpt", "--unit", "4000000000,0"}), 2);
     EXPECT_EQ(run({"replay", kScene, "--algorithm", "bdpt", "--iteration", "4000000000", "--pixel", "1,1"}), 2);
     EXPECT_FALSE(std::filesystem::exists("cornell.exr"));

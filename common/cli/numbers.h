@@ -1,6 +1,6 @@
 #pragma once
-// Numbers on the command line. Every numeric option of every program is checked by one of these two, because CLI11 alone takes
-// NaN for a number of any range, reads a leading 0 as octal, wraps negative numbers around and lets large ones saturate.
+// Numbers on the command line. Every numeric option of client, server and worker is checked by one of these, because CLI11 alone
+// takes NaN for a number of any range, reads a leading 0 as octal, wraps negative numbers around and lets large ones saturate.
 
 #include <CLI/CLI.hpp>
 
@@ -11,7 +11,7 @@
 
 namespace lightloom {
 
-/// A real number of [low, high], as std::from_chars reads it; a leading plus sign is none of it.
+/// A real number of [low, high]; may have a plus sign.
 inline CLI::Validator number_between(double low, double high) {
     const auto shortest = [](double value) {
         char text[32];
@@ -21,7 +21,8 @@ inline CLI::Validator number_between(double low, double high) {
     return CLI::Validator(
         [low, high, range](std::string& text) {
             double value = NAN;
-            const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+            const size_t sign = text.size() > 1 && text[0] == '+' && text[1] != '-' ? 1 : 0;
+            const auto [end, error] = std::from_chars(text.data() + sign, text.data() + text.size(), value);
             const bool good = error == std::errc() && end == text.data() + text.size() && value >= low && value <= high;
             return good ? std::string() : "\"" + text + "\" is no number " + range;
         },
@@ -43,6 +44,6 @@ inline CLI::Validator whole_number_between(uint64_t low, uint64_t high) {
 }
 
 /// Any seed.
-inline CLI::Validator whole_number() { return whole_number_between(0, UINT64_MAX); }
+inline CLI::Validator whole_number() { return whole_number_between(0, UINT64_MAX).description(""); }
 
 }  // namespace lightloom
