@@ -99,7 +99,7 @@ bool Coordinator::wait_for_maker(JobRecord& job) {
     discard_round(job);
     job.phase = PreparePhase::kWaitingForTables;
     spdlog::info("{}: waits for the tables of {}", job.id, job.maker->id);
-    changed(job);
+    prepared_further(job);
     return true;
 }
 
@@ -116,14 +116,15 @@ void Coordinator::resume_waiting(const std::shared_ptr<JobRecord>& job) {
 void Coordinator::prepared_further(JobRecord& job) {
     changed(job);
     for (const auto& other : jobs_)
-        if (other->maker.get() == &job) prepared_further(*other);
+        for (const JobRecord* maker = other->maker.get(); maker; maker = maker->maker.get())
+            if (maker == &job) changed(*other);
 }
 
 Status Coordinator::take_over_tables(JobRecord& job) {
     JobSpec spec;
     SceneFacts facts;
     TablesInfo tables;
-    std::shared_ptr<JobRecord> maker;  // goes without the mutex: it may be the last to know the other job, and joins its tasks
+    std::shared_ptr<JobRecord> maker;
     {
         const std::lock_guard lock(mutex_);
         if (job.state != JobState::kPreparing) return {};
@@ -137,6 +138,7 @@ Status Coordinator::take_over_tables(JobRecord& job) {
         job.phase = PreparePhase::kReadingScene;
         changed(job);
     }
+    maker.reset();  // without the mutex: nobody else may know the other job any more, and it joins its tasks
     if (tables.asset.size_bytes == 0) return prepare_tables(job, std::move(spec), std::move(facts), true);
     const auto bytes = assets_.read(tables.asset.digest);
     if (!bytes.ok()) return prepare_tables(job, std::move(spec), std::move(facts), false);

@@ -3,6 +3,9 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/server_builder.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 
 #include "server/asset_service.h"
 #include "server/job_service.h"
@@ -19,9 +22,29 @@ struct GrpcServer::Services {
     WorkerServiceImpl worker;
 };
 
+namespace {
+
+/// gRPC would take the socket from a server that has it.
+bool socket_is_served(const std::string& path) {
+    sockaddr_un name{};
+    if (path.empty() || path.size() >= sizeof name.sun_path) return false;
+    name.sun_family = AF_UNIX;
+    path.copy(name.sun_path, path.size());
+    const int probe = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (probe < 0) return false;
+    const bool answered = ::connect(probe, reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0;
+    ::close(probe);
+    return answered;
+}
+
+}  // namespace
+
 GrpcServer::GrpcServer() = default;
 
 Result<std::unique_ptr<GrpcServer>> GrpcServer::start(Coordinator& coordinator, const std::string& address) {
+    const Status taken(StatusCode::kUnavailable, "cannot listen on " + address + "; is another coordinator running there?");
+    constexpr std::string_view kUnix = "unix:";
+    if (address.starts_with(kUnix) && socket_is_served(address.substr(kUnix.size()))) return taken;
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     std::unique_ptr<GrpcServer> server(new GrpcServer);
@@ -38,8 +61,7 @@ Result<std::unique_ptr<GrpcServer>> GrpcServer::start(Coordinator& coordinator, 
     builder.RegisterService(&server->services_->asset);
     builder.RegisterService(&server->services_->worker);
     server->server_ = builder.BuildAndStart();
-    if (!server->server_ || server->port_ == 0)
-        return Status(StatusCode::kUnavailable, "cannot listen on " + address + "; is another coordinator running there?");
+    if (!server->server_ || server->port_ == 0) return taken;
     return server;
 }
 

@@ -89,7 +89,7 @@ int main(int argc, char** argv) {
     app.add_option("--table-cache-size", table_cache_mb,
                    "MB of the table cache: learned tables that later jobs find again, also after a restart; those used "
                    "least recently go first; 0 keeps none")->check(whole_number_between(0, uint64_t(1) << 30))->capture_default_str();
-    app.add_option("--port-file", port_file, "Write \"GRPC_PORT STATUS_PORT\" here once both listen");
+    app.add_option("--port-file", port_file, "Write \"GRPC_PORT STATUS_PORT\" here once both listen (a unix: socket has port 0)");
     app.add_flag("--allow-plaintext", plaintext, "Listen on other than loopback addresses");
     app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
     app.add_option("--shuffle-leases", shuffle, "")->group("")->check(whole_number());  // tests: lease units in a random order
@@ -156,16 +156,18 @@ int main(int argc, char** argv) {
         auto started = StatusHttp::start(coordinator, status);
         if (!started.ok()) {
             spdlog::error("{}", started.status().message());
-            return 1;
+            return started.status().code() == StatusCode::kInvalidArgument ? 2 : 1;
         }
         http = std::move(started).value();
     }
     std::optional<OwnWorker> own;
     if (threads > 0) own.emplace(coordinator, *identity, threads, std::filesystem::path(data) / "worker");
-    spdlog::info("build {}, listening on port {}, status on port {}", identity->build_id, (*server)->port(),
+    const bool tcp = !listen.starts_with("unix:");
+    spdlog::info("build {}, listening on {}, status on port {}", identity->build_id,
+                 tcp ? "port " + std::to_string((*server)->port()) : listen,
                  http ? http->port() : 0);
     if (!port_file.empty()) {
-        const std::string ports = std::to_string((*server)->port()) + " " + std::to_string(http ? http->port() : 0) + "\n";
+        const std::string ports = std::to_string(tcp ? (*server)->port() : 0) + " " + std::to_string(http ? http->port() : 0) + "\n";
         if (const Status written = write_file_atomically(port_file, ports); !written.ok()) {
             spdlog::error("{}", written.message());
             return 1;

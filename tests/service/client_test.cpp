@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "client/commands.h"
@@ -38,6 +39,30 @@ TEST(CommandLine, NumbersAreDecimalAndInRange) {
     EXPECT_TRUE(accepts(whole_number(), "18446744073709551615"));
     std::string text = "3e6";
     EXPECT_EQ(real(text), "\"3e6\" is no number from -30 to 2592000");
+}
+
+TEST(Outputs, ThatAreLinksAreTriedOutWhereTheyPoint) {
+    const TempDirectory directory;
+    const auto path = [&](const char* name) { return directory.path / name; };
+    client::JobOptions options;
+    options.output = path("a.exr").string();
+    const auto check = [&](const char* png) {
+        options.png = path(png).string();
+        return client::check_outputs(options, client::beside_image(options, AfterFetch::kImageGoes));
+    };
+    std::filesystem::create_symlink("a.exr", path("same.png"));
+    EXPECT_NE(check("same.png").message().find("same.png: is a link to nothing"), std::string::npos) << "it will be the image";
+    std::ofstream(path("a.exr")) << "of an earlier render";
+    EXPECT_NE(check("same.png").message().find("another output"), std::string::npos);
+    std::filesystem::create_directory(path("elsewhere"));
+    std::ofstream(path("elsewhere/b.png")) << "of an earlier render";
+    std::filesystem::create_symlink("elsewhere/b.png", path("b.png"));
+    EXPECT_TRUE(check("b.png").ok()) << check("b.png").message();
+    std::filesystem::create_symlink("/proc/version", path("proc.png"));  // where not even root can make files
+    EXPECT_EQ(check("proc.png").message().rfind(path("proc.png").string() + ": cannot be written", 0), 0u) << check("proc.png").message();
+    size_t files = 0;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(directory.path)) files += std::filesystem::is_regular_file(entry.symlink_status());
+    EXPECT_EQ(files, 2u) << "nothing is left of the trial";
 }
 
 /// A service that has one finished job, and whose submissions fail as the test says.

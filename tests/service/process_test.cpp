@@ -272,6 +272,28 @@ TEST(Processes, SigtermEndsWorkerAndServerCleanly) {
     EXPECT_EQ(service.server->wait(), 0) << service.log("server");
 }
 
+TEST(Processes, ASocketBelongsToTheServerThatHasIt) {
+    const TempDirectory directory;
+    const auto path = [&](const std::string& name) { return (directory.path / name).string(); };
+    const std::string address = "unix:" + path("socket");
+    const auto serve = [&](const std::string& name) {
+        return std::make_unique<Process>(
+            "lightloom-server", std::vector<std::string>{"--listen", address, "--status", "off", "--data", path(name), "--port-file",
+                                                         path(name + ".ports")}, path(name + ".log"));
+    };
+    const auto list = [&] { return Process("lightloom", {"list", "--server", address}, path("list.log")).wait(); };
+    const auto first = serve("first");
+    ASSERT_TRUE(wait_until(60, [&] { return std::filesystem::exists(path("first.ports")); }));
+    EXPECT_EQ(list(), 0);
+    EXPECT_EQ(serve("second")->wait(), 1);
+    EXPECT_EQ(list(), 0) << "the second has not taken it along";
+    first->signal(SIGKILL);
+    first->wait();
+    const auto third = serve("third");
+    EXPECT_TRUE(wait_until(60, [&] { return std::filesystem::exists(path("third.ports")); })) << "what a dead one left is free";
+    EXPECT_EQ(list(), 0);
+}
+
 TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
     const TempDirectory directory;
     const std::string log = (directory.path / "log").string();
@@ -294,6 +316,8 @@ TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
     EXPECT_EQ(serve({"--status", "127.0.0.1:94x"}), 2);
     EXPECT_EQ(serve({"--listen", "0.0.0.0:0"}), 2) << "beyond loopback";
     EXPECT_EQ(serve({"--lease", "nan"}), 2);
+    EXPECT_EQ(serve({"--listen", "127.0.0.1:0", "--status", "a.name:0", "--allow-plaintext", "--data",
+                     (directory.path / "data").string()}), 2) << "of a host, not an address";
     EXPECT_EQ(serve({"--threads", "02"}), 2);
     EXPECT_EQ(Process("lightloom-worker", {"--threads", "0x2"}, log).wait(), 2);
     EXPECT_EQ(run({"render", kScene, "--resolution", "12"}), 2);
