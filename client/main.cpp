@@ -3,7 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "client/commands.h"
-#include "common/core/log.h"
+#include "common/cli/log.h"
 #include "common/work/identity.h"
 
 namespace {

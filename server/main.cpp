@@ -12,8 +12,8 @@
 #include <optional>
 #include <thread>
 
+#include "common/cli/log.h"
 #include "common/cli/numbers.h"
-#include "common/core/log.h"
 #include "common/film/atomic_file.h"
 #include "common/work/identity.h"
 #include "server/data_lock.h"

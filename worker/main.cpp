@@ -12,8 +12,8 @@
 #include <iostream>
 #include <thread>
 
+#include "common/cli/log.h"
 #include "common/cli/numbers.h"
-#include "common/core/log.h"
 #include "common/work/identity.h"
 #include "worker/grpc_worker_port.h"
 #include "worker/scene_cache.h"

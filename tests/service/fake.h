@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "common/core/log.h"
+#include "common/cli/log.h"
 #include "common/core/rng.h"
 #include "server/coordinator.h"
 #include "server/local_ports.h"

@@ -1,4 +1,4 @@
-#include "common/core/log.h"
+#include "common/cli/log.h"
 
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
