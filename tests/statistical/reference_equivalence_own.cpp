@@ -68,13 +68,16 @@ Result<RatioInterval> light_against_bdpt(const Options& options, const LoadedSce
                                          nlohmann::ordered_json* line) {
     auto light = catalog_group(loaded, "light", options.seed);
     if (!light.ok()) return light.status();
-    // Half of the time each; the seeds differ, because the two estimates have to be independent.
+    // Most of the time for the noisier side, the same share in every scene: shares that followed the samples would bias the
+    // means. The seeds differ, because the two estimates have to be independent.
+    constexpr double kLightShare = 0.85;
     const auto never = [](const Rendering&) { return false; };
-    auto a = render_groups(*loaded.scene, *light, options.seconds / 2, never);
+    auto a = render_groups(*loaded.scene, *light, options.seconds * kLightShare, never);
     if (!a.ok()) return a.status();
     BdptAlgorithm<SplattablePaths> bdpt;
     bdpt.selection.light_paths_per_iteration = double(loaded.scene->frame().crop.area());
-    auto b = render_groups(*loaded.scene, group_of(loaded, bdpt, options.seed + 1), options.seconds / 2, never);
+    auto b = render_groups(*loaded.scene, group_of(loaded, bdpt, options.seed + 1),
+                           options.seconds * (1 - kLightShare), never);
     if (!b.ok()) return b.status();
     (*line)["light_spp"] = a->iterations;
     (*line)["bdpt_spp"] = b->iterations;
