@@ -16,7 +16,6 @@ namespace lightloom {
 namespace {
 
 constexpr std::chrono::milliseconds kTick(20);
-constexpr double kLearningSteps = 1000;  ///< Into which progress of learning is divided.
 
 /// Ids need only be unique, also across restarts of the coordinator.
 std::string new_id(const char* prefix) {
@@ -42,7 +41,7 @@ Status no_job(const std::string& id) {
 
 Coordinator::Coordinator(CoordinatorOptions options)
     : options_(std::move(options)), assets_(options_.directory / "assets"),
-      table_cache_(options_.table_cache, options_.table_cache_bytes),
+      table_cache_(options_.table_cache, options_.table_cache_bytes), workers_(options_.lease_seconds),
       ticker_([this](std::stop_token stop) { tick(stop); }) {
     // Jobs do not outlive the coordinator, so nobody names the tables that it finds.
     if (const size_t count = assets_.remove_all_that_begin_with(kTablesPrefix); count > 0)
@@ -74,11 +73,7 @@ Coordinator::~Coordinator() {
     }
 }
 
-TimePoint Coordinator::after(double seconds) const {
-    return options_.clock() + std::chrono::duration_cast<TimePoint::duration>(std::chrono::duration<double>(seconds));
-}
-
-std::shared_ptr<Coordinator::JobRecord> Coordinator::find_job(const std::string& job_id) const {
+std::shared_ptr<JobRecord> Coordinator::find_job(const std::string& job_id) const {
     for (const auto& job : jobs_) {
         if (job->id == job_id) return job;
     }
@@ -132,7 +127,7 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     const auto repeated = [&]() -> std::optional<Result<JobInfo>> {
         const auto known = requests_.find(request_id);
         if (known == requests_.end()) return std::nullopt;
-        if (same_request(known->second->submitted, spec)) return Result<JobInfo>(snapshot(*known->second));
+        if (same_request(known->second->submitted, spec)) return Result<JobInfo>(known->second->info(options_.clock()));
         return Result<JobInfo>(
             Status(StatusCode::kAlreadyExists, "request " + request_id + " was used for another job; use a new id"));
     };
@@ -164,19 +159,19 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     spdlog::info("{}: accepted, {} {}", job.id, spec.algorithm, job.spec.scene_root.hex().substr(0, 12));
     start_task(job, &job.prepare_task, "to prepare this job: its scene or frame is too large",
                [this, &job](std::stop_token stop) { return prepare(job, stop); });
-    return snapshot(job);
+    return job.info(options_.clock());
 }
 
 Result<JobInfo> Coordinator::get_job(const std::string& job_id) const {
     const std::lock_guard lock(mutex_);
     const auto job = find_job(job_id);
-    return job ? Result<JobInfo>(snapshot(*job)) : no_job(job_id);
+    return job ? Result<JobInfo>(job->info(options_.clock())) : no_job(job_id);
 }
 
 std::vector<JobInfo> Coordinator::list_jobs() const {
     const std::lock_guard lock(mutex_);
     std::vector<JobInfo> out;
-    for (const auto& job : jobs_) out.push_back(snapshot(*job));
+    for (const auto& job : jobs_) out.push_back(job->info(options_.clock()));
     return out;
 }
 
@@ -189,7 +184,7 @@ Result<JobInfo> Coordinator::cancel_job(const std::string& job_id) {
         job->train_task.request_stop();
         end_job(*job, JobState::kCancelled);
     }
-    return snapshot(*job);
+    return job->info(options_.clock());
 }
 
 Result<JobInfo> Coordinator::wait_job(const std::string& job_id, uint64_t after_revision, double timeout_seconds) const {
@@ -199,7 +194,7 @@ Result<JobInfo> Coordinator::wait_job(const std::string& job_id, uint64_t after_
     job_changed_.wait_for(lock, std::chrono::duration<double>(timeout_seconds),
                           [&] { return closing_ || job->revision > after_revision; });
     if (closing_) return Status(StatusCode::kUnavailable, "the coordinator is going down");
-    return snapshot(*job);
+    return job->info(options_.clock());
 }
 
 Result<std::string> Coordinator::image(const std::string& job_id, ImageKind kind) const {
@@ -235,68 +230,6 @@ Result<std::string> Coordinator::manifest(const std::string& job_id) const {
         directory = job->directory;
     }
     return read_file((directory / "manifest.json").string());
-}
-
-JobInfo Coordinator::snapshot(const JobRecord& job) const {
-    JobInfo info;
-    info.job_id = job.id;
-    info.state = job.state;
-    info.spec = job.spec;
-    info.message = job.message;
-    info.revision = job.revision;
-    const TimePoint now = options_.clock();
-    if (job.units) {
-        info.unit_total = job.units->unit_total();
-        info.unit_done = job.units->done_count();
-        info.unit_leased = job.units->leased_count();
-    } else {
-        info.unit_total = job.ended_units.total;
-        info.unit_done = job.ended_units.done;
-    }
-    info.samples_per_pixel_done = job.merged_iterations;
-    const bool ended = is_terminal(job.state);
-    if (job.prepared != TimePoint())
-        info.prepare_seconds = seconds_between(job.created, job.prepared);
-    if (job.rendering) {
-        const bool over = ended || job.state == JobState::kFinishing;
-        info.render_seconds = seconds_between(job.first_render, over ? job.finishing : now);
-        if (over) {
-            info.eta_seconds = 0;
-        } else if (job.spec.time_limit_seconds > 0) {
-            info.eta_seconds = std::max(0.0, job.spec.time_limit_seconds - info.render_seconds);
-        } else if (info.unit_done > 0) {
-            info.eta_seconds = info.render_seconds * double(info.unit_total - info.unit_done) / double(info.unit_done);
-        }
-    }
-    if (ended && job.rendering) info.finish_seconds = seconds_between(job.finishing, job.ended);
-    info.dropped_samples = job.dropped;
-    info.camera_samples = job.counters.camera_samples;
-    info.light_paths = job.counters.light_paths;
-    info.rays = job.counters.rays;
-    info.worker_count = uint32_t(job.workers.size());
-    info.image_digest = job.image_digest;
-    info.image_size_bytes = job.image_size;
-    info.duplicates_same = job.duplicates_same;
-    info.duplicates_different = job.duplicates_different;
-    info.tables = job.tables;
-    info.phase = job.phase;
-    if (job.maker) {
-        info.waits_for = job.maker->id;
-        info.eta_seconds = snapshot(*job.maker).eta_seconds;
-    }
-    if (job.phase == PreparePhase::kLearning && job.state == JobState::kPreparing) {
-        info.phase_total = kLearningSteps;
-        info.phase_done = uint64_t(kLearningSteps * job.learning.share);
-        if (const auto left = job.learning.seconds_left(now)) info.eta_seconds = *left;
-    } else if (job.round) {
-        info.unit_leased = job.round->units().leased_count();
-        info.phase_total = job.round->work().total_samples;
-        info.phase_done = job.round->samples_done();
-        if (job.phase == PreparePhase::kTracing && info.phase_done > 0)
-            info.eta_seconds = seconds_between(job.training_begin, now) * double(info.phase_total - info.phase_done) /
-                               double(info.phase_done);
-    }
-    return info;
 }
 
 void Coordinator::end_job(JobRecord& job, JobState state) {
@@ -343,17 +276,12 @@ void Coordinator::leases_expired(JobRecord& job, UnitTable& units, const std::ve
     spdlog::warn("{}: {} lease(s) ran out; the units go to other workers", job.id, expired.size());
     work_changed_.notify_all();
     for (const UnitTable::Expired& lease : expired) {
-        // A worker that is heard of has lost a lease on the way, not its life. Of those that a silent one held, the oldest was in
-        // work and bears the blame; the others waited behind it.
-        WorkerRecord& worker = *workers_[lease.worker];
-        if (worker.left || worker.blamed == worker.last_heard ||
-            seconds_between(worker.last_heard, options_.clock()) < 0.5 * options_.lease_seconds)
-            continue;
-        worker.blamed = worker.last_heard;
+        // Of the units that a silent worker held, the oldest was in work and bears the blame; the others waited behind it.
+        if (!workers_.fell_silent(lease.worker, options_.clock())) continue;
         const std::set<uint32_t> lost = units.lose(lease.unit, lease.worker);
         if (lost.size() < kMaxLostWorkers) continue;
         std::string names;
-        for (const uint32_t index : lost) names += (names.empty() ? "" : ", ") + workers_[index]->id;
+        for (const uint32_t index : lost) names += (names.empty() ? "" : ", ") + workers_.at(index).id;
         return fail_job(job, {StatusCode::kAborted, "unit " + unit_name(lease.unit) + ": " + std::to_string(lost.size()) +
                                                         " workers fell silent over it (" + names +
                                                         "); it may crash them or exhaust their memory, see their logs"});
@@ -382,7 +310,7 @@ void Coordinator::tick(std::stop_token stop) {
         const TimePoint now = options_.clock();
         for (const auto& job : jobs_) {
             if (job->maker) resume_waiting(job);
-            UnitTable* const units = open_table(*job);
+            UnitTable* const units = job->open_units();
             if (!units) continue;
             if (const auto expired = units->expire(now); !expired.empty()) {
                 leases_expired(*job, *units, expired);

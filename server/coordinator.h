@@ -12,27 +12,17 @@
 #include <optional>
 #include <thread>
 
-#include "common/film/exr_io.h"
 #include "common/film/partial_exr.h"
 #include "common/tables/train.h"
 #include "common/work/service.h"
-#include "server/reducer.h"
+#include "server/scene_facts.h"
 #include "server/table_cache.h"
 #include "server/unit_table.h"
+#include "server/worker_registry.h"
 
 namespace lightloom {
 
-/// What a job needs to know of its scene before units can be planned.
-struct SceneFacts {
-    FrameLayout frame;         ///< With the job's resolution.
-    float exposure_scale = 1;  ///< Multiplies the developed image.
-    int max_depth = 5;         ///< Bounces, if the job leaves them to the scene.
-    std::vector<ImageLayer> layers;  ///< First-hit layers, if the job asks for them.
-    /// The built scene, of which learning needs the lights. Called only for a job whose tables have to be made; holds no scene.
-    std::function<Result<std::shared_ptr<const Scene>>()> build_scene;
-};
-
-using SceneReader = std::function<Result<SceneFacts>(const AssetStore& assets, const JobSpec& spec, std::stop_token stop)>;
+struct JobRecord;
 
 struct CoordinatorOptions {
     std::filesystem::path directory;  ///< Assets and finished images; made if need be.
@@ -49,15 +39,6 @@ struct CoordinatorOptions {
     uint64_t training_bytes = uint64_t(4) << 30;   ///< Room for the training data of one job.
     size_t max_jobs = 10000;  ///< That have not ended.
     size_t kept_jobs = 1000;  ///< Ended jobs that are remembered; the oldest are forgotten, their files stay.
-};
-
-struct WorkerStatus {
-    std::string worker_id, host;
-    uint64_t process_id = 0;
-    uint32_t thread_count = 0;
-    uint64_t units_merged = 0, units_held = 0;
-    double seconds_since_heard = 0;
-    bool lost = false;  ///< Not heard of for longer than a lease, or said goodbye.
 };
 
 class Coordinator {
@@ -101,16 +82,10 @@ class Coordinator {
     std::vector<WorkerStatus> workers() const;
 
   private:
-    struct WorkerRecord;
-    struct JobRecord;
-
     /// Shared, because a job may be forgotten while a caller works without the mutex.
     std::shared_ptr<JobRecord> find_job(const std::string& job_id) const;
-    WorkerRecord* find_worker(const std::string& worker_id) const;
-    TimePoint after(double seconds) const;
-    static double seconds_between(TimePoint a, TimePoint b) { return std::chrono::duration<double>(b - a).count(); }
+    TimePoint lease_end() const { return seconds_after(options_.clock(), options_.lease_seconds); }
     void changed(JobRecord& job);
-    JobInfo snapshot(const JobRecord& job) const;
     Result<JobSpec> canonical_spec(const JobSpec& spec) const;
     Status check_assets(const JobSpec& spec) const;
     void fail_job(JobRecord& job, const Status& why);
@@ -123,9 +98,6 @@ class Coordinator {
     void plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables);
     Status prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait);
     std::shared_ptr<JobRecord> find_maker(const JobRecord& job) const;
-    /// The job itself, or who makes the tables that it, and those that it waits for, wait for. Jobs never wait in a circle: who
-    /// waits makes no tables, and only makers are waited for.
-    static const std::shared_ptr<JobRecord>& maker_of_last_resort(const std::shared_ptr<JobRecord>& job);
     /// True if another job makes the tables of `table_key`: this one waits for them.
     bool wait_for_maker(JobRecord& job);
     void resume_waiting(const std::shared_ptr<JobRecord>& job);
@@ -148,10 +120,6 @@ class Coordinator {
     /// Removes the asset of an ended job's tables unless another job needs it.
     void drop_tables(const Digest& digest);
     Status store_tables(const Digest& digest, std::string_view bytes);
-    /// The open units of a kind, or null.
-    static UnitTable* table_for(JobRecord& job, UnitKind kind);
-    /// The units that can be leased now, or null.
-    static UnitTable* open_table(JobRecord& job);
     void size_window(JobRecord& job) const;
     Status write_results(JobRecord& job);
     void forget_old_jobs();
@@ -173,7 +141,7 @@ class Coordinator {
     std::vector<std::shared_ptr<JobRecord>> jobs_;            // oldest first
     std::vector<std::shared_ptr<void>> discarded_;            // large things that the ticker frees without the mutex
     std::map<std::string, JobRecord*> requests_;              // by request id
-    std::vector<std::unique_ptr<WorkerRecord>> workers_;      // never removed: units refer to them by index
+    WorkerRegistry workers_;
     bool closing_ = false;
     std::jthread ticker_;  // last: stops before anything that it uses goes away
 };

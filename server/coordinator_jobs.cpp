@@ -10,6 +10,7 @@
 
 #include "common/film/atomic_file.h"
 #include "common/transport/catalog.h"
+#include "server/coordinator.h"
 #include "server/job_record.h"
 #include "server/results.h"
 
@@ -161,14 +162,14 @@ Status Coordinator::write_results(JobRecord& job) {
         for (const UnitTable::Merged& unit : manifest.units) job.workers.insert(unit.worker);
         job.dropped = reducer->dropped();
         std::erase_if(job.dropped_samples, [&](const auto& d) { return d.unit.group >= job.merged_groups; });
-        manifest.job = snapshot(job);
+        manifest.job = job.info(options_.clock());
         manifest.identity = options_.identity;
         manifest.created_at = job.created_at;
         manifest.finished_at = utc_now();
         manifest.groups = job.merged_groups;
         manifest.iterations = job.merged_iterations;
         for (const uint32_t index : job.workers) {
-            const WorkerRecord& w = *workers_[index];
+            const WorkerRecord& w = workers_.at(index);
             manifest.workers.push_back({index, w.id, w.hello.host, w.hello.process_id, w.hello.thread_count});
         }
         for (const JobRecord::Dropped& d : job.dropped_samples) manifest.dropped.push_back({d.unit, d.sample});

@@ -8,6 +8,7 @@
 
 #include "common/transport/catalog.h"
 #include "common/transport/parameters.h"
+#include "server/coordinator.h"
 #include "server/job_record.h"
 #include "server/training_budget.h"
 
@@ -169,20 +170,14 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
     JobSpec spec;
     SceneFacts facts;
     double traced = 0;
-    size_t crew = 0;
-    uint32_t threads = 1;  // of the worker that traced the probe: the largest, to be safe
+    WorkerRegistry::Crew crew;
     {
         const std::lock_guard lock(mutex_);
         if (job.state != JobState::kPreparing) return over();
         spec = job.spec;
         facts = job.facts;
         traced = job.round->traced_seconds();
-        const TimePoint now = options_.clock();
-        for (const auto& w : workers_) {
-            if (w->left || seconds_between(w->last_heard, now) > options_.lease_seconds) continue;
-            ++crew;
-            threads = std::max(threads, w->hello.thread_count);
-        }
+        crew = workers_.crew(options_.clock());
     }
     const auto parameters = TransportParameters::read(render_settings(spec));
     if (!parameters.ok()) return parameters.status();
@@ -192,11 +187,12 @@ Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& 
     if (!tables.ok()) return tables.status();
     const double learned = seconds_since(begin), samples = double(std::max<uint64_t>(1, probe.samples));
     const uint64_t wanted = parameters->training_samples;
+    const uint32_t threads = std::max(1u, crew.most_threads);  // of the worker that traced the probe: the largest, to be safe
     const auto affordable = [&](bool guided, uint64_t most) {
         // Every round learns once more what the probe's learning cost.
         const double budget = kTrainingShare * spec.time_limit_seconds - traced - (guided ? 3 : 2) * learned;
         const double per_sample = (guided ? kGuidedCost : 1) * traced / samples;
-        const TrainingRate rate{per_sample / double(std::max<size_t>(1, crew)), kLearningOverTracing * per_sample * threads};
+        const TrainingRate rate{per_sample / double(std::max<size_t>(1, crew.workers)), kLearningOverTracing * per_sample * threads};
         return affordable_training_samples(rate, budget, most);
     };
     const auto has_pilot = [&](uint64_t n) {

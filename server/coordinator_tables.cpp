@@ -10,6 +10,7 @@
 
 #include "common/transport/catalog.h"
 #include "common/transport/parameters.h"
+#include "server/coordinator.h"
 #include "server/job_record.h"
 #include "server/training_budget.h"
 
@@ -22,18 +23,6 @@ uint64_t training_samples(const JobSpec& spec) {
 }
 
 }  // namespace
-
-UnitTable* Coordinator::open_table(JobRecord& job) {
-    if (job.state == JobState::kRunning) return &*job.units;
-    return job.state == JobState::kPreparing && job.round ? &job.round->units() : nullptr;
-}
-
-UnitTable* Coordinator::table_for(JobRecord& job, UnitKind kind) {
-    UnitTable* const table = open_table(job);
-    if (!table) return nullptr;
-    const UnitKind open = job.state == JobState::kRunning ? UnitKind::kRender : job.round->kind();
-    return kind == open ? table : nullptr;
-}
 
 void Coordinator::discard_training(JobRecord& job) {
     discarded_.push_back(std::make_shared<SceneFacts>(std::exchange(job.facts, {})));
@@ -76,18 +65,12 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
     return {};
 }
 
-std::shared_ptr<Coordinator::JobRecord> Coordinator::find_maker(const JobRecord& job) const {
+std::shared_ptr<JobRecord> Coordinator::find_maker(const JobRecord& job) const {
     for (const auto& other : jobs_) {
         const bool makes = other->makes_tables && !is_terminal(other->state);
         if (other.get() != &job && makes && other->table_key == job.table_key) return other;
     }
     return nullptr;
-}
-
-const std::shared_ptr<Coordinator::JobRecord>& Coordinator::maker_of_last_resort(const std::shared_ptr<JobRecord>& job) {
-    const std::shared_ptr<JobRecord>* maker = &job;
-    while ((*maker)->maker) maker = &(*maker)->maker;
-    return *maker;
 }
 
 bool Coordinator::wait_for_maker(JobRecord& job) {
@@ -202,7 +185,7 @@ void Coordinator::drop_tables(const Digest& digest) {
 Result<uint64_t> Coordinator::expected_training_bytes(const UnitReference& reference) const {
     const std::lock_guard lock(mutex_);
     const auto job = find_job(reference.job_id);
-    UnitTable* const units = job ? table_for(*job, reference.key.kind) : nullptr;
+    UnitTable* const units = job ? job->open_units(reference.key.kind) : nullptr;
     if (!units || reference.key.kind == UnitKind::kRender)
         return not_found("job " + reference.job_id + " takes no such training data (any more)");
     const auto unit = units->find(reference.key);
@@ -226,12 +209,12 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
     if (!(trace_seconds >= 0 && trace_seconds < 1e9)) trace_seconds = 0;
 
     const std::lock_guard lock(mutex_);
-    WorkerRecord* worker = find_worker(worker_id);
+    WorkerRecord* worker = workers_.find(worker_id);
     if (!worker) return no_worker(worker_id);
     worker->last_heard = options_.clock();
     worker->held.erase(reference);
     const auto job = find_job(reference.job_id);
-    UnitTable* const units = job ? table_for(*job, reference.key.kind) : nullptr;
+    UnitTable* const units = job ? job->open_units(reference.key.kind) : nullptr;
     if (!units) return SubmitAck{SubmitOutcome::kStale, "job " + reference.job_id + " has its training data already"};
     const auto unit = units->find(reference.key);
     if (!unit) return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};

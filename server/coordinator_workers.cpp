@@ -2,13 +2,11 @@
 
 #include <spdlog/spdlog.h>
 
+#include "server/coordinator.h"
 #include "server/job_record.h"
 
 namespace lightloom {
 namespace {
-
-/// A worker may hold one unit beside the one that it renders, so that it does not idle between two.
-constexpr size_t kMaxHeld = 2;
 
 std::string describe(const BuildIdentity& identity) {
     return "build " + identity.build_id + ", math profile \"" + identity.math_profile + "\", golden unit " +
@@ -16,13 +14,6 @@ std::string describe(const BuildIdentity& identity) {
 }
 
 }  // namespace
-
-Coordinator::WorkerRecord* Coordinator::find_worker(const std::string& worker_id) const {
-    for (const auto& worker : workers_) {
-        if (worker->id == worker_id) return worker->left ? nullptr : worker.get();
-    }
-    return nullptr;
-}
 
 Result<WorkerGrant> Coordinator::register_worker(const WorkerHello& hello) {
     if (hello.thread_count == 0) return invalid_argument("a worker needs at least one thread");
@@ -35,32 +26,23 @@ Result<WorkerGrant> Coordinator::register_worker(const WorkerHello& hello) {
         return refusal;
     }
     const std::lock_guard lock(mutex_);
-    auto worker = std::make_unique<WorkerRecord>();
-    worker->id = "worker-" + std::to_string(workers_.size() + 1) + "-" + hello.host + "-" + std::to_string(hello.process_id);
-    worker->index = uint32_t(workers_.size());
-    worker->hello = hello;
-    worker->last_heard = options_.clock();
-    spdlog::info("{}: registered, {} thread(s)", worker->id, hello.thread_count);
-    const WorkerGrant grant{worker->id, options_.heartbeat_seconds, options_.lease_seconds};
-    workers_.push_back(std::move(worker));
-    return grant;
+    const WorkerRecord& worker = workers_.add(hello, options_.clock());
+    spdlog::info("{}: registered, {} thread(s)", worker.id, hello.thread_count);
+    return WorkerGrant{worker.id, options_.heartbeat_seconds, options_.lease_seconds};
 }
 
 std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
-    if (worker.held.size() >= kMaxHeld) return std::nullopt;
+    if (!worker.has_room()) return std::nullopt;
     // A second unit only if enough are left for those workers that have none: a unit must not wait behind another one
     // while somebody idles.
-    size_t idle = 0;
-    if (!worker.held.empty()) {
-        for (const auto& other : workers_) idle += other->held.empty() && other->waiting > 0;
-    }
+    const size_t idle = worker.held.empty() ? 0 : workers_.idle();
     for (const auto& in_line : jobs_) {
         // A job that waits for tables lends its place to the job that makes them, which may be a younger one.
         const std::shared_ptr<JobRecord> job = maker_of_last_resort(in_line);
         if (job != in_line && job->state != JobState::kPreparing) continue;
-        UnitTable* const units = open_table(*job);
+        UnitTable* const units = job->open_units();
         if (!units || (!worker.held.empty() && !units->has_more_than(idle))) continue;
-        const auto unit = units->lease(worker.index, after(options_.lease_seconds));
+        const auto unit = units->lease(worker.index, lease_end());
         if (!unit) continue;
         const bool render = unit->key.kind == UnitKind::kRender;
         if (!render && job->training_begin == TimePoint()) {
@@ -84,7 +66,7 @@ Result<std::vector<UnitLease>> Coordinator::lease_units(const std::string& worke
     if (!(wait_seconds >= 0)) return invalid_argument("a worker waits for 0 or more seconds");
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(std::min(wait_seconds, 5.0));
     std::unique_lock lock(mutex_);
-    WorkerRecord* worker = find_worker(worker_id);
+    WorkerRecord* worker = workers_.find(worker_id);
     if (!worker) return no_worker(worker_id);
     ++worker->waiting;
     std::vector<UnitLease> leases;
@@ -106,15 +88,15 @@ Result<std::vector<UnitLease>> Coordinator::lease_units(const std::string& worke
 Result<std::vector<UnitReference>> Coordinator::heartbeat(const std::string& worker_id,
                                                           const std::vector<RunningUnit>& running) {
     const std::lock_guard lock(mutex_);
-    WorkerRecord* worker = find_worker(worker_id);
+    WorkerRecord* worker = workers_.find(worker_id);
     if (!worker) return no_worker(worker_id);
     worker->last_heard = options_.clock();
     std::vector<UnitReference> revoked;
     std::set<UnitReference> held;
     for (const RunningUnit& item : running) {
         const auto job = find_job(item.unit.job_id);
-        UnitTable* const units = job ? table_for(*job, item.unit.key.kind) : nullptr;
-        if (!units || !units->renew(item.unit.key, worker->index, after(options_.lease_seconds))) {
+        UnitTable* const units = job ? job->open_units(item.unit.key.kind) : nullptr;
+        if (!units || !units->renew(item.unit.key, worker->index, lease_end())) {
             revoked.push_back(item.unit);
             continue;
         }
@@ -134,11 +116,11 @@ Status Coordinator::release_unit(const std::string& worker_id, const UnitReferen
     const bool lost_bytes = why.code() == StatusCode::kDataLoss || why.code() == StatusCode::kNotFound;
     const bool repaired = lost_bytes && repair_tables(unit.job_id);
     const std::lock_guard lock(mutex_);
-    WorkerRecord* worker = find_worker(worker_id);
+    WorkerRecord* worker = workers_.find(worker_id);
     if (!worker) return no_worker(worker_id);
     worker->held.erase(unit);
     const auto job = find_job(unit.job_id);
-    UnitTable* const units = job ? table_for(*job, unit.key.kind) : nullptr;
+    UnitTable* const units = job ? job->open_units(unit.key.kind) : nullptr;
     if (!units) return {};
     // What a network did to a worker says nothing about the unit: it costs time only.
     const bool blameless = repaired || why.code() == StatusCode::kCancelled || why.code() == StatusCode::kUnavailable ||
@@ -155,10 +137,10 @@ Status Coordinator::release_unit(const std::string& worker_id, const UnitReferen
 
 Status Coordinator::goodbye(const std::string& worker_id) {
     const std::lock_guard lock(mutex_);
-    WorkerRecord* worker = find_worker(worker_id);
+    WorkerRecord* worker = workers_.find(worker_id);
     if (!worker) return no_worker(worker_id);
     for (const auto& job : jobs_) {
-        if (UnitTable* const units = open_table(*job)) units->release_all(worker->index);
+        if (UnitTable* const units = job->open_units()) units->release_all(worker->index);
     }
     worker->held.clear();
     worker->left = true;
@@ -188,7 +170,7 @@ Result<SubmitAck> Coordinator::submit_payload(const std::string& worker_id, cons
     if (partial.ok()) return submit_partial(worker_id, unit, descriptor.payload_digest, *std::move(partial));
 
     const std::lock_guard lock(mutex_);
-    WorkerRecord* worker = find_worker(worker_id);
+    WorkerRecord* worker = workers_.find(worker_id);
     if (!worker) return no_worker(worker_id);
     worker->held.erase(unit);
     if (const auto job = find_job(unit.job_id); job && job->state == JobState::kRunning) {
@@ -225,7 +207,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     WorkUnit unit;
     {
         const std::lock_guard lock(mutex_);
-        WorkerRecord* worker = find_worker(worker_id);
+        WorkerRecord* worker = workers_.find(worker_id);
         if (!worker) return no_worker(worker_id);
         worker->last_heard = options_.clock();
         worker->held.erase(reference);
@@ -263,7 +245,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
         job->splats_per_path = splats_per_path;
         size_window(*job);
     }
-    ++workers_[index]->merged;
+    ++workers_.at(index).merged;
     job->workers.insert(index);
     job->counters.camera_samples += counters.camera_samples;
     job->counters.light_paths += counters.light_paths;
@@ -289,14 +271,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
 
 std::vector<WorkerStatus> Coordinator::workers() const {
     const std::lock_guard lock(mutex_);
-    const TimePoint now = options_.clock();
-    std::vector<WorkerStatus> out;
-    for (const auto& w : workers_) {
-        const double silent = seconds_between(w->last_heard, now);
-        out.push_back({w->id, w->hello.host, w->hello.process_id, w->hello.thread_count, w->merged, w->held.size(),
-                       silent, w->left || silent > options_.lease_seconds});
-    }
-    return out;
+    return workers_.statuses(options_.clock());
 }
 
 }  // namespace lightloom

@@ -1,27 +1,24 @@
 #pragma once
-// The coordinator's own records. Private to server/coordinator*.cpp; every field is guarded by the coordinator's mutex unless
-// it says otherwise.
+// JobRecord: all that the coordinator knows of a job. Its fields are the coordinator's to change, under the coordinator's mutex
+// unless they say otherwise; what can be told from them alone is told here.
 
+#include <filesystem>
+#include <memory>
+#include <optional>
 #include <set>
+#include <string>
+#include <thread>
+#include <vector>
 
-#include "server/coordinator.h"
+#include "server/reducer.h"
+#include "server/scene_facts.h"
+#include "server/time_point.h"
 #include "server/training_round.h"
+#include "server/unit_table.h"
 
 namespace lightloom {
 
-struct Coordinator::WorkerRecord {
-    std::string id;
-    uint32_t index = 0;  ///< In workers_.
-    WorkerHello hello;
-    TimePoint last_heard;
-    std::optional<TimePoint> blamed;  ///< The last_heard for which a unit bears the blame already.
-    bool left = false;
-    uint32_t waiting = 0;  ///< lease_units calls that wait now.
-    uint64_t merged = 0;
-    std::set<UnitReference> held;
-};
-
-struct Coordinator::JobRecord {
+struct JobRecord {
     std::string id, request_id;
     JobSpec submitted;  ///< As it came, to recognise a repeated submission.
     JobSpec spec;       ///< Canonical, completed from the scene.
@@ -76,20 +73,23 @@ struct Coordinator::JobRecord {
 
     std::jthread prepare_task, train_task, finish_task;
     int running_tasks = 0;  ///< Of these. A job is forgotten only without any, so that nobody waits for one under the mutex.
+
+    JobInfo info(TimePoint now) const;
+    /// The units that can be leased now, or null.
+    UnitTable* open_units();
+    /// The same if they are of that kind, otherwise null.
+    UnitTable* open_units(UnitKind kind);
 };
 
-inline std::optional<double> Coordinator::JobRecord::Learning::seconds_left(TimePoint now) const {
-    if (!(share > 0)) return std::nullopt;
-    return std::max(0.0, seconds_between(begin, heard) * (1 - share) / share - seconds_between(heard, now));
-}
+/// The job itself, or who makes the tables that it, and those that it waits for, wait for. Jobs never wait in a circle: who waits
+/// makes no tables, and only makers are waited for.
+const std::shared_ptr<JobRecord>& maker_of_last_resort(const std::shared_ptr<JobRecord>& job);
 
 /// Behind the word "unit", for people.
 inline std::string unit_name(const UnitKey& key) {
     return key.kind == UnitKind::kRender ? std::to_string(key.group) + "/" + std::to_string(key.tile)
                                          : "of training " + std::to_string(key.group);
 }
-
-inline Status no_worker(const std::string& id) { return not_found("unknown worker " + id + "; register again"); }
 
 inline constexpr size_t kMaxDroppedPerJob = 64;
 /// A unit that failed on this many workers fails its job: it is the unit, not the workers.

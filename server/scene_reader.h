@@ -1,8 +1,10 @@
 #pragma once
 // Reads what a job needs to know of its scene from the asset store.
 
+#include <filesystem>
+
 #include "common/import/import.h"
-#include "server/coordinator.h"
+#include "server/scene_facts.h"
 
 namespace lightloom {
 

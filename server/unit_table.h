@@ -4,7 +4,6 @@
 // each unit of an open group, 16 bytes for each unit of a merged one.
 
 #include <algorithm>
-#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -13,10 +12,9 @@
 
 #include "common/core/digest.h"
 #include "common/work/job.h"
+#include "server/time_point.h"
 
 namespace lightloom {
-
-using TimePoint = std::chrono::steady_clock::time_point;
 
 class UnitTable {
   public:

@@ -1,11 +1,13 @@
-// What the coordinator keeps, and for how long: the table of units, the sums, the list of jobs.
+// What the coordinator keeps, and for how long: the table of units, the workers, the sums, the list of jobs.
 
 #include <gtest/gtest.h>
 
 #include "common/film/atomic_file.h"
 #include "common/scene/scene.h"
+#include "server/reducer.h"
 #include "server/scene_reader.h"
 #include "server/training_round.h"
+#include "server/worker_registry.h"
 #include "tests/service/fake.h"
 
 namespace lightloom {
@@ -67,6 +69,57 @@ TEST(UnitTable, AMillionIterationsNeedNoRoomBeforeTheyAreLeased) {
     EXPECT_EQ(table.group_total(), 1u << 24);
     EXPECT_TRUE(table.lease(0, kNever));
     EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(500));
+}
+
+TimePoint at_second(double seconds) { return seconds_after(TimePoint(), seconds); }
+
+TEST(WorkerRegistry, KnowsWhoIsThereAndWhoIsIdle) {
+    WorkerRegistry registry(10);
+    WorkerRecord& first = registry.add({{}, 2, "host", 7}, at_second(0));
+    WorkerRecord& second = registry.add({{}, 8, "host", 7}, at_second(0));
+    EXPECT_NE(first.id, second.id) << "two workers of one process";
+    EXPECT_EQ(registry.find(second.id), &second);
+    EXPECT_EQ(&registry.at(first.index), &first);
+    EXPECT_EQ(registry.find("worker-3-host-7"), nullptr);
+
+    first.waiting = second.waiting = 1;
+    second.held = {{"job", {0, 0}}};
+    EXPECT_EQ(registry.idle(), 1u) << "the second has something to do";
+    EXPECT_TRUE(second.has_room());
+    second.held.insert({"job", {0, 1}});
+    EXPECT_FALSE(second.has_room());
+
+    const auto crew_at = [&](double seconds) { return registry.crew(at_second(seconds)); };
+    EXPECT_EQ(crew_at(10).workers, 2u);
+    EXPECT_EQ(crew_at(10).most_threads, 8u);
+    first.last_heard = at_second(5);
+    EXPECT_EQ(crew_at(11).workers, 1u);
+    EXPECT_EQ(crew_at(11).most_threads, 2u);
+    const auto statuses = registry.statuses(at_second(11));
+    ASSERT_EQ(statuses.size(), 2u);
+    EXPECT_FALSE(statuses[first.index].lost);
+    EXPECT_TRUE(statuses[second.index].lost);
+    EXPECT_EQ(statuses[second.index].units_held, 2u);
+    EXPECT_EQ(statuses[second.index].seconds_since_heard, 11);
+
+    first.left = true;
+    EXPECT_EQ(registry.find(first.id), nullptr);
+    EXPECT_EQ(crew_at(6).workers, 1u);
+    EXPECT_TRUE(registry.statuses(at_second(6))[first.index].lost);
+    EXPECT_EQ(registry.at(first.index).id, first.id) << "manifests still name it";
+}
+
+TEST(WorkerRegistry, ASilenceIsHeldAgainstOneUnitOnly) {
+    WorkerRegistry registry(10);
+    WorkerRecord& worker = registry.add({{}, 1, "host", 1}, at_second(0));
+    EXPECT_FALSE(registry.fell_silent(worker.index, at_second(4))) << "it was heard of: the lease was lost on the way";
+    EXPECT_TRUE(registry.fell_silent(worker.index, at_second(11)));
+    EXPECT_FALSE(registry.fell_silent(worker.index, at_second(12))) << "the same silence";
+    worker.last_heard = at_second(13);
+    EXPECT_TRUE(registry.fell_silent(worker.index, at_second(24))) << "another one";
+    worker.last_heard = at_second(25);
+    worker.left = true;
+    EXPECT_FALSE(registry.fell_silent(worker.index, at_second(40))) << "it said goodbye";
 }
 
 /// The only splat of a unit's partial is `value`.

@@ -1,0 +1,28 @@
+#pragma once
+// What a job needs to know of its scene before units can be planned.
+
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <vector>
+
+#include "common/core/result.h"
+#include "common/film/exr_io.h"
+#include "common/film/frame.h"
+#include "common/scene/scene.h"
+#include "common/work/service.h"
+
+namespace lightloom {
+
+struct SceneFacts {
+    FrameLayout frame;         ///< With the job's resolution.
+    float exposure_scale = 1;  ///< Multiplies the developed image.
+    int max_depth = 5;         ///< Bounces, if the job leaves them to the scene.
+    std::vector<ImageLayer> layers;  ///< First-hit layers, if the job asks for them.
+    /// The built scene, of which learning needs the lights. Called only for a job whose tables have to be made; holds no scene.
+    std::function<Result<std::shared_ptr<const Scene>>()> build_scene;
+};
+
+using SceneReader = std::function<Result<SceneFacts>(const AssetStore& assets, const JobSpec& spec, std::stop_token stop)>;
+
+}  // namespace lightloom
