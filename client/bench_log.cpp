@@ -1,5 +1,6 @@
 #include "client/bench_log.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <system_error>
 
@@ -7,6 +8,16 @@
 #include "common/film/atomic_file.h"
 
 namespace lightloom::client {
+namespace {
+
+/// Whether a line of a benchmark begins like this, however little of it was written.
+bool begins_a_line(std::string_view text) {
+    constexpr std::string_view kBegin = "{\"run\":\"";
+    const size_t common = std::min(text.size(), kBegin.size());
+    return text.substr(0, common) == kBegin.substr(0, common);
+}
+
+}  // namespace
 
 Json BenchRun::json() const {
     return {{"scene_digest", scene_digest},
@@ -74,7 +85,7 @@ Result<BenchHistory> parse_history(std::string_view text, const std::string& fil
         Json json = Json::parse(line, nullptr, false);
         const auto run = json.is_object() ? json.find("run") : json.end();
         if (!json.is_object() || run == json.end() || !run->is_string()) {
-            if (!whole && line.starts_with('{') && json.is_discarded()) break;  // what a killed benchmark was writing
+            if (!whole && json.is_discarded() && begins_a_line(line)) break;  // what a killed benchmark was writing
             return invalid_argument(file_name + ":" + std::to_string(number) +
                                     ": not a line of a benchmark; repair the file or give another name");
         }
