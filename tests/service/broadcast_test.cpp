@@ -361,6 +361,39 @@ TEST(TrainingBudget, JobsThatSettleOnTheSameSetTrainOnce) {
     }
 }
 
+TEST(TrainingBudget, SoDoThreeOfThem) {
+    TableService service;
+    std::vector<std::string> jobs = {service.submit_training(poor_job(service))};
+    for (int i = 0; i < 2; ++i) jobs.push_back(service.submit_now(poor_job(service)));
+    const auto settled = [&](const std::string& id) {
+        JobInfo job = *service.coordinator->get_job(id);
+        return job.waits_for == jobs[0] && job.spec.parameters["training-paths"] == std::to_string(kMinTrainingSamples);
+    };
+    int probes = 0;
+    std::vector<std::pair<std::string, UnitLease>> sets;
+    for (int i = 0; i < 12000 && !(settled(jobs[1]) && settled(jobs[2])); ++i) {
+        for (const auto& [worker, lease] : lease_all(service)) {
+            if (lease.unit.key.kind == UnitKind::kProbe) {
+                ++probes;
+                service.give(worker, lease, traced(lease));
+            } else {
+                sets.emplace_back(worker, lease);
+            }
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    EXPECT_EQ(probes, 3);
+    ASSERT_EQ(sets.size(), 1u);
+    EXPECT_EQ(sets[0].second.job_id, jobs[0]);
+    service.give(sets[0].first, sets[0].second, traced(sets[0].second));
+    const Digest tables = service.wait(jobs[0], is_running).tables.asset.digest;
+    for (const std::string& id : jobs) {
+        const JobInfo job = service.wait(id, is_running);
+        EXPECT_EQ(job.tables.asset.digest, tables);
+        EXPECT_EQ(job.tables.from_cache, id != jobs[0]);
+    }
+}
+
 /// Who waits for a younger job's tables does not wait for what has come in between.
 TEST(TrainingBudget, AJobThatWaitsLendsItsPlaceInTheQueue) {
     TableService service;

@@ -90,6 +90,33 @@ TEST(GuidedTables, AGuideThatTheDiskHasLostIsRestored) {
     ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
 }
 
+/// One that can afford two rounds makes the tables of the spec that it records, as a job of that spec does.
+TEST(GuidedTables, OfATimeLimitedJobAreThoseOfItsSpec) {
+    TableService service;
+    JobSpec timed = service.guided_spec(0);
+    timed.parameters.erase("training-paths");
+    timed.time_limit_seconds = 20;
+    const std::string id = service.submit_training(timed);
+    const auto probe = lease_all(service);
+    ASSERT_EQ(probe.size(), 1u);
+    ASSERT_EQ(probe[0].second.unit.key.kind, UnitKind::kProbe);
+    // At such a rate 32768 samples fit, if learning from the probe takes less than 0.3 s; 65536 never do.
+    const std::string& payload = traced(probe[0].second);
+    service.give(probe[0].first, probe[0].second, payload, sha256(payload), 0.07);
+    JobInfo info = service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing; });
+    JobSpec recorded = service.guided_spec();
+    recorded.parameters["training-paths"] = info.spec.parameters.at("training-paths");
+    if (std::stoull(recorded.parameters["training-paths"]) <= kTrainingUnitSamples)
+        GTEST_SKIP() << "this machine learns too slowly to afford two rounds";
+    for (const auto& [worker, lease] : deliver_pilot(service))
+        EXPECT_EQ(service.give(worker, lease, guided(service, lease)).outcome, SubmitOutcome::kAccepted);
+    info = service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
+    ASSERT_EQ(info.state, JobState::kRunning) << info.message;
+    EXPECT_TRUE(info.tables.capped_by_time_limit);
+    EXPECT_EQ(info.tables.asset.digest, tables_alone(recorded));
+    ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
+}
+
 /// Tasks of jobs look through the list of all jobs; one that is being taken apart is not theirs to see.
 TEST(GuidedTables, ACoordinatorMayGoAtAnyMomentOfThem) {
     for (int pause = 0; pause < 40; pause += 4) {
@@ -97,6 +124,7 @@ TEST(GuidedTables, ACoordinatorMayGoAtAnyMomentOfThem) {
         const std::string over = service.submit_training(service.guided_spec(3));
         ASSERT_TRUE(service.coordinator->cancel_job(over).ok());
         service.submit_training(service.guided_spec());
+        service.submit_now(service.guided_spec());  // waits for these tables and takes them over
         const auto units = deliver_pilot(service);
         ASSERT_EQ(units.size(), 2u);
         for (const auto& [worker, lease] : units)

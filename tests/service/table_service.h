@@ -69,8 +69,10 @@ struct TableService : FakeService {
         wait(id, [](const JobInfo& j) { return j.phase_total > 0 || j.state != JobState::kPreparing; });
         return id;
     }
-    SubmitAck give(const std::string& worker, const UnitLease& lease, const std::string& payload, const Digest& digest) {
-        const auto ack = coordinator->submit_training(worker, lease.reference(), digest, payload, 0.1);
+    /// As if tracing had taken `seconds`.
+    SubmitAck give(const std::string& worker, const UnitLease& lease, const std::string& payload, const Digest& digest,
+                   double seconds = 0.1) {
+        const auto ack = coordinator->submit_training(worker, lease.reference(), digest, payload, seconds);
         EXPECT_TRUE(ack.ok()) << ack.status().message();
         return ack.ok() ? *ack : SubmitAck{SubmitOutcome::kRejected, "error"};
     }
