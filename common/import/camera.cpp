@@ -166,10 +166,11 @@ void set_integrator(Context* context, const std::string& kind, const ParameterLi
                                                      "lightpath", "simplepath", "simplevolpath", "randomwalk"};
     if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end())
         fail(p.where(), p.what() + " is not supported: it does not compute light transport; use \"path\"");
-    context->scene.max_depth = p.one_int("maxdepth", 5);
-    if (context->scene.max_depth < 0 || context->scene.max_depth > kMaxDepth)
-        fail(p.where(), p.what() + ": maxdepth must lie between 0 and " + std::to_string(kMaxDepth) + ", not " +
-                            std::to_string(context->scene.max_depth));
+    const int depth = p.one_int("maxdepth", 5);
+    if (depth < 0) fail(p.where(), p.what() + ": maxdepth must not be negative");
+    if (depth > kMaxDepth)
+        context->diagnostics.warn(p.where(), p.what() + ": a maxdepth above " + std::to_string(kMaxDepth) + " becomes that");
+    context->scene.max_depth = std::min(depth, kMaxDepth);
     if (p.one_bool("regularize", false))
         context->diagnostics.warn(p.where(),
                                   p.what() + ": regularize is ignored, it would blur the picture's glossy light");

@@ -66,6 +66,10 @@ struct TextureCost {
     double visits = 1;  ///< Nodes looked at.
 };
 
+/// What the numbers of a texture are decides what they may be and how a spectrum is reduced (spectra.h). A spectrum texture may
+/// be used both as a reflectance and as an index of refraction; then it is two.
+enum class TextureUse { kFloat, kReflectance, kUnbounded };
+
 struct Context {
     Context(FileSource* source, const ImportOptions& import_options)
         : files(source), options(import_options), diagnostics(import_options.strict) {}
@@ -81,7 +85,7 @@ struct Context {
     std::vector<Definition> anonymous_materials;
 
     // Caches of the resolution.
-    std::map<std::string, TextureId> resolved_float_textures, resolved_spectrum_textures;
+    std::map<std::pair<std::string, TextureUse>, TextureId> resolved_textures;
     std::map<std::string, MaterialId> resolved_named_materials;
     std::map<int, MaterialId> resolved_anonymous_materials;
     std::map<std::tuple<float, float, float>, TextureId> constants;
@@ -105,16 +109,13 @@ struct Context {
 // textures.cpp
 TextureId add_node(Context* context, const TextureNode& node);
 TextureId constant_texture(Context* context, const Rgb& value);
-TextureId named_float_texture(Context* context, const Location& where, const std::string& name);
-TextureId named_spectrum_texture(Context* context, const Location& where, const std::string& name);
+TextureId named_texture(Context* context, const Location& where, const std::string& name, TextureUse use);
 /// Parameter `name` as "float" or "texture"; kNone if absent.
 TextureId float_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name);
 
-/// How a colour is used decides what its numbers may be (and how a spectrum is reduced, see spectra.h).
-enum class ColourUse { kReflectance, kUnbounded };
-/// Parameter `name` as "rgb", "spectrum" or "texture"; kNone if absent.
+/// Parameter `name` as "rgb", "spectrum" or "texture"; kNone if absent. Not kFloat.
 TextureId spectrum_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name,
-                                     ColourUse use);
+                                     TextureUse use);
 
 /// Parameter `name` of type "spectrum" read from its values or file; nothing if absent.
 std::optional<Spectrum> spectrum_parameter(Context* context, const ParameterList& parameters, std::string_view name);
@@ -145,6 +146,7 @@ void set_integrator(Context* context, const std::string& kind, const ParameterLi
 struct ShapeState {
     Mat4 object_to_world;
     bool reverse_orientation = false;
+    bool emits = false;
 };
 /// The shape's geometry. `*faces` says for every triangle of a mesh which of pbrt's shapes it is a part of, as ascending
 /// numbers without gaps; it is empty if every triangle is a shape of its own.

@@ -168,7 +168,8 @@ void Parser::shape(Tokenizer* tokens, const Location& where) {
         if (pending.alpha < 0 || pending.alpha > 1) fail(where, list.what() + ": alpha must be between 0 and 1");
     }
     pending.geometry = make_shape(context_, kind, list,
-                                  {static_transform(where, list.what()), state_.reverse_orientation}, &pending.faces);
+                                  {static_transform(where, list.what()), state_.reverse_orientation, pending.area_light != nullptr},
+                                  &pending.faces);
     if (!pending.area_light) pending.faces = {};
     list.finish();
     context_->shapes.push_back(std::move(pending));

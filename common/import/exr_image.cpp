@@ -1,14 +1,18 @@
 #include "common/import/exr_image.h"
 
 #include <ImfChannelList.h>
+#include <ImfChromaticities.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfIO.h>
 #include <ImfInputFile.h>
+#include <ImfStandardAttributes.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <exception>
+#include <optional>
 
 namespace lightloom::import {
 namespace {
@@ -38,6 +42,28 @@ std::string one_line(std::string text) {
     for (char& c : text)
         if (c == '\n' || c == '\r') c = ' ';
     return text;
+}
+
+/// Primaries and white, as red x, red y, ... white y.
+struct NamedPrimaries {
+    ExrPrimaries primaries;
+    float xy[8];
+};
+constexpr NamedPrimaries kPrimaries[] = {
+    {ExrPrimaries::kRec709, {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f}},
+    {ExrPrimaries::kDisplayP3, {0.680f, 0.320f, 0.265f, 0.690f, 0.150f, 0.060f, 0.3127f, 0.3290f}},
+    {ExrPrimaries::kRec2020, {0.708f, 0.292f, 0.170f, 0.797f, 0.131f, 0.046f, 0.3127f, 0.3290f}},
+};
+
+std::optional<ExrPrimaries> primaries_of(const Imf::Header& header) {
+    if (!Imf::hasChromaticities(header)) return ExrPrimaries::kRec709;
+    const Imf::Chromaticities& c = Imf::chromaticities(header);
+    const float xy[8] = {c.red.x, c.red.y, c.green.x, c.green.y, c.blue.x, c.blue.y, c.white.x, c.white.y};
+    for (const NamedPrimaries& named : kPrimaries) {
+        const auto close = [](float a, float b) { return std::fabs(a - b) < 2e-3f; };
+        if (std::equal(xy, xy + 8, named.xy, close)) return named.primaries;
+    }
+    return std::nullopt;
 }
 
 }  // namespace
@@ -76,7 +102,12 @@ Result<ExrPixels> read_exr(const std::string& bytes) try {
             return invalid_argument("the EXR image has sub-sampled channels, which are not supported");
     LL_RETURN_IF_ERROR(check_image_size(uint64_t(std::max<int64_t>(width, 0)), uint64_t(std::max<int64_t>(height, 0)),
                                         names.size(), bytes.size()));
+    const std::optional<ExrPrimaries> primaries = primaries_of(file.header());
+    if (!primaries && names.size() >= 3)
+        return invalid_argument("the EXR image's chromaticities are not those of sRGB, Display P3 or Rec. 2020; convert it to "
+                                "sRGB's primaries");
     ExrPixels out;
+    if (primaries) out.primaries = *primaries;
     out.width = int(width);
     out.height = int(height);
     out.channels = int(names.size());

@@ -8,13 +8,17 @@
 
 namespace lightloom::import {
 
+/// Of the header's chromaticities; a file without them has Rec. 709's.
+enum class ExrPrimaries { kRec709, kDisplayP3, kRec2020 };
+
 struct ExrPixels {
     int width = 0, height = 0;
     int channels = 0;           ///< 1 (Y or a single channel), 3 (R, G, B) or 4 (with A).
+    ExrPrimaries primaries = ExrPrimaries::kRec709;
     std::vector<float> values;  ///< Row 0 at the top.
 };
 
-/// Decodes a scan-line or tiled EXR. The first part of a multi-part file is read.
+/// Decodes a scan-line or tiled EXR, of a multi-part file the first part. Primaries that ExrPrimaries does not list are an error.
 Result<ExrPixels> read_exr(const std::string& bytes);
 
 /// Refuses dimensions that are unreasonable or that so few bytes cannot hold, before memory of that size is asked for.

@@ -52,10 +52,10 @@ std::vector<T> keep_colour(const T* raw, size_t pixels, int channels) {
 
 /// One channel of linear values, see ImageChannels::kScalar; `linear` maps a T to its value.
 template <typename T, typename F>
-std::vector<float> keep_scalar(const T* raw, size_t pixels, int channels, T opaque, F linear) {
+std::vector<float> keep_scalar(const T* raw, size_t pixels, int channels, bool has_alpha, T opaque, F linear) {
     const size_t stride = size_t(channels);
     bool use_alpha = false;
-    if (channels == 4)
+    if (channels == 4 && has_alpha)
         for (size_t i = 0; i < pixels && !use_alpha; ++i) use_alpha = raw[i * 4 + 3] != opaque;
     std::vector<float> out(pixels);
     for (size_t i = 0; i < pixels; ++i) {
@@ -71,13 +71,14 @@ std::vector<float> keep_scalar(const T* raw, size_t pixels, int channels, T opaq
 }
 
 template <typename T>
-void fill(Image* image, const T* raw, int channels, const ImageRequest& request, T opaque,
+/// `has_alpha`: a fourth channel counts, see ImageChannels::kScalar.
+void fill(Image* image, const T* raw, int channels, bool has_alpha, const ImageRequest& request, T opaque,
           const std::vector<float>& table) {
     const size_t pixels = size_t(image->width) * size_t(image->height);
     const auto linear = [&](T v) { return table.empty() ? float(v) : table[size_t(v)]; };
     if (request.channels == ImageChannels::kScalar) {
         image->channels = 1;
-        image->floats = keep_scalar(raw, pixels, channels, opaque, linear);
+        image->floats = keep_scalar(raw, pixels, channels, has_alpha, opaque, linear);
         return;
     }
     image->channels = channels >= 3 ? 3 : 1;
@@ -91,13 +92,37 @@ void fill(Image* image, const T* raw, int channels, const ImageRequest& request,
     }
 }
 
+/// To the renderer's primaries; what lies outside of them becomes 0.
+void to_srgb_primaries(ExrPrimaries from, Image* image) {
+    if (from == ExrPrimaries::kRec709) return;
+    // Both have the white D65 (SMPTE EG 432-1, ITU-R BT.2020).
+    constexpr double kP3[3][3] = {
+        {1.2249402, -0.2249402, 0.0}, {-0.0420569, 1.0420569, 0.0}, {-0.0196376, -0.0786361, 1.0982736}};
+    constexpr double kRec2020[3][3] = {
+        {1.6604910, -0.5876411, -0.0728499}, {-0.1245505, 1.1328999, -0.0083494}, {-0.0181508, -0.1005789, 1.1187297}};
+    const auto& m = from == ExrPrimaries::kDisplayP3 ? kP3 : kRec2020;
+    for (size_t i = 0; i + 2 < image->floats.size(); i += 3) {
+        float* const p = &image->floats[i];
+        const double rgb[3] = {p[0], p[1], p[2]};
+        for (int c = 0; c < 3; ++c) p[c] = float(std::max(m[c][0] * rgb[0] + m[c][1] * rgb[1] + m[c][2] * rgb[2], 0.0));
+    }
+}
+
 std::vector<float> decoding_table(size_t codes, const ImageRequest& request) {
     std::vector<float> table(codes);
     for (size_t i = 0; i < codes; ++i) table[i] = float(decode(double(i) / double(codes - 1), request));
     return table;
 }
 
+/// Colour type "truecolour with alpha" of a PNG's header, or another format. The alpha that the decoder makes of a palette or
+/// of a transparent colour is none to pbrt-v4.
+bool is_rgba_png(const std::string& bytes) {
+    constexpr size_t kColourType = 25;
+    return bytes.size() > kColourType && bytes.compare(1, 3, "PNG") == 0 && bytes[kColourType] == 6;
+}
+
 Result<Image> read_with_stb(const std::string& bytes, const ImageRequest& request) {
+    const bool has_alpha = is_rgba_png(bytes);
     const stbi_uc* data = reinterpret_cast<const stbi_uc*>(bytes.data());
     const int size = int(bytes.size());
     Image image;
@@ -111,22 +136,27 @@ Result<Image> read_with_stb(const std::string& bytes, const ImageRequest& reques
         const std::unique_ptr<float, void (*)(void*)> raw(
             stbi_loadf_from_memory(data, size, &image.width, &image.height, &channels, 0), stbi_image_free);
         if (!raw) return failed();
-        fill(&image, raw.get(), channels, request, 1.0f, {});
+        fill(&image, raw.get(), channels, has_alpha, request, 1.0f, {});
     } else if (stbi_is_16_bit_from_memory(data, size)) {
         const std::unique_ptr<stbi_us, void (*)(void*)> raw(
             stbi_load_16_from_memory(data, size, &image.width, &image.height, &channels, 0), stbi_image_free);
         if (!raw) return failed();
-        fill(&image, raw.get(), channels, request, stbi_us(65535), decoding_table(65536, request));
+        fill(&image, raw.get(), channels, has_alpha, request, stbi_us(65535), decoding_table(65536, request));
     } else {
         const std::unique_ptr<stbi_uc, void (*)(void*)> raw(
             stbi_load_from_memory(data, size, &image.width, &image.height, &channels, 0), stbi_image_free);
         if (!raw) return failed();
-        fill(&image, raw.get(), channels, request, stbi_uc(255), decoding_table(256, request));
+        fill(&image, raw.get(), channels, has_alpha, request, stbi_uc(255), decoding_table(256, request));
     }
     return image;
 }
 
 }  // namespace
+
+bool has_fixed_encoding(const std::string& name) {
+    const std::string extension = lower_extension(name);
+    return extension == "jpg" || extension == "jpeg" || extension == "tga";
+}
 
 Result<Image> read_image(const std::string& name, const std::string& bytes, const ImageRequest& request) {
     const std::string extension = lower_extension(name);
@@ -139,10 +169,12 @@ Result<Image> read_image(const std::string& name, const std::string& bytes, cons
         Image out;
         out.width = exr->width;
         out.height = exr->height;
-        fill(&out, exr->values.data(), exr->channels, request, 1.0f, {});
+        fill(&out, exr->values.data(), exr->channels, true, request, 1.0f, {});
+        if (request.channels == ImageChannels::kColour && out.channels == 3) to_srgb_primaries(exr->primaries, &out);
         image = std::move(out);
-    } else if (extension == "png" || extension == "jpg" || extension == "jpeg" || extension == "tga" ||
-               extension == "hdr") {
+    } else if (has_fixed_encoding(name)) {
+        image = read_with_stb(bytes, {request.channels});
+    } else if (extension == "png" || extension == "hdr") {
         image = read_with_stb(bytes, request);
     }
     if (!image.ok()) return image;

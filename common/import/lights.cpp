@@ -2,6 +2,7 @@
 // magnitude: it is the luminous flux (illuminance) that the light has for a colour of luminance 1, so an rgb colour
 // still multiplies it.
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/core/math.h"
@@ -126,14 +127,17 @@ void distant_light(Context* context, const ParameterList& p, const Mat4& m) {
 }
 
 /// What "illuminance" normalises: the light's own xy plane lit by the upper half of the map. pbrt-v4 counts every pixel
-/// with 2 pi / n, half of its true solid angle; so do we, or a scene would look half as bright here.
+/// with 2 pi / n, half of its true solid angle, and weighs the channels of an EXR file in the file's order, blue first, with the
+/// weights of red, green and blue; so do we, or a scene would look half as bright here, or have another exposure.
 double illuminance_of(const Image& image) {
+    const bool blue_first = image.channels == 3 && has_suffix(image.name, ".exr");
+    const auto luminance = [&](const Rgb& c) { return blue_first ? Rgb(c.b, c.g, c.r).luminance() : c.luminance(); };
     double sum = 0;
     for (int y = 0; y < image.height; ++y)
         for (int x = 0; x < image.width; ++x) {
             const Vec3 w = equal_area_square_to_sphere(
                 {(float(x) + 0.5f) / float(image.width), (float(y) + 0.5f) / float(image.height)});
-            if (w.z > 0) sum += double(image.texel(x, y).luminance()) * w.z;
+            if (w.z > 0) sum += double(luminance(image.texel(x, y))) * w.z;
         }
     return sum * 2 * kPiD / (double(image.width) * image.height);
 }
@@ -153,14 +157,20 @@ void infinite_light(Context* context, const ParameterList& p, const Mat4& m) {
     } else {
         if (p.find_any("L")) fail(p.where(), p.what() + ": give either L or filename, not both");
         light.image = context->load_image(p.where(), reference, ImageRequest{});
-        const Image& image = context->scene.images[size_t(light.image)];
+        Image& image = context->scene.images[size_t(light.image)];
         if (image.width != image.height)
             fail(p.where(), quoted(reference) +
                                 ": an environment map must be a square equal-area octahedral image, not " +
                                 std::to_string(image.width) + " x " + std::to_string(image.height) +
                                 "; convert it with \"imgtool makeequiarea\"");
-        for (const float v : image.floats)
-            if (v < 0) fail(p.where(), quoted(reference) + ": the environment map holds a negative value");
+        bool negative = false;
+        for (float& v : image.floats) {
+            negative = negative || v < 0;
+            v = std::max(v, 0.0f);
+        }
+        if (negative)
+            context->diagnostics.warn(p.where(),
+                                      quoted(reference) + ": negative values of the environment map become 0, as in pbrt");
         if (illuminance > 0) {
             const double own = illuminance_of(image);
             if (!(own > 0))

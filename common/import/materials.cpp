@@ -14,7 +14,7 @@ constexpr int kMaxMixDepth = 32;
 constexpr int kMaxLayerEvents = 10000;
 
 TextureId spectrum_or(Context* context, const ParameterList& p, std::string_view name, float fallback) {
-    const TextureId id = spectrum_texture_parameter(context, p, name, ColourUse::kReflectance);
+    const TextureId id = spectrum_texture_parameter(context, p, name, TextureUse::kReflectance);
     return id == kNone ? constant_texture(context, Rgb(fallback)) : id;
 }
 
@@ -61,7 +61,7 @@ std::string metal_of(const Parameter* p, std::string_view suffix) {
 
 /// The reflectance or eta and k of a conductor; `prefix` is "" or "conductor.".
 void read_conductor(Context* context, const ParameterList& p, const std::string& prefix, Material* m) {
-    m->reflectance = spectrum_texture_parameter(context, p, "reflectance", ColourUse::kReflectance);
+    m->reflectance = spectrum_texture_parameter(context, p, "reflectance", TextureUse::kReflectance);
     const std::string eta_name = prefix + "eta", k_name = prefix + "k";
     if (m->reflectance != kNone) {
         if (p.find_any(eta_name) || p.find_any(k_name))
@@ -86,8 +86,8 @@ void read_conductor(Context* context, const ParameterList& p, const std::string&
         m->eta = constant_texture(context, both.eta);
         m->k = constant_texture(context, both.k);
     }
-    if (m->eta == kNone) m->eta = spectrum_texture_parameter(context, p, eta_name, ColourUse::kUnbounded);
-    if (m->k == kNone) m->k = spectrum_texture_parameter(context, p, k_name, ColourUse::kUnbounded);
+    if (m->eta == kNone) m->eta = spectrum_texture_parameter(context, p, eta_name, TextureUse::kUnbounded);
+    if (m->k == kNone) m->k = spectrum_texture_parameter(context, p, k_name, TextureUse::kUnbounded);
     if (m->eta == kNone || m->k == kNone) p.finish();  // A parameter of the wrong type.
 }
 

@@ -299,12 +299,14 @@ Status Reader::vertices(const Element& element, PlyMesh* mesh) {
             double number = 0;
             if (!value(p.type, &number)) return ended(element, i);
             v[p.slot] = float(number);
-            if (!std::isfinite(v[p.slot]))
+            const bool normal = p.slot == kNx || p.slot == kNy || p.slot == kNz;
+            if (!std::isfinite(v[p.slot]) && !normal)
                 return invalid_argument("the PLY vertex " + std::to_string(i) + " has a " + p.name +
                                         " that is not a finite number");
         }
         mesh->positions.push_back({v[kX], v[kY], v[kZ]});
-        if (normals) mesh->normals.push_back({v[kNx], v[kNy], v[kNz]});
+        const Vec3 n{v[kNx], v[kNy], v[kNz]};
+        if (normals) mesh->normals.push_back(is_finite(n) ? n : Vec3{0, 0, 0});
         if (uvs) mesh->uvs.push_back({v[kU], v[kV]});
     }
     return {};
@@ -331,6 +333,7 @@ Status Reader::faces(const Element& element, PlyMesh* mesh) {
                 return invalid_argument("the PLY face " + std::to_string(i) + " has " + std::to_string(int64_t(count)) +
                                         " vertices; it needs three or more");
             // Up to the first polygon, every face is the triangle of the same number.
+            mesh->has_polygons = mesh->has_polygons || count > 4;
             const bool polygons = count > 3 || !mesh->faces.empty();
             while (polygons && mesh->faces.size() < mesh->indices.size() / 3)
                 mesh->faces.push_back(uint32_t(mesh->faces.size()));

@@ -10,16 +10,17 @@ namespace lightloom::import {
 
 struct PlyMesh {
     std::vector<Vec3> positions;
-    std::vector<Vec3> normals;  ///< Empty or one per position, as in the file (not normalised).
+    std::vector<Vec3> normals;  ///< Empty or one per position, as in the file (not normalised); zero where one is not finite.
     std::vector<Vec2> uvs;      ///< Empty or one per position.
     std::vector<uint32_t> indices;
     std::vector<uint32_t> faces;                  ///< The face of every triangle; empty if all faces are triangles.
+    bool has_polygons = false;                    ///< Faces of more than four vertices.
     std::vector<std::string> ignored_properties;  ///< Vertex and face properties that nothing here uses.
 };
 
 /// Decodes a PLY file. Polygons become fans of triangles around their first vertex. Reserves no more memory than the
-/// data can fill, whatever the header claims; every index is checked and every number is finite. The error message does
-/// not name the file.
+/// data can fill, whatever the header claims; every index is checked and every position and (u, v) is finite. The error
+/// message does not name the file.
 Result<PlyMesh> read_ply(std::string_view bytes);
 
 }  // namespace lightloom::import

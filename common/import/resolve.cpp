@@ -84,7 +84,7 @@ void add_shape(Context* context, PendingShape shape) {
         return;
     }
     if (!shape.alpha_texture.empty())
-        attributes.alpha = named_float_texture(context, shape.where, shape.alpha_texture);
+        attributes.alpha = named_texture(context, shape.where, shape.alpha_texture, TextureUse::kFloat);
     else if (shape.alpha != 1)
         attributes.alpha = constant_texture(context, Rgb(shape.alpha));
     if (shape.area_light) {
@@ -117,9 +117,11 @@ void resolve_shapes(Context* context) {
     for (size_t i = 1; i < context->anonymous_materials.size(); ++i)
         resolve_material_reference(context, {false, "", int(i), context->anonymous_materials[i].parameters.where()});
     for (const auto& [name, definition] : context->float_textures)
-        named_float_texture(context, definition.parameters.where(), name);
-    for (const auto& [name, definition] : context->spectrum_textures)
-        named_spectrum_texture(context, definition.parameters.where(), name);
+        named_texture(context, definition.parameters.where(), name, TextureUse::kFloat);
+    for (const auto& [name, definition] : context->spectrum_textures) {
+        const bool used = context->resolved_textures.contains({name, TextureUse::kUnbounded});
+        if (!used) named_texture(context, definition.parameters.where(), name, TextureUse::kReflectance);
+    }
 }
 
 }  // namespace lightloom::import

@@ -1,8 +1,9 @@
 // Shapes become triangle meshes and spheres in world space (the space of the object inside ObjectBegin).
 //
 // Orientation: a mesh keeps its corners in file order; `flip_normal` is ReverseOrientation xor "the transformation
-// swaps handedness", which makes the geometric normal the image of the object-space one. A sphere's geometric normal
-// points outwards whatever the transformation does, so only ReverseOrientation flips it.
+// swaps handedness", which makes the geometric normal the image of the object-space one. A sphere's is flipped in
+// the same way, as pbrt-v4 does where a ray hits one: a mirrored glass sphere is a hole in glass. Where it samples light on
+// one, pbrt-v4 heeds ReverseOrientation alone; so do spheres that emit here, hit or sampled.
 
 #include <cmath>
 
@@ -59,7 +60,7 @@ TriangleMesh place(Context* context, const ParameterList& parameters, TriangleMe
             if (substitutes.empty()) {
                 context->diagnostics.warn(
                     parameters.where(),
-                    parameters.what() + ": a normal has length zero; the geometry's own is used there");
+                    parameters.what() + ": a normal has length zero or is not a number; the geometry's own is used there");
                 substitutes = geometric_normals(mesh);
             }
             n = mesh.attributes.flip_normal ? -substitutes[i] : substitutes[i];
@@ -137,6 +138,9 @@ TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const S
     for (const std::string& name : ply->ignored_properties)
         context->diagnostics.warn(parameters.where(),
                                   "the PLY property " + quoted(name) + " is ignored: nothing here uses it");
+    if (ply->has_polygons)
+        context->diagnostics.warn(parameters.where(), quoted(reference) + ": faces of more than four vertices become fans of "
+                                                                          "triangles; pbrt leaves them out");
     TriangleMesh mesh;
     mesh.positions = std::move(ply->positions);
     mesh.normals = std::move(ply->normals);
@@ -186,7 +190,7 @@ std::variant<TriangleMesh, Sphere> sphere(Context* context, const ParameterList&
         normalise(&axis);
     }
     s.orientation = Frame(axes[0], axes[1], axes[2]);
-    s.attributes.flip_normal = state.reverse_orientation;
+    s.attributes.flip_normal = state.reverse_orientation != (!state.emits && state.object_to_world.swaps_handedness());
     return s;
 }
 

@@ -195,9 +195,10 @@ ConductorRgb conductor_rgb(const Spectrum& eta, const Spectrum& k) {
     const double target[3] = {colour.r, colour.g, colour.b};
     float fitted[3];
     for (int c = 0; c < 3; ++c) {
-        const double n = out.eta[c], f = target[c];
+        // Gold's red is 1.02 under D65, which no surface of three independent channels reflects.
+        const double n = out.eta[c], f = std::min(target[c], 0.9999);
         const double k2 = (f * (n + 1) * (n + 1) - (n - 1) * (n - 1)) / (1 - f);
-        fitted[c] = f < 1 && k2 > 0 ? float(std::sqrt(k2)) : out.k[c];
+        fitted[c] = k2 > 0 ? float(std::sqrt(k2)) : out.k[c];
     }
     out.k = {fitted[0], fitted[1], fitted[2]};
     return out;

@@ -1,24 +1,20 @@
 #pragma once
 // How pbrt's spectra become linear RGB (Rec.709 primaries, white D65). The renderer is RGB; these are the rules:
 //
-// * `rgb` is taken as it is. As a light it is that radiance (intensity, irradiance) in the picture; pbrt's spectral
-// film
+// * `rgb` is taken as it is. As a light it is that radiance (intensity, irradiance) in the picture; pbrt's spectral film
 //   reproduces exactly these numbers too.
-// * Lights (`spectrum` values, files, names, `blackbody`): pbrt-v4 scales a spectrum so that its luminance is 1 and
-// then
+// * Lights (`spectrum` values, files, names, `blackbody`): pbrt-v4 scales a spectrum so that its luminance is 1 and then
 //   applies the light's `scale` or `power`. So only the chromaticity counts: XYZ with the CIE 1931 2 degree observer,
 //   divided by Y, to RGB. A component below zero (a colour outside the gamut) becomes 0 and the others are scaled so
 //   that the luminance stays 1; the import says so.
-// * Reflectances and transmittances: the colour under the white D65, RGB(R * D65) / RGB(D65): a constant r is (r, r,
-// r).
-//   Components are clamped to [0, 1].
-// * Indices of refraction eta and k of conductors: a weighted mean per channel, the weights being the positive part of
-// the
-//   channel's matching function times D65. If both eta and k are spectra, k is then adjusted so that the reflectance at
-//   normal incidence is exactly the RGB colour of the spectral reflectance there, which is what one sees.
+// * Reflectances and transmittances: the colour under the white D65, RGB(R * D65) / RGB(D65): a constant r is
+//   (r, r, r). Components are clamped to [0, 1].
+// * Indices of refraction eta and k of conductors: a weighted mean per channel, the weights being the positive part
+//   of the channel's matching function times D65. If both eta and k are spectra, k is then adjusted so that the reflectance at
+//   normal incidence is exactly the RGB colour of the spectral reflectance there, which is what one sees (but at most
+//   0.9999 in each channel: the red of gold would be 1.02)
 // * The index of a dielectric: its value at the sodium line (587.6 nm, the n_d of a glass catalogue); dispersion is
-// ignored,
-//   which the import says.
+//   ignored, which the import says.
 //
 // A spectrum is linear between its samples and zero outside of them, as in pbrt.
 

@@ -30,19 +30,19 @@ Spectrum read_spectrum(Context* context, const Parameter& p, const std::string& 
          what + ": " + quoted(p.strings[0]) + " is not a spectrum file (pairs of increasing wavelength and value)");
 }
 
-Rgb colour_of(Context* context, const Parameter& p, const std::string& what, ColourUse use) {
+Rgb colour_of(Context* context, const Parameter& p, const std::string& what, TextureUse use) {
     Rgb colour;
     if (p.type == "rgb") {
         if (p.numbers.size() != 3) fail(p.where, what + ": " + quoted("rgb " + p.name) + " needs three numbers");
         colour = {float(p.numbers[0]), float(p.numbers[1]), float(p.numbers[2])};
-    } else if (use == ColourUse::kReflectance) {
+    } else if (use == TextureUse::kReflectance) {
         colour = reflectance_rgb(read_spectrum(context, p, what));
     } else {
         colour = index_rgb(read_spectrum(context, p, what));
     }
     for (int c = 0; c < 3; ++c) {
         if (colour[c] < 0) fail(p.where, what + ": " + quoted(p.name) + " is negative");
-        if (use == ColourUse::kReflectance && colour[c] > 1)
+        if (use == TextureUse::kReflectance && colour[c] > 1)
             fail(p.where, what + ": " + quoted(p.name) + " is above 1; a reflectance must lie in [0, 1]");
     }
     return colour;
@@ -69,7 +69,7 @@ void read_encoding(const ParameterList& parameters, const std::string& fallback,
     request->gamma = float(gamma);
 }
 
-TextureId image_texture(Context* context, const ParameterList& parameters, bool is_float) {
+TextureId image_texture(Context* context, const ParameterList& parameters, TextureUse use) {
     TextureNode node;
     node.kind = TextureKind::kImage;
     read_mapping(parameters, &node);
@@ -87,47 +87,49 @@ TextureId image_texture(Context* context, const ParameterList& parameters, bool 
     const std::string reference = parameters.one_string("filename", "");
     if (reference.empty()) fail(parameters.where(), parameters.what() + " has no \"string filename\"");
     ImageRequest request;
-    request.channels = is_float ? ImageChannels::kScalar : ImageChannels::kColour;
+    request.channels = use == TextureUse::kFloat ? ImageChannels::kScalar : ImageChannels::kColour;
     read_encoding(parameters, "sRGB", &request);
+    if (!request.srgb && has_fixed_encoding(reference))
+        context->diagnostics.warn(parameters.where(),
+                                  parameters.what() + ": the encoding is ignored, as in pbrt: JPEG and TGA files are sRGB");
     node.image = context->load_image(parameters.where(), reference, request);
     return add_node(context, node);
 }
 
-TextureId operand(Context* context, const ParameterList& parameters, std::string_view name, bool is_float,
-                  float fallback) {
-    const TextureId id = is_float ? float_texture_parameter(context, parameters, name)
-                                  : spectrum_texture_parameter(context, parameters, name, ColourUse::kUnbounded);
+TextureId operand(Context* context, const ParameterList& parameters, std::string_view name, TextureUse use, float fallback) {
+    const TextureId id = use == TextureUse::kFloat ? float_texture_parameter(context, parameters, name)
+                                                   : spectrum_texture_parameter(context, parameters, name, use);
     return id == kNone ? constant_texture(context, Rgb(fallback)) : id;
 }
 
-TextureId checkerboard(Context* context, const ParameterList& parameters, bool is_float) {
+TextureId checkerboard(Context* context, const ParameterList& parameters, TextureUse use) {
     if (parameters.one_int("dimension", 2) != 2)
         fail(parameters.where(), parameters.what() + ": only \"integer dimension\" 2 is supported");
     TextureNode node;
     node.kind = TextureKind::kCheckerboard;
     read_mapping(parameters, &node);
-    node.a = operand(context, parameters, "tex1", is_float, 1);
-    node.b = operand(context, parameters, "tex2", is_float, 0);
+    node.a = operand(context, parameters, "tex1", use, 1);
+    node.b = operand(context, parameters, "tex2", use, 0);
     return add_node(context, node);
 }
 
-TextureId make_texture(Context* context, const Definition& definition, bool is_float) {
+TextureId make_texture(Context* context, const Definition& definition, TextureUse use) {
     const ParameterList& parameters = definition.parameters;
     TextureNode node;
-    if (definition.kind == "constant") return operand(context, parameters, "value", is_float, 1);
-    if (definition.kind == "imagemap") return image_texture(context, parameters, is_float);
-    if (definition.kind == "checkerboard") return checkerboard(context, parameters, is_float);
+    if (definition.kind == "constant") return operand(context, parameters, "value", use, 1);
+    if (definition.kind == "imagemap") return image_texture(context, parameters, use);
+    if (definition.kind == "checkerboard") return checkerboard(context, parameters, use);
     if (definition.kind == "scale") {
         node.kind = TextureKind::kScale;
-        node.a = operand(context, parameters, "tex", is_float, 1);
-        node.b = operand(context, parameters, "scale", true, 1);
+        node.a = operand(context, parameters, "tex", use, 1);
+        node.b = operand(context, parameters, "scale", TextureUse::kFloat, 1);
         return add_node(context, node);
     }
     if (definition.kind == "mix") {
         node.kind = TextureKind::kMix;
-        node.a = operand(context, parameters, "tex1", is_float, 0);
-        node.b = operand(context, parameters, "tex2", is_float, 1);
-        node.amount = operand(context, parameters, "amount", true, 0.5f);
+        node.a = operand(context, parameters, "tex1", use, 0);
+        node.b = operand(context, parameters, "tex2", use, 1);
+        node.amount = operand(context, parameters, "amount", TextureUse::kFloat, 0.5f);
         return add_node(context, node);
     }
     fail(parameters.where(),
@@ -137,12 +139,15 @@ TextureId make_texture(Context* context, const Definition& definition, bool is_f
 /// Marks a texture that is being resolved, so that a cycle is found.
 constexpr TextureId kInProgress = -2;
 
-TextureId named_texture(Context* context, const Location& where, const std::string& name, bool is_float) {
-    auto& resolved = is_float ? context->resolved_float_textures : context->resolved_spectrum_textures;
+}  // namespace
+
+TextureId named_texture(Context* context, const Location& where, const std::string& name, TextureUse use) {
+    auto& resolved = context->resolved_textures;
+    const bool is_float = use == TextureUse::kFloat;
     const auto& definitions = is_float ? context->float_textures : context->spectrum_textures;
     const auto& others = is_float ? context->spectrum_textures : context->float_textures;
     const std::string type = is_float ? "float" : "spectrum";
-    if (const auto it = resolved.find(name); it != resolved.end()) {
+    if (const auto it = resolved.find({name, use}); it != resolved.end()) {
         if (it->second == kInProgress) fail(where, "the texture " + quoted(name) + " refers to itself");
         return it->second;
     }
@@ -153,9 +158,9 @@ TextureId named_texture(Context* context, const Location& where, const std::stri
                  (others.count(name) ? "; the texture of this name has the other type" : "; define it with Texture"));
     }
     if (resolved.size() > 100000) fail(where, "the scene has more than 100000 textures");
-    resolved[name] = kInProgress;
+    resolved[{name, use}] = kInProgress;
     if (++context->texture_depth > kMaxNesting) fail(where, "textures refer to one another more than 31 levels deep");
-    const TextureId id = make_texture(context, it->second, is_float);
+    const TextureId id = make_texture(context, it->second, use);
     --context->texture_depth;
     const TextureCost cost = context->texture_costs[size_t(id)];
     if (cost.levels > kMaxNesting) fail(where, "textures refer to one another more than 31 levels deep");
@@ -163,11 +168,9 @@ TextureId named_texture(Context* context, const Location& where, const std::stri
         fail(where,
              "the texture " + quoted(name) + " needs more than 4096 look-ups; use fewer textures in one another");
     it->second.parameters.finish();
-    resolved[name] = id;
+    resolved[{name, use}] = id;
     return id;
 }
-
-}  // namespace
 
 TextureId add_node(Context* context, const TextureNode& node) {
     TextureCost cost{1, 1};
@@ -192,30 +195,22 @@ TextureId constant_texture(Context* context, const Rgb& value) {
     return it->second;
 }
 
-TextureId named_float_texture(Context* context, const Location& where, const std::string& name) {
-    return named_texture(context, where, name, true);
-}
-
-TextureId named_spectrum_texture(Context* context, const Location& where, const std::string& name) {
-    return named_texture(context, where, name, false);
-}
-
 TextureId float_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name) {
     if (const Parameter* p = parameters.find("texture", name)) {
         if (p->strings.size() != 1)
             fail(p->where, parameters.what() + ": " + quoted(p->name) + " needs one texture name");
-        return named_float_texture(context, p->where, p->strings[0]);
+        return named_texture(context, p->where, p->strings[0], TextureUse::kFloat);
     }
     if (!parameters.find("float", name)) return kNone;
     return constant_texture(context, Rgb(parameters.one_float(name, 0)));
 }
 
 TextureId spectrum_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name,
-                                     ColourUse use) {
+                                     TextureUse use) {
     if (const Parameter* p = parameters.find("texture", name)) {
         if (p->strings.size() != 1)
             fail(p->where, parameters.what() + ": " + quoted(p->name) + " needs one texture name");
-        return named_spectrum_texture(context, p->where, p->strings[0]);
+        return named_texture(context, p->where, p->strings[0], use);
     }
     for (const std::string_view type : {"rgb", "spectrum"})
         if (const Parameter* p = parameters.find(type, name))

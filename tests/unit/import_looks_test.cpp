@@ -1,5 +1,6 @@
 // Materials, textures, lights, spectra and images.
 
+#include <array>
 #include <cmath>
 
 #include "common/import/images.h"
@@ -32,6 +33,43 @@ std::string tga(int width, int height, const std::string& bgr) {
     out[14] = char(height);
     out[16] = 24;
     return out + bgr;
+}
+
+/// A PNG of 8 bits per sample, stored without compression; `rows` begin with a filter byte each. The decoder checks no sums.
+std::string png(int width, int height, int colour_type, const std::string& rows, const std::string& palette = "",
+                const std::string& transparency = "") {
+    const auto big = [](size_t v) { return std::string{char(v >> 24), char(v >> 16), char(v >> 8), char(v)}; };
+    const auto chunk = [&](const std::string& type, const std::string& data) {
+        return big(data.size()) + type + data + std::string(4, '\0');
+    };
+    const size_t n = rows.size();
+    const std::string stored = {'\x78', '\x01', '\x01', char(n), char(n >> 8), char(~n), char(~n >> 8)};
+    std::string out = "\x89PNG\r\n\x1a\n" +
+                      chunk("IHDR", big(size_t(width)) + big(size_t(height)) + char(8) + char(colour_type) + std::string(3, '\0'));
+    if (!palette.empty()) out += chunk("PLTE", palette);
+    if (!transparency.empty()) out += chunk("tRNS", transparency);
+    return out + chunk("IDAT", stored + rows + std::string(4, '\0')) + chunk("IEND", "");
+}
+
+/// A scan-line EXR of one pixel of float colour with these chromaticities: red, green, blue, white.
+std::string exr(const Rgb& colour, const std::array<float, 8>& xy) {
+    const auto bytes = [](const auto& v) { return std::string(reinterpret_cast<const char*>(&v), sizeof v); };
+    const auto attribute = [&](const std::string& name, const std::string& type, const std::string& value) {
+        return name + '\0' + type + '\0' + bytes(int32_t(value.size())) + value;
+    };
+    std::string channels;
+    for (const char c : {'B', 'G', 'R'})  // of type FLOAT, not sub-sampled
+        channels += std::string{c, '\0'} + bytes(std::array<int32_t, 4>{2, 0, 1, 1});
+    const std::array<int32_t, 4> window{0, 0, 0, 0};
+    std::string out = bytes(int32_t(20000630)) + bytes(int32_t(2));
+    out += attribute("channels", "chlist", channels + '\0') + attribute("chromaticities", "chromaticities", bytes(xy));
+    out += attribute("compression", "compression", std::string(1, '\0')) + attribute("dataWindow", "box2i", bytes(window));
+    out += attribute("displayWindow", "box2i", bytes(window)) + attribute("lineOrder", "lineOrder", std::string(1, '\0'));
+    out += attribute("pixelAspectRatio", "float", bytes(1.0f));
+    out += attribute("screenWindowCenter", "v2f", bytes(std::array<float, 2>{}));
+    out += attribute("screenWindowWidth", "float", bytes(1.0f)) + '\0';
+    out += bytes(uint64_t(out.size() + 8));
+    return out + bytes(int32_t(0)) + bytes(int32_t(12)) + bytes(colour.b) + bytes(colour.g) + bytes(colour.r);
 }
 
 TEST(ImportMaterial, DefaultsAreThoseOfPbrt) {
@@ -174,10 +212,10 @@ TEST(ImportTexture, ImagesAreLookedUpAsInPbrt) {
 }
 
 TEST(ImportTexture, EncodingsAndFloats) {
-    const testing::FileMap files{{"g.tga", tga(1, 1, "\x80\x80\x80")},
-                                 {"c.tga", tga(1, 1, std::string("\x30\x60\x90", 3))}};
+    const testing::FileMap files{{"g.png", png(1, 1, 0, std::string("\0\x80", 2))},
+                                 {"c.png", png(1, 1, 2, std::string("\0\x30\x60\x90", 4))}};
     const auto grey = [&](const std::string& options) {
-        const SceneDescription d = world("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"g.tga\" " +
+        const SceneDescription d = world("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"g.png\" " +
                                              options + " Shape \"sphere\" \"texture alpha\" \"t\"",
                                          files);
         return value(d, d.spheres.at(0).attributes.alpha).g;
@@ -186,10 +224,72 @@ TEST(ImportTexture, EncodingsAndFloats) {
     EXPECT_NEAR(grey("\"string encoding\" \"linear\""), 128 / 255.0, 1e-6);
     EXPECT_NEAR(grey("\"string encoding\" \"gamma 2.2\""), std::pow(128 / 255.0, 2.2), 1e-5);
     const SceneDescription d = world(
-        "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"c.tga\" \"string encoding\" \"linear\""
+        "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"c.png\" \"string encoding\" \"linear\""
         " Shape \"sphere\" \"texture alpha\" \"t\"",
         files);
     EXPECT_NEAR(value(d, d.spheres[0].attributes.alpha).r, 96 / 255.0, 1e-6);
+    expect_warning("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"g.tga\" \"string encoding\" \"linear\"", "sRGB",
+                   {{"g.tga", tga(1, 1, "\x80\x80\x80")}});
+    const SceneDescription fixed = world(
+        "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"g.tga\" \"string encoding\" \"linear\""
+        " Shape \"sphere\" \"texture alpha\" \"t\"",
+        {{"g.tga", tga(1, 1, "\x80\x80\x80")}});
+    EXPECT_NEAR(value(fixed, fixed.spheres[0].attributes.alpha).r, 0.21586, 1e-4) << "as in pbrt, whatever the file asks for";
+}
+
+/// pbrt-v4 knows the alpha of an RGBA PNG; what the decoder makes of a palette's transparency or finds in a TGA is dropped.
+TEST(ImportTexture, AlphaIsThatOfRgbaFilesAlone) {
+    const auto alpha = [&](const std::string& name, const std::string& bytes) {
+        const SceneDescription d = world("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"" + name +
+                                             "\" Shape \"sphere\" \"texture alpha\" \"t\"",
+                                         {{name, bytes}});
+        return value(d, d.spheres.at(0).attributes.alpha).r;
+    };
+    EXPECT_NEAR(alpha("a.png", png(1, 1, 6, std::string("\0\xff\xff\xff\x80", 5))), 0.21586, 1e-4);
+    EXPECT_EQ(alpha("a.png", png(1, 1, 3, std::string("\0\0", 2), "\xff\xff\xff", "\x40")), 1);
+    EXPECT_EQ(alpha("a.png", png(1, 1, 2, std::string("\0\xff\xff\xff", 4), "", std::string("\0\xff\0\xff\0\xff", 6))), 1);
+    std::string rgba = tga(1, 1, "\xff\xff\xff\x40");
+    rgba[16] = 32;
+    rgba[17] = 8;
+    EXPECT_EQ(alpha("a.tga", rgba), 1);
+}
+
+TEST(ImportTexture, PrimariesOfExrFilesBecomeThoseOfSrgb) {
+    constexpr std::array<float, 8> kRec709{0.64f, 0.33f, 0.3f, 0.6f, 0.15f, 0.06f, 0.3127f, 0.329f};
+    constexpr std::array<float, 8> kRec2020{0.708f, 0.292f, 0.17f, 0.797f, 0.131f, 0.046f, 0.3127f, 0.329f};
+    constexpr std::array<float, 8> kAces{0.7347f, 0.2653f, 0, 1, 0.0001f, -0.077f, 0.32168f, 0.33767f};
+    const std::string texture = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"c.exr\" ";
+    const auto colour = [&](const Rgb& c, const std::array<float, 8>& xy) {
+        const SceneDescription d =
+            world(texture + "Material \"diffuse\" \"texture reflectance\" \"t\"" + kShape, {{"c.exr", exr(c, xy)}});
+        return value(d, material_of(d).reflectance);
+    };
+    const Rgb kept = colour({0.9f, 0.5f, 0.1f}, kRec709);
+    EXPECT_FLOAT_EQ(kept.r, 0.9f);
+    EXPECT_FLOAT_EQ(kept.b, 0.1f);
+    const Rgb white = colour(Rgb(0.5f), kRec2020), red = colour({0.5f, 0.1f, 0.1f}, kRec2020);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(white[c], 0.5, 1e-6);
+    EXPECT_NEAR(red.r, 0.7642, 1e-4);
+    EXPECT_NEAR(red.g, 0.0502, 1e-4);
+    EXPECT_EQ(colour({0.5f, 0, 0}, kRec2020).g, 0) << "outside of sRGB";
+    expect_error(texture, {"c.exr", "chromaticities"}, {{"c.exr", exr(Rgb(0.5f), kAces)}});
+}
+
+/// The same spectrum is reduced in one way as a reflectance and in another as an index.
+TEST(ImportTexture, SpectraAreReducedByTheirUse) {
+    const std::string green = "[400 0.05 499 0.05 500 0.9 560 0.9 561 0.05 700 0.05]";
+    const SceneDescription direct = world("Material \"diffuse\" \"spectrum reflectance\" " + green + kShape);
+    const Rgb expected = value(direct, material_of(direct).reflectance);
+    const std::string texture = "Texture \"t\" \"spectrum\" \"constant\" \"spectrum value\" " + green +
+                                " Texture \"half\" \"spectrum\" \"scale\" \"texture tex\" \"t\" \"float scale\" 0.5 ";
+    SceneDescription d = world(texture + "Material \"diffuse\" \"texture reflectance\" \"t\"" + kShape);
+    EXPECT_EQ(value(d, material_of(d).reflectance), expected);
+    d = world(texture + "Material \"diffuse\" \"texture reflectance\" \"half\"" + kShape);
+    EXPECT_EQ(value(d, material_of(d).reflectance), expected * 0.5f);
+    d = world(texture + "Material \"conductor\" \"texture eta\" \"t\" \"texture k\" \"t\"" + kShape);
+    const SceneDescription index = world("Material \"conductor\" \"spectrum eta\" " + green + " \"rgb k\" [1 1 1]" + kShape);
+    EXPECT_EQ(value(d, material_of(d).eta), value(index, material_of(index).eta));
+    EXPECT_NE(value(d, material_of(d).eta), expected);
 }
 
 TEST(ImportTexture, Errors) {
@@ -353,6 +453,14 @@ TEST(ImportLight, Infinite) {
     EXPECT_EQ(d.images.at(size_t(d.infinite_lights[0].image)).width, 2);
     expect_error("LightSource \"infinite\" \"string filename\" \"wide.tga\"", {"square"}, files);
     expect_error("LightSource \"infinite\" \"string filename\" \"e.tga\" \"rgb L\" [1 1 1]", {"not both"}, files);
+    // pbrt-v4 weighs the channels of an EXR in the order of the file, so that this blue map counts as red.
+    constexpr std::array<float, 8> kRec709{0.64f, 0.33f, 0.3f, 0.6f, 0.15f, 0.06f, 0.3127f, 0.329f};
+    const auto radiance_of = [&](const Rgb& map) {
+        const std::string light = "LightSource \"infinite\" \"string filename\" \"e.exr\" \"float illuminance\" 1";
+        return world(light, {{"e.exr", exr(map, kRec709)}}).infinite_lights.at(0).radiance.r;
+    };
+    EXPECT_NEAR(radiance_of(Rgb(1.0f)) / radiance_of({0, 0, 1}), Rgb(1, 0, 0).luminance(), 1e-5);
+    expect_warning("LightSource \"infinite\" \"string filename\" \"e.exr\"", "negative", {{"e.exr", exr({-1e-6f, 1, 1}, kRec709)}});
     expect_error("LightSource \"infinite\" \"point3 portal\" [0 0 0 1 0 0 1 1 0 0 1 0]", {"portal"});
 }
 
@@ -379,6 +487,10 @@ TEST(ImportSpectra, Reductions) {
         EXPECT_NEAR(constant.eta[c], 0.3, 1e-6);
         EXPECT_NEAR(constant.k[c], 2.5, 1e-4);
     }
+    // A channel that the spectrum's colour has above 1, as gold has, is reflected whole.
+    const import::ConductorRgb red = import::conductor_rgb({{300, 0.3}, {900, 0.3}}, {{300, 1}, {570, 1}, {571, 90}, {900, 90}});
+    const double n = red.eta.r, k = red.k.r;
+    EXPECT_NEAR(((n - 1) * (n - 1) + k * k) / ((n + 1) * (n + 1) + k * k), 0.9999, 1e-5);
     EXPECT_FALSE(import::spectrum_from_pairs({400, 1, 400, 2}).has_value());
     EXPECT_FALSE(import::spectrum_from_pairs({400, 1, 500}).has_value());
 }

@@ -173,6 +173,22 @@ TEST(Ply, AllFormatsAgree) {
               {{"a.ply.gz", gzip(binary_quad(false))}, {"a.ply", binary_quad(true)}});
     EXPECT_EQ(d.meshes.at(0).positions, d.meshes.at(1).positions);
     EXPECT_EQ(d.meshes.at(0).attributes.source, "scene.pbrt:3");
+    const std::string pentagon = ascii_header("5", "1") + "0 0 0\n1 0 0\n1 1 0\n0 1 0\n-1 .5 0\n5 0 1 2 3 4";
+    expect_warning("Shape \"plymesh\" \"string filename\" \"a.ply\"", "more than four", {{"a.ply", pentagon}});
+}
+
+/// Files with such normals exist; the geometry's own stand in for them, as in pbrt.
+TEST(Ply, NormalsThatAreNoNumbersAreLeftOut) {
+    const std::string text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                             "property float nx\nproperty float ny\nproperty float nz\nelement face 1\n"
+                             "property list uchar int vertex_indices\nend_header\n"
+                             "0 0 0 0 0 1\n1 0 0 nan nan nan\n0 1 0 0 0 1\n3 0 1 2\n";
+    const auto mesh = import::read_ply(text);
+    ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+    EXPECT_EQ(mesh->normals[1], (Vec3{0, 0, 0}));
+    const std::string shape = "Shape \"plymesh\" \"string filename\" \"a.ply\"";
+    expect_warning(shape, "not a number", {{"a.ply", text}});
+    EXPECT_EQ(world(shape, {{"a.ply", text}}).meshes.at(0).normals.at(1), (Vec3{0, 0, 1}));
 }
 
 TEST(Ply, Errors) {

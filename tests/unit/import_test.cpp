@@ -65,8 +65,10 @@ TEST(ImportState, OrientationFollowsHandednessAndReversal) {
     EXPECT_TRUE(world(std::string("ReverseOrientation ") + kTriangle).meshes[0].attributes.flip_normal);
     EXPECT_TRUE(world(std::string("Scale -1 1 1 ") + kTriangle).meshes[0].attributes.flip_normal);
     EXPECT_FALSE(world(std::string("Scale -1 1 1 ReverseOrientation ") + kTriangle).meshes[0].attributes.flip_normal);
-    // A sphere's normal points outwards however it is mirrored.
-    EXPECT_FALSE(world("Scale -1 1 1 Shape \"sphere\"").spheres[0].attributes.flip_normal);
+    // A mirrored sphere is inside out, as in pbrt; but one that emits keeps its light outside.
+    EXPECT_TRUE(world("Scale -1 1 1 Shape \"sphere\"").spheres[0].attributes.flip_normal);
+    EXPECT_FALSE(world("Scale -1 1 1 ReverseOrientation Shape \"sphere\"").spheres[0].attributes.flip_normal);
+    EXPECT_FALSE(world("Scale -1 1 1 AreaLightSource \"diffuse\" Shape \"sphere\"").spheres[0].attributes.flip_normal);
     EXPECT_TRUE(world("ReverseOrientation Shape \"sphere\"").spheres[0].attributes.flip_normal);
 }
 
@@ -297,9 +299,9 @@ TEST(ImportOptions, UnsupportedOnesAreNamed) {
     refused("Film \"gbuffer\"", "rgb");
     refused("\nFilm \"rgb\" \"integer xresolution\" 10000 \"integer yresolution\" 7670", "scene.pbrt:2");
     refused("Film \"rgb\" \"integer xresolution\" 10000 \"integer yresolution\" 7670", "76695843");
-    refused("\nIntegrator \"path\" \"integer maxdepth\" 256", "scene.pbrt:2");
-    refused("Integrator \"path\" \"integer maxdepth\" 256", "between 0 and 255, not 256");
-    refused("Integrator \"path\" \"integer maxdepth\" -1", "between 0 and 255, not -1");
+    refused("\nIntegrator \"path\" \"integer maxdepth\" -1", "scene.pbrt:2");
+    refused("Integrator \"path\" \"integer maxdepth\" -1", "negative");
+    warned("Integrator \"path\" \"integer maxdepth\" 1000", "255");
     refused("Film \"rgb\" \"integer xresolution\" 0", "resolution");
     refused("Film \"rgb\" \"integer xresolution\" 2000000000", "resolution");
     refused("Film \"rgb\" \"string sensor\" \"canon_eos_5d\"", "sensor");
