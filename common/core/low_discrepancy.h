@@ -28,12 +28,15 @@ constexpr uint32_t scramble_reversed(uint32_t x, uint32_t seed) {
     return x;
 }
 
-/// Second dimension of the Sobol' sequence (its generator matrix is Pascal's triangle modulo 2).
-constexpr uint32_t sobol_second(uint32_t index) {
-    uint32_t result = 0;
-    for (uint32_t v = 0x80000000u; index != 0; index >>= 1, v ^= v >> 1)
-        if (index & 1) result ^= v;
-    return result;
+/// Second dimension of the Sobol' sequence, bit-reversed. Its generator matrix is Pascal's triangle modulo 2, whose entry (i, j) is
+/// odd where the bits of i are among those of j: a sum over supersets, taken for one bit of the positions at a time.
+constexpr uint32_t sobol_second_reversed(uint32_t index) {
+    index ^= (index >> 1) & 0x55555555u;
+    index ^= (index >> 2) & 0x33333333u;
+    index ^= (index >> 4) & 0x0f0f0f0fu;
+    index ^= (index >> 8) & 0x00ff00ffu;
+    index ^= (index >> 16) & 0x0000ffffu;
+    return index;
 }
 
 /// Point `index` of the sequence belonging to `seed`, in [0, 1)^2. Any 2^k consecutive aligned indices are stratified.
@@ -42,7 +45,7 @@ constexpr Vec2 low_discrepancy_point(uint32_t index, uint64_t seed) {
     const uint32_t shuffled = reverse_bits(scramble_reversed(reverse_bits(index), uint32_t(h)));
     // The first dimension is the bit-reversed index, so its scramble needs no reversal on the way in.
     const uint32_t x = reverse_bits(scramble_reversed(shuffled, uint32_t(h >> 32)));
-    const uint32_t y = reverse_bits(scramble_reversed(reverse_bits(sobol_second(shuffled)), uint32_t(h2)));
+    const uint32_t y = reverse_bits(scramble_reversed(sobol_second_reversed(shuffled), uint32_t(h2)));
     return {float(x >> 8) * 0x1p-24f, float(y >> 8) * 0x1p-24f};
 }
 

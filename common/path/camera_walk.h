@@ -14,21 +14,22 @@ class CameraSampler : public WalkSampler {
         : WalkSampler({seed, Stage::kCamera, iteration, pixel}, Rng({seed, Stage::kPixelScramble, 0, pixel}).next_u64(),
                       uint32_t(iteration), 2) {}
 
-    Vec2 film() { return point(0); }
-    Vec2 lens() { return point(1); }
+    /// The ray of the sample through the pixel (px, py).
+    Camera::CameraRay ray(const Camera& camera, int px, int py) const {
+        const Vec2 film = point(0), lens = camera.has_lens() ? point(1) : Vec2{};
+        return camera.sample_ray({float(px) + film.x, float(py) + film.y}, lens);
+    }
     Vec2 next_event(int t) { return t == 2 ? point(3) : rng().uniform2(); }
 };
 
-/// Walks from the lens through the film position (px, py) + sampler.film(). `z` has room for max_edges + 2 vertices.
+/// Walks from the lens along sampler.ray(). `z` has room for max_edges + 2 vertices.
 /// After each arrival `visit(t)` is called with z[0 .. t-1] complete (material resolved unless nothing can follow), before
 /// the vertex scatters: next event and emitter hits belong there. `escape(t, ray)` is called when the sub-path of t
 /// vertices leaves the scene. Returns the number of vertices.
 template <class Visit, class Escape>
 int trace_camera_path(const Scene& scene, CameraSampler& sampler, int px, int py, int max_edges, const RouletteRule& rule,
                       PathVertex* z, WalkCounters* counters, Visit&& visit, Escape&& escape) {
-    const Vec2 jitter = sampler.film();
-    const Camera::CameraRay lens_ray =
-        scene.camera().sample_ray({float(px) + jitter.x, float(py) + jitter.y}, sampler.lens());
+    const Camera::CameraRay lens_ray = sampler.ray(scene.camera(), px, py);
     WalkRay ray{lens_ray.origin, lens_ray.direction, Rgb(1.0f), lens_ray.pdf_solid_angle, false, true};
     z[0].p = ray.origin;
     z[0].alpha = ray.alpha;

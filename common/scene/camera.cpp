@@ -56,7 +56,7 @@ Camera::CameraRay Camera::sample_ray(Vec2 film, Vec2 lens) const {
     CameraRay ray;
     ray.origin = position_;
     Vec3 d = p;
-    if (lens_radius_ > 0) {
+    if (has_lens()) {
         const Vec2 l = sample_disk(lens);
         ray.origin = position_ + right_ * (l.x * lens_radius_) + up_ * (l.y * lens_radius_);
         d = p * focal_distance_ - Vec3{l.x * lens_radius_, l.y * lens_radius_, 0};

@@ -21,6 +21,9 @@ class Camera {
     /// `film` in pixels (x right, y down, continuous), `lens` uniform in [0, 1)^2.
     CameraRay sample_ray(Vec2 film, Vec2 lens) const;
 
+    /// False for a pinhole, which has no use for `lens`.
+    bool has_lens() const { return lens_radius_ > 0; }
+
     /// A point on the lens, world.
     Vec3 sample_lens(Vec2 lens) const;
 

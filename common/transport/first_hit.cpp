@@ -18,10 +18,8 @@ std::vector<ImageLayer> first_hit_layers(const Scene& scene, uint64_t seed, int 
             Vec3 normal;
             float depth = 0;
             for (int i = 0; i < samples; ++i) {
-                CameraSampler sampler(seed, uint64_t(i), pixel);
-                const Vec2 jitter = sampler.film();
-                const Camera::CameraRay ray = scene.camera().sample_ray(
-                    {float(crop.x0 + column) + jitter.x, float(crop.y0 + row) + jitter.y}, sampler.lens());
+                const CameraSampler sampler(seed, uint64_t(i), pixel);
+                const Camera::CameraRay ray = sampler.ray(scene.camera(), crop.x0 + column, crop.y0 + row);
                 SurfacePoint point;
                 if (!scene.intersect(ray.origin, ray.direction, &point)) continue;
                 albedo += scene.bsdf_at(point).albedo();

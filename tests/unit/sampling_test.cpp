@@ -133,6 +133,18 @@ TEST(InverseCdfTable, EveryOutcomeHasExactlyItsPartOfTheUnitInterval) {
     EXPECT_EQ(single.column(0).draw(0.75).rest, 0.75);
 }
 
+/// Column j of Pascal's triangle modulo 2, row i at bit 31 - i, added up over the bits j of the index.
+TEST(LowDiscrepancy, SecondDimensionIsThatOfSobol) {
+    Rng rng({5, Stage::kTraining, 0, 0});
+    for (int n = 0; n < 1000; ++n) {
+        const uint32_t index = n < 100 ? uint32_t(n) : uint32_t(rng.next_u64());
+        uint32_t column = 0x80000000u, expected = 0;
+        for (int j = 0; j < 32; ++j, column ^= column >> 1)
+            if (index >> j & 1) expected ^= column;
+        ASSERT_EQ(reverse_bits(sobol_second_reversed(index)), expected) << index;
+    }
+}
+
 /// 2^m consecutive points from a multiple of 2^m on: one in every elementary interval of area 2^-m.
 TEST(LowDiscrepancy, EveryAlignedBlockIsStratified) {
     for (const uint64_t seed : {0ull, 1ull, 99ull, 1ull << 40})
