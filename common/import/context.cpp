@@ -25,8 +25,10 @@ int32_t Context::load_image(const Location& where, const std::string& reference,
                             (request.channels == ImageChannels::kScalar ? "|scalar" : "|colour");
     const auto [it, inserted] = image_index.try_emplace(key, kNone);
     if (inserted) {
-        Result<Image> image = read_image(*name, read_file(where, *name), request);
+        std::string warning;
+        Result<Image> image = read_image(*name, read_file(where, *name), request, &warning);
         if (!image.ok()) fail(where, quoted(reference) + ": " + image.status().message());
+        if (!warning.empty()) diagnostics.warn(where, quoted(reference) + ": " + warning);
         it->second = int32_t(scene.images.size());
         scene.images.push_back(std::move(image).value());
     }

@@ -68,6 +68,15 @@ std::optional<ExrPrimaries> primaries_of(const Imf::Header& header) {
 
 }  // namespace
 
+Rgb luminance_weights(ExrPrimaries primaries) {
+    switch (primaries) {
+        case ExrPrimaries::kRec709: break;
+        case ExrPrimaries::kDisplayP3: return {0.22897f, 0.69174f, 0.07929f};
+        case ExrPrimaries::kRec2020: return {0.26270f, 0.67800f, 0.05930f};
+    }
+    return {0.2126f, 0.7152f, 0.0722f};
+}
+
 Status check_image_size(uint64_t width, uint64_t height, uint64_t channels, uint64_t file_bytes) {
     constexpr uint64_t kMaxSide = 16384, kMaxExpansion = 4096;
     const std::string claim = std::to_string(width) + " x " + std::to_string(height);
@@ -80,7 +89,7 @@ Status check_image_size(uint64_t width, uint64_t height, uint64_t channels, uint
     return {};
 }
 
-Result<ExrPixels> read_exr(const std::string& bytes) try {
+Result<ExrPixels> read_exr(const std::string& bytes, ExrChannels channels) try {
     MemoryStream stream(bytes);
     Imf::InputFile file(stream, 1);
     const Imath::Box2i window = file.header().dataWindow();
@@ -102,6 +111,11 @@ Result<ExrPixels> read_exr(const std::string& bytes) try {
             return invalid_argument("the EXR image has sub-sampled channels, which are not supported");
     LL_RETURN_IF_ERROR(check_image_size(uint64_t(std::max<int64_t>(width, 0)), uint64_t(std::max<int64_t>(height, 0)),
                                         names.size(), bytes.size()));
+    if (channels == ExrChannels::kFirstThree && names.size() >= 3) {
+        auto channel = list.begin();
+        for (std::string& name : names) name = (channel++).name();
+        names.resize(3);
+    }
     const std::optional<ExrPrimaries> primaries = primaries_of(file.header());
     if (!primaries && names.size() >= 3)
         return invalid_argument("the EXR image's chromaticities are not those of sRGB, Display P3 or Rec. 2020; convert it to "

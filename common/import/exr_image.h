@@ -5,21 +5,30 @@
 #include <vector>
 
 #include "common/core/result.h"
+#include "common/core/vec.h"
 
 namespace lightloom::import {
 
 /// Of the header's chromaticities; a file without them has Rec. 709's.
 enum class ExrPrimaries { kRec709, kDisplayP3, kRec2020 };
 
+/// Of red, green and blue.
+Rgb luminance_weights(ExrPrimaries primaries);
+
 struct ExrPixels {
     int width = 0, height = 0;
-    int channels = 0;           ///< 1 (Y or a single channel), 3 (R, G, B) or 4 (with A).
+    int channels = 0;           ///< 1 (Y or a single channel), 3 (R, G, B, or the first three) or 4 (with A).
     ExrPrimaries primaries = ExrPrimaries::kRec709;
     std::vector<float> values;  ///< Row 0 at the top.
 };
 
+enum class ExrChannels {
+    kColour,      ///< R, G, B and A if there; otherwise Y or the only one.
+    kFirstThree,  ///< In the order of the file, which is that of the alphabet, as some of pbrt's code takes them.
+};
+
 /// Decodes a scan-line or tiled EXR, of a multi-part file the first part. Primaries that ExrPrimaries does not list are an error.
-Result<ExrPixels> read_exr(const std::string& bytes);
+Result<ExrPixels> read_exr(const std::string& bytes, ExrChannels channels = ExrChannels::kColour);
 
 /// Refuses dimensions that are unreasonable or that so few bytes cannot hold, before memory of that size is asked for.
 Status check_image_size(uint64_t width, uint64_t height, uint64_t channels, uint64_t file_bytes);

@@ -92,8 +92,8 @@ void fill(Image* image, const T* raw, int channels, bool has_alpha, const ImageR
     }
 }
 
-/// To the renderer's primaries; what lies outside of them becomes 0.
-void to_srgb_primaries(ExrPrimaries from, Image* image) {
+/// To the renderer's primaries. Colours outside of them end at its border at equal luminance.
+void to_srgb_primaries(ExrPrimaries from, Image* image, bool* clipped) {
     if (from == ExrPrimaries::kRec709) return;
     // Both have the white D65 (SMPTE EG 432-1, ITU-R BT.2020).
     constexpr double kP3[3][3] = {
@@ -104,7 +104,13 @@ void to_srgb_primaries(ExrPrimaries from, Image* image) {
     for (size_t i = 0; i + 2 < image->floats.size(); i += 3) {
         float* const p = &image->floats[i];
         const double rgb[3] = {p[0], p[1], p[2]};
-        for (int c = 0; c < 3; ++c) p[c] = float(std::max(m[c][0] * rgb[0] + m[c][1] * rgb[1] + m[c][2] * rgb[2], 0.0));
+        for (int c = 0; c < 3; ++c) p[c] = float(m[c][0] * rgb[0] + m[c][1] * rgb[1] + m[c][2] * rgb[2]);
+        const Rgb exact(p[0], p[1], p[2]), inside(std::max(p[0], 0.0f), std::max(p[1], 0.0f), std::max(p[2], 0.0f));
+        if (inside == exact) continue;
+        // The rounding of the matrices is not worth a warning.
+        if (std::min({p[0], p[1], p[2]}) < -1e-3f * inside.luminance()) *clipped = true;
+        const float scale = inside.luminance() > 0 ? std::max(exact.luminance(), 0.0f) / inside.luminance() : 0;
+        for (int c = 0; c < 3; ++c) p[c] = inside[c] * scale;
     }
 }
 
@@ -158,7 +164,9 @@ bool has_fixed_encoding(const std::string& name) {
     return extension == "jpg" || extension == "jpeg" || extension == "tga";
 }
 
-Result<Image> read_image(const std::string& name, const std::string& bytes, const ImageRequest& request) {
+Result<Image> read_image(const std::string& name, const std::string& bytes, const ImageRequest& request,
+                         std::string* warning) {
+    bool out_of_gamut = false;
     const std::string extension = lower_extension(name);
     if (bytes.size() > (size_t(1) << 30)) return invalid_argument("the image file is larger than 1 GiB");
     Result<Image> image =
@@ -170,7 +178,7 @@ Result<Image> read_image(const std::string& name, const std::string& bytes, cons
         out.width = exr->width;
         out.height = exr->height;
         fill(&out, exr->values.data(), exr->channels, true, request, 1.0f, {});
-        if (request.channels == ImageChannels::kColour && out.channels == 3) to_srgb_primaries(exr->primaries, &out);
+        if (request.channels == ImageChannels::kColour && out.channels == 3) to_srgb_primaries(exr->primaries, &out, &out_of_gamut);
         image = std::move(out);
     } else if (has_fixed_encoding(name)) {
         image = read_with_stb(bytes, {request.channels});
@@ -181,6 +189,15 @@ Result<Image> read_image(const std::string& name, const std::string& bytes, cons
     if (!std::all_of(image->floats.begin(), image->floats.end(), [](float v) { return std::isfinite(v); }))
         return invalid_argument("the image holds a value that is not a finite number");
     image->name = name;
+    if (request.channels == ImageChannels::kColour) {
+        bool negative = false;
+        for (float& v : image->floats) {
+            negative = negative || v < 0;
+            v = std::max(v, 0.0f);
+        }
+        if (negative) *warning = "negative values become 0, as in pbrt";
+        if (out_of_gamut) *warning = "colours outside of sRGB's gamut lose saturation at equal luminance";
+    }
     return image;
 }
 

@@ -2,11 +2,12 @@
 // magnitude: it is the luminous flux (illuminance) that the light has for a colour of luminance 1, so an rgb colour
 // still multiplies it.
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/core/math.h"
 #include "common/import/context.h"
+#include "common/import/exr_image.h"
+#include "common/import/file_source.h"
 #include "common/import/tessellate.h"
 #include "common/scene/sampling.h"
 
@@ -127,19 +128,31 @@ void distant_light(Context* context, const ParameterList& p, const Mat4& m) {
 }
 
 /// What "illuminance" normalises: the light's own xy plane lit by the upper half of the map. pbrt-v4 counts every pixel
-/// with 2 pi / n, half of its true solid angle, and weighs the channels of an EXR file in the file's order, blue first, with the
-/// weights of red, green and blue; so do we, or a scene would look half as bright here, or have another exposure.
-double illuminance_of(const Image& image) {
-    const bool blue_first = image.channels == 3 && has_suffix(image.name, ".exr");
-    const auto luminance = [&](const Rgb& c) { return blue_first ? Rgb(c.b, c.g, c.r).luminance() : c.luminance(); };
+/// with 2 pi / n, half of its true solid angle, and weighs the first three channels of an EXR file as red, green and
+/// blue, which by name they are not (B, G, R or A, B, G); so do we, or a scene would look half as bright here, or have another
+/// exposure.
+template <typename Luminance>
+double illuminance_of(int width, int height, Luminance luminance) {
     double sum = 0;
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x) {
-            const Vec3 w = equal_area_square_to_sphere(
-                {(float(x) + 0.5f) / float(image.width), (float(y) + 0.5f) / float(image.height)});
-            if (w.z > 0) sum += double(luminance(image.texel(x, y))) * w.z;
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+            const Vec3 w =
+                equal_area_square_to_sphere({(float(x) + 0.5f) / float(width), (float(y) + 0.5f) / float(height)});
+            if (w.z > 0) sum += double(luminance(x, y)) * w.z;
         }
-    return sum * 2 * kPiD / (double(image.width) * image.height);
+    return sum * 2 * kPiD / (double(width) * height);
+}
+
+double illuminance_of(Context* context, const Location& where, const std::string& reference, const Image& image) {
+    if (lower_extension(image.name) != "exr" || image.channels != 3)
+        return illuminance_of(image.width, image.height, [&](int x, int y) { return image.texel(x, y).luminance(); });
+    const Result<ExrPixels> raw = read_exr(context->read_file(where, reference), ExrChannels::kFirstThree);
+    if (!raw.ok()) fail(where, quoted(reference) + ": " + raw.status().message());
+    const Rgb weights = luminance_weights(raw->primaries);
+    return illuminance_of(raw->width, raw->height, [&](int x, int y) {
+        const float* p = &raw->values[3 * (size_t(y) * size_t(raw->width) + size_t(x))];
+        return weights.r * p[0] + weights.g * p[1] + weights.b * p[2];
+    });
 }
 
 void infinite_light(Context* context, const ParameterList& p, const Mat4& m) {
@@ -157,22 +170,14 @@ void infinite_light(Context* context, const ParameterList& p, const Mat4& m) {
     } else {
         if (p.find_any("L")) fail(p.where(), p.what() + ": give either L or filename, not both");
         light.image = context->load_image(p.where(), reference, ImageRequest{});
-        Image& image = context->scene.images[size_t(light.image)];
+        const Image& image = context->scene.images[size_t(light.image)];
         if (image.width != image.height)
             fail(p.where(), quoted(reference) +
                                 ": an environment map must be a square equal-area octahedral image, not " +
                                 std::to_string(image.width) + " x " + std::to_string(image.height) +
                                 "; convert it with \"imgtool makeequiarea\"");
-        bool negative = false;
-        for (float& v : image.floats) {
-            negative = negative || v < 0;
-            v = std::max(v, 0.0f);
-        }
-        if (negative)
-            context->diagnostics.warn(p.where(),
-                                      quoted(reference) + ": negative values of the environment map become 0, as in pbrt");
         if (illuminance > 0) {
-            const double own = illuminance_of(image);
+            const double own = illuminance_of(context, p.where(), reference, image);
             if (!(own > 0))
                 fail(p.where(),
                      quoted(reference) + ": the map is black above its horizon, so illuminance cannot scale it");

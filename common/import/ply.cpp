@@ -306,7 +306,10 @@ Status Reader::vertices(const Element& element, PlyMesh* mesh) {
         }
         mesh->positions.push_back({v[kX], v[kY], v[kZ]});
         const Vec3 n{v[kNx], v[kNy], v[kNz]};
-        if (normals) mesh->normals.push_back(is_finite(n) ? n : Vec3{0, 0, 0});
+        if (normals) {
+            mesh->normals.push_back(is_finite(n) ? n : Vec3{0, 0, 0});
+            mesh->finite_normals += is_finite(n);
+        }
         if (uvs) mesh->uvs.push_back({v[kU], v[kV]});
     }
     return {};

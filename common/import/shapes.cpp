@@ -1,9 +1,9 @@
 // Shapes become triangle meshes and spheres in world space (the space of the object inside ObjectBegin).
 //
 // Orientation: a mesh keeps its corners in file order; `flip_normal` is ReverseOrientation xor "the transformation
-// swaps handedness", which makes the geometric normal the image of the object-space one. A sphere's is flipped in
-// the same way, as pbrt-v4 does where a ray hits one: a mirrored glass sphere is a hole in glass. Where it samples light on
-// one, pbrt-v4 heeds ReverseOrientation alone; so do spheres that emit here, hit or sampled.
+// swaps handedness", which makes the geometric normal the image of the object-space one. pbrt-v4 turns the
+// object-space normal of a mirrored sphere or disk where a ray hits it: a mirrored glass sphere is a hole in glass. Where it
+// samples light on one it does not; so spheres and disks that emit keep their side here, hit or sampled.
 
 #include <cmath>
 
@@ -60,7 +60,7 @@ TriangleMesh place(Context* context, const ParameterList& parameters, TriangleMe
             if (substitutes.empty()) {
                 context->diagnostics.warn(
                     parameters.where(),
-                    parameters.what() + ": a normal has length zero or is not a number; the geometry's own is used there");
+                    parameters.what() + ": a normal has length zero or is no number; the geometry's own is used there");
                 substitutes = geometric_normals(mesh);
             }
             n = mesh.attributes.flip_normal ? -substitutes[i] : substitutes[i];
@@ -144,6 +144,10 @@ TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const S
     TriangleMesh mesh;
     mesh.positions = std::move(ply->positions);
     mesh.normals = std::move(ply->normals);
+    if (ply->finite_normals == 0 && !mesh.normals.empty()) {
+        context->diagnostics.warn(parameters.where(), quoted(reference) + ": its normals are no numbers and are left out");
+        mesh.normals.clear();
+    }
     mesh.uvs = std::move(ply->uvs);
     mesh.indices = std::move(ply->indices);
     *faces = std::move(ply->faces);
@@ -157,6 +161,12 @@ void require_full_turn(const ParameterList& parameters) {
 
 /// All triangles are parts of one shape.
 void join(const TriangleMesh& mesh, std::vector<uint32_t>* faces) { faces->assign(mesh.indices.size() / 3, 0); }
+
+/// Of a sphere or disk, see above.
+ShapeState quadric(ShapeState state) {
+    if (!state.emits && state.object_to_world.swaps_handedness()) state.reverse_orientation = !state.reverse_orientation;
+    return state;
+}
 
 std::variant<TriangleMesh, Sphere> sphere(Context* context, const ParameterList& parameters, const ShapeState& state,
                                           std::vector<uint32_t>* faces) {
@@ -175,7 +185,7 @@ std::variant<TriangleMesh, Sphere> sphere(Context* context, const ParameterList&
                                       std::to_string(kEllipsoidTriangles) + " triangles with smooth normals");
         TriangleMesh mesh = tessellate_sphere(radius);
         join(mesh, faces);
-        return place(context, parameters, std::move(mesh), state);
+        return place(context, parameters, std::move(mesh), quadric(state));
     }
     Sphere s;
     s.centre = state.object_to_world.point({0, 0, 0});
@@ -190,7 +200,7 @@ std::variant<TriangleMesh, Sphere> sphere(Context* context, const ParameterList&
         normalise(&axis);
     }
     s.orientation = Frame(axes[0], axes[1], axes[2]);
-    s.attributes.flip_normal = state.reverse_orientation != (!state.emits && state.object_to_world.swaps_handedness());
+    s.attributes.flip_normal = quadric(state).reverse_orientation;
     return s;
 }
 
@@ -206,7 +216,7 @@ TriangleMesh disk(Context* context, const ParameterList& parameters, const Shape
                                   " segments of exactly the disk's area; the rim is true to 0.03 % of the radius");
     TriangleMesh mesh = tessellate_disk(radius, inner, height);
     join(mesh, faces);
-    return place(context, parameters, std::move(mesh), state);
+    return place(context, parameters, std::move(mesh), quadric(state));
 }
 
 TriangleMesh bilinear_mesh(Context* context, const ParameterList& parameters, const ShapeState& state,

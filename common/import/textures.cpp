@@ -36,13 +36,18 @@ Rgb colour_of(Context* context, const Parameter& p, const std::string& what, Tex
         if (p.numbers.size() != 3) fail(p.where, what + ": " + quoted("rgb " + p.name) + " needs three numbers");
         colour = {float(p.numbers[0]), float(p.numbers[1]), float(p.numbers[2])};
     } else if (use == TextureUse::kReflectance) {
-        colour = reflectance_rgb(read_spectrum(context, p, what));
+        // Above 1 is for others to bring down: a texture's scale, or in the end the material.
+        Spectrum spectrum = read_spectrum(context, p, what);
+        double largest = 1;
+        for (const SpectrumSample& sample : spectrum) largest = std::max(largest, sample.value);
+        for (SpectrumSample& sample : spectrum) sample.value /= largest;
+        colour = reflectance_rgb(spectrum) * float(largest);
     } else {
         colour = index_rgb(read_spectrum(context, p, what));
     }
     for (int c = 0; c < 3; ++c) {
         if (colour[c] < 0) fail(p.where, what + ": " + quoted(p.name) + " is negative");
-        if (use == TextureUse::kReflectance && colour[c] > 1)
+        if (p.type == "rgb" && use == TextureUse::kReflectance && colour[c] > 1)
             fail(p.where, what + ": " + quoted(p.name) + " is above 1; a reflectance must lie in [0, 1]");
     }
     return colour;
@@ -157,7 +162,7 @@ TextureId named_texture(Context* context, const Location& where, const std::stri
              "no " + type + " texture is named " + quoted(name) +
                  (others.count(name) ? "; the texture of this name has the other type" : "; define it with Texture"));
     }
-    if (resolved.size() > 100000) fail(where, "the scene has more than 100000 textures");
+    if (resolved.size() > 300000) fail(where, "the scene has more than 300000 textures");
     resolved[{name, use}] = kInProgress;
     if (++context->texture_depth > kMaxNesting) fail(where, "textures refer to one another more than 31 levels deep");
     const TextureId id = make_texture(context, it->second, use);

@@ -272,6 +272,9 @@ TEST(ImportTexture, PrimariesOfExrFilesBecomeThoseOfSrgb) {
     EXPECT_NEAR(red.r, 0.7642, 1e-4);
     EXPECT_NEAR(red.g, 0.0502, 1e-4);
     EXPECT_EQ(colour({0.5f, 0, 0}, kRec2020).g, 0) << "outside of sRGB";
+    EXPECT_NEAR(colour({0.5f, 0, 0}, kRec2020).luminance(), 0.5 * 0.2627, 1e-4);
+    expect_warning(texture, "gamut", {{"c.exr", exr({0.5f, 0, 0}, kRec2020)}});
+    expect_warning(texture, "negative", {{"c.exr", exr({0.5f, 0.5f, -0.1f}, kRec709)}});
     expect_error(texture, {"c.exr", "chromaticities"}, {{"c.exr", exr(Rgb(0.5f), kAces)}});
 }
 
@@ -290,6 +293,11 @@ TEST(ImportTexture, SpectraAreReducedByTheirUse) {
     const SceneDescription index = world("Material \"conductor\" \"spectrum eta\" " + green + " \"rgb k\" [1 1 1]" + kShape);
     EXPECT_EQ(value(d, material_of(d).eta), value(index, material_of(index).eta));
     EXPECT_NE(value(d, material_of(d).eta), expected);
+    // In per cent, as a texture's scale may have it.
+    d = world("Texture \"p\" \"spectrum\" \"constant\" \"spectrum value\" [300 80 900 80] "
+              "Texture \"t\" \"spectrum\" \"scale\" \"texture tex\" \"p\" \"float scale\" 0.01 "
+              "Material \"diffuse\" \"texture reflectance\" \"t\"" + kShape);
+    EXPECT_NEAR(value(d, material_of(d).reflectance).g, 0.8, 1e-5);
 }
 
 TEST(ImportTexture, Errors) {
@@ -460,6 +468,10 @@ TEST(ImportLight, Infinite) {
         return world(light, {{"e.exr", exr(map, kRec709)}}).infinite_lights.at(0).radiance.r;
     };
     EXPECT_NEAR(radiance_of(Rgb(1.0f)) / radiance_of({0, 0, 1}), Rgb(1, 0, 0).luminance(), 1e-5);
+    constexpr std::array<float, 8> kRec2020{0.708f, 0.292f, 0.17f, 0.797f, 0.131f, 0.046f, 0.3127f, 0.329f};
+    const Rgb wide = world("LightSource \"infinite\" \"string filename\" \"e.EXR\" \"float illuminance\" 1",
+                           {{"e.EXR", exr({0.1f, 0.1f, 1}, kRec2020)}}).infinite_lights.at(0).radiance;
+    EXPECT_NEAR(radiance_of(Rgb(1.0f)) / wide.r, 0.1 + 0.9 * 0.2627, 1e-4) << "by the file's own primaries";
     expect_warning("LightSource \"infinite\" \"string filename\" \"e.exr\"", "negative", {{"e.exr", exr({-1e-6f, 1, 1}, kRec709)}});
     expect_error("LightSource \"infinite\" \"point3 portal\" [0 0 0 1 0 0 1 1 0 0 1 0]", {"portal"});
 }

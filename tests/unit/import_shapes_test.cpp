@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <regex>
 
 #include "common/import/ply.h"
 #include "import_testing.h"
@@ -177,7 +178,7 @@ TEST(Ply, AllFormatsAgree) {
     expect_warning("Shape \"plymesh\" \"string filename\" \"a.ply\"", "more than four", {{"a.ply", pentagon}});
 }
 
-/// Files with such normals exist; the geometry's own stand in for them, as in pbrt.
+/// Files with such normals exist. Where all are, the mesh has none, as in pbrt; where some are, the geometry's own stand in.
 TEST(Ply, NormalsThatAreNoNumbersAreLeftOut) {
     const std::string text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
                              "property float nx\nproperty float ny\nproperty float nz\nelement face 1\n"
@@ -187,8 +188,11 @@ TEST(Ply, NormalsThatAreNoNumbersAreLeftOut) {
     ASSERT_TRUE(mesh.ok()) << mesh.status().message();
     EXPECT_EQ(mesh->normals[1], (Vec3{0, 0, 0}));
     const std::string shape = "Shape \"plymesh\" \"string filename\" \"a.ply\"";
-    expect_warning(shape, "not a number", {{"a.ply", text}});
+    expect_warning(shape, "no number;", {{"a.ply", text}});
     EXPECT_EQ(world(shape, {{"a.ply", text}}).meshes.at(0).normals.at(1), (Vec3{0, 0, 1}));
+    const std::string none = std::regex_replace(text, std::regex("0 0 1\n"), "nan 0 0\n");
+    expect_warning(shape, "left out", {{"a.ply", none}});
+    EXPECT_TRUE(world(shape, {{"a.ply", none}}).meshes.at(0).normals.empty());
 }
 
 TEST(Ply, Errors) {

@@ -68,6 +68,12 @@ TEST(ImportState, OrientationFollowsHandednessAndReversal) {
     // A mirrored sphere is inside out, as in pbrt; but one that emits keeps its light outside.
     EXPECT_TRUE(world("Scale -1 1 1 Shape \"sphere\"").spheres[0].attributes.flip_normal);
     EXPECT_FALSE(world("Scale -1 1 1 ReverseOrientation Shape \"sphere\"").spheres[0].attributes.flip_normal);
+    // So is one that becomes triangles, and a disk.
+    const auto mesh_flips = [](const std::string& text) { return world(text).meshes.at(0).attributes.flip_normal; };
+    EXPECT_FALSE(mesh_flips("Scale -1 1 2 Shape \"sphere\""));
+    EXPECT_TRUE(mesh_flips("Scale -1 1 2 ReverseOrientation Shape \"sphere\""));
+    EXPECT_FALSE(mesh_flips("Scale -1 1 1 Shape \"disk\""));
+    EXPECT_TRUE(mesh_flips("Scale -1 1 1 AreaLightSource \"diffuse\" Shape \"disk\""));
     EXPECT_FALSE(world("Scale -1 1 1 AreaLightSource \"diffuse\" Shape \"sphere\"").spheres[0].attributes.flip_normal);
     EXPECT_TRUE(world("ReverseOrientation Shape \"sphere\"").spheres[0].attributes.flip_normal);
 }

@@ -10,7 +10,7 @@ add_test(NAME light_math_symbols
          COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/light_math_symbols.sh $<TARGET_FILE:lt_core> $<TARGET_FILE:lt_scene_base>
                  $<TARGET_FILE:lt_scene> $<TARGET_FILE:lt_tables> $<TARGET_FILE:lt_import> $<TARGET_FILE:lt_transport>)
 set(libraries "")
-foreach(name core scene_base scene film import tables transport work server worker client)
+foreach(name core cli scene_base scene film import tables transport work server worker client)
     list(APPEND libraries $<TARGET_FILE:lt_${name}>)
 endforeach()
 add_test(NAME one_definition COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/one_definition.sh ${libraries})
