@@ -50,8 +50,8 @@ struct BenchHistory {
 };
 
 /// Reads the lines of an earlier, perhaps killed process. Checkpoints of the runs in `keys` that have no last line are left
-/// out, because those runs start again. The beginning of such a line at the end of the file is ignored; any other line that is not JSON is an error
-/// that names it.
+/// out, because those runs start again. The beginning of such a line at the end of the file is ignored; any other line that
+/// is not JSON is an error that names it.
 Result<BenchHistory> parse_history(std::string_view text, const std::string& file_name, const std::set<std::string>& keys);
 
 /// Appends lines to a file; each is whole before the next begins.

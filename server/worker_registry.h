@@ -57,8 +57,8 @@ class WorkerRegistry {
         uint32_t most_threads = 0;  ///< That one of them has.
     };
     Crew crew(TimePoint now) const;
-    /// Whether the unit whose lease this worker let expire bears the blame for its silence: it does once for each silence, and a worker
-    /// that was heard of within half a lease has lost a lease on the way, not its life.
+    /// Whether the unit whose lease this worker let expire bears the blame for its silence: it does once for each silence. A
+    /// worker that was heard of within half a lease has lost a lease on the way, not its life.
     bool fell_silent(uint32_t index, TimePoint now);
     std::vector<WorkerStatus> statuses(TimePoint now) const;
 
