@@ -1,76 +1,23 @@
-// Materials, textures, lights, spectra and images.
+// Materials, lights and spectra.
 
 #include <array>
 #include <cmath>
 
-#include "common/import/images.h"
 #include "common/import/spectra.h"
-#include "common/scene/texture.h"
-#include "import_testing.h"
+#include "import_looks.h"
 
 namespace lightloom {
 namespace {
 
+using testing::exr;
 using testing::expect_error;
 using testing::expect_warning;
 using testing::import_world;
+using testing::kShape;
+using testing::material_of;
+using testing::tga;
+using testing::value;
 using testing::world;
-
-const std::string kShape = " Shape \"sphere\" ";
-
-/// The material of the first shape.
-Material material_of(const SceneDescription& d) { return d.materials.at(size_t(d.spheres.at(0).attributes.material)); }
-
-Rgb value(const SceneDescription& d, TextureId id, Vec2 uv = {0.3f, 0.3f}) {
-    return evaluate_texture({d.textures, d.images, d.materials}, id, uv);
-}
-
-/// An uncompressed 24-bit TGA; `bgr` holds rows from the bottom.
-std::string tga(int width, int height, const std::string& bgr) {
-    std::string out(18, '\0');
-    out[2] = 2;
-    out[12] = char(width);
-    out[14] = char(height);
-    out[16] = 24;
-    return out + bgr;
-}
-
-/// A PNG of 8 bits per sample, stored without compression; `rows` begin with a filter byte each. The decoder checks no sums.
-std::string png(int width, int height, int colour_type, const std::string& rows, const std::string& palette = "",
-                const std::string& transparency = "") {
-    const auto big = [](size_t v) { return std::string{char(v >> 24), char(v >> 16), char(v >> 8), char(v)}; };
-    const auto chunk = [&](const std::string& type, const std::string& data) {
-        return big(data.size()) + type + data + std::string(4, '\0');
-    };
-    const size_t n = rows.size();
-    const std::string stored = {'\x78', '\x01', '\x01', char(n), char(n >> 8), char(~n), char(~n >> 8)};
-    std::string out = "\x89PNG\r\n\x1a\n" +
-                      chunk("IHDR", big(size_t(width)) + big(size_t(height)) + char(8) + char(colour_type) + std::string(3, '\0'));
-    if (!palette.empty()) out += chunk("PLTE", palette);
-    if (!transparency.empty()) out += chunk("tRNS", transparency);
-    return out + chunk("IDAT", stored + rows + std::string(4, '\0')) + chunk("IEND", "");
-}
-
-/// A scan-line EXR of one pixel of float colour with these chromaticities: red, green, blue, white.
-std::string exr(const Rgb& colour, const std::array<float, 8>& xy) {
-    const auto bytes = [](const auto& v) { return std::string(reinterpret_cast<const char*>(&v), sizeof v); };
-    const auto attribute = [&](const std::string& name, const std::string& type, const std::string& value) {
-        return name + '\0' + type + '\0' + bytes(int32_t(value.size())) + value;
-    };
-    std::string channels;
-    for (const char c : {'B', 'G', 'R'})  // of type FLOAT, not sub-sampled
-        channels += std::string{c, '\0'} + bytes(std::array<int32_t, 4>{2, 0, 1, 1});
-    const std::array<int32_t, 4> window{0, 0, 0, 0};
-    std::string out = bytes(int32_t(20000630)) + bytes(int32_t(2));
-    out += attribute("channels", "chlist", channels + '\0') + attribute("chromaticities", "chromaticities", bytes(xy));
-    out += attribute("compression", "compression", std::string(1, '\0')) + attribute("dataWindow", "box2i", bytes(window));
-    out += attribute("displayWindow", "box2i", bytes(window)) + attribute("lineOrder", "lineOrder", std::string(1, '\0'));
-    out += attribute("pixelAspectRatio", "float", bytes(1.0f));
-    out += attribute("screenWindowCenter", "v2f", bytes(std::array<float, 2>{}));
-    out += attribute("screenWindowWidth", "float", bytes(1.0f)) + '\0';
-    out += bytes(uint64_t(out.size() + 8));
-    return out + bytes(int32_t(0)) + bytes(int32_t(12)) + bytes(colour.b) + bytes(colour.g) + bytes(colour.r);
-}
 
 TEST(ImportMaterial, DefaultsAreThoseOfPbrt) {
     SceneDescription d = world(kShape);
@@ -168,170 +115,6 @@ TEST(ImportMaterial, WhatIsNotModelledIsNamed) {
     expect_warning("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"" + kShape, "dispersion");
     EXPECT_NEAR(material_of(world("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"" + kShape)).ior, 1.5168,
                 1e-4);
-}
-
-TEST(ImportTexture, KindsAndNesting) {
-    const SceneDescription d = world(
-        "Texture \"c\" \"spectrum\" \"checkerboard\" \"rgb tex1\" [1 0 0] \"rgb tex2\" [0 1 0] \"float uscale\" 2 "
-        "\"float vscale\" 2\n"
-        "Texture \"h\" \"float\" \"constant\" \"float value\" 0.5\n"
-        "Texture \"s\" \"spectrum\" \"scale\" \"texture tex\" \"c\" \"texture scale\" \"h\"\n"
-        "Texture \"m\" \"spectrum\" \"mix\" \"texture tex1\" \"s\" \"rgb tex2\" [0 0 1] \"float amount\" 0.25\n"
-        "Material \"diffuse\" \"texture reflectance\" \"m\" Shape \"sphere\" \"texture alpha\" \"h\"");
-    const TextureId id = material_of(d).reflectance;
-    EXPECT_EQ(value(d, id, {0.1f, 0.1f}), Rgb(0.375f, 0, 0.25f));
-    EXPECT_EQ(value(d, id, {0.6f, 0.1f}), Rgb(0, 0.375f, 0.25f));
-    EXPECT_EQ(value(d, id, {-0.1f, 0.1f}), Rgb(0, 0.375f, 0.25f));
-    EXPECT_EQ(value(d, d.spheres[0].attributes.alpha), Rgb(0.5f));
-}
-
-TEST(ImportTexture, ImagesAreLookedUpAsInPbrt) {
-    // Bottom row: red, green; top row: blue, white.
-    const testing::FileMap files{{"t.tga", tga(2, 2,
-                                               std::string("\0\0\xff"
-                                                           "\0\xff\0"
-                                                           "\xff\0\0"
-                                                           "\xff\xff\xff",
-                                                           12))}};
-    const auto look = [&](const std::string& options, Vec2 uv) {
-        const SceneDescription d = world("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"t.tga\" " +
-                                             options + " Material \"diffuse\" \"texture reflectance\" \"t\"" + kShape,
-                                         files);
-        return value(d, material_of(d).reflectance, uv);
-    };
-    const std::string point = "\"string filter\" \"point\" ";
-    EXPECT_EQ(look(point, {0.25f, 0.25f}), Rgb(1, 0, 0));
-    EXPECT_EQ(look(point, {0.75f, 0.25f}), Rgb(0, 1, 0));
-    EXPECT_EQ(look(point, {0.25f, 0.75f}), Rgb(0, 0, 1));
-    EXPECT_EQ(look(point, {1.25f, -0.75f}), Rgb(1, 0, 0));
-    EXPECT_EQ(look(point + "\"string wrap\" \"black\"", {1.25f, 0.25f}), Rgb(0, 0, 0));
-    EXPECT_EQ(look(point + "\"string wrap\" \"clamp\"", {5, 0.25f}), Rgb(0, 1, 0));
-    EXPECT_EQ(look(point + "\"bool invert\" true \"float scale\" 0.5", {0.25f, 0.25f}), Rgb(0.5f, 1, 1));
-    EXPECT_EQ(look("\"string wrap\" \"clamp\"", {0.5f, 0.25f}), Rgb(0.5f, 0.5f, 0));
-    EXPECT_EQ(look("", {0.5f, 0.5f}), Rgb(0.5f, 0.5f, 0.5f));
-}
-
-TEST(ImportTexture, EncodingsAndFloats) {
-    const testing::FileMap files{{"g.png", png(1, 1, 0, std::string("\0\x80", 2))},
-                                 {"c.png", png(1, 1, 2, std::string("\0\x30\x60\x90", 4))}};
-    const auto grey = [&](const std::string& options) {
-        const SceneDescription d = world("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"g.png\" " +
-                                             options + " Shape \"sphere\" \"texture alpha\" \"t\"",
-                                         files);
-        return value(d, d.spheres.at(0).attributes.alpha).g;
-    };
-    EXPECT_NEAR(grey(""), 0.21586, 1e-4);
-    EXPECT_NEAR(grey("\"string encoding\" \"linear\""), 128 / 255.0, 1e-6);
-    EXPECT_NEAR(grey("\"string encoding\" \"gamma 2.2\""), std::pow(128 / 255.0, 2.2), 1e-5);
-    const SceneDescription d = world(
-        "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"c.png\" \"string encoding\" \"linear\""
-        " Shape \"sphere\" \"texture alpha\" \"t\"",
-        files);
-    EXPECT_NEAR(value(d, d.spheres[0].attributes.alpha).r, 96 / 255.0, 1e-6);
-    expect_warning("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"g.tga\" \"string encoding\" \"linear\"", "sRGB",
-                   {{"g.tga", tga(1, 1, "\x80\x80\x80")}});
-    const SceneDescription fixed = world(
-        "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"g.tga\" \"string encoding\" \"linear\""
-        " Shape \"sphere\" \"texture alpha\" \"t\"",
-        {{"g.tga", tga(1, 1, "\x80\x80\x80")}});
-    EXPECT_NEAR(value(fixed, fixed.spheres[0].attributes.alpha).r, 0.21586, 1e-4) << "as in pbrt, whatever the file asks for";
-}
-
-/// pbrt-v4 knows the alpha of an RGBA PNG; what the decoder makes of a palette's transparency or finds in a TGA is dropped.
-TEST(ImportTexture, AlphaIsThatOfRgbaFilesAlone) {
-    const auto alpha = [&](const std::string& name, const std::string& bytes) {
-        const SceneDescription d = world("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"" + name +
-                                             "\" Shape \"sphere\" \"texture alpha\" \"t\"",
-                                         {{name, bytes}});
-        return value(d, d.spheres.at(0).attributes.alpha).r;
-    };
-    EXPECT_NEAR(alpha("a.png", png(1, 1, 6, std::string("\0\xff\xff\xff\x80", 5))), 0.21586, 1e-4);
-    EXPECT_EQ(alpha("a.png", png(1, 1, 3, std::string("\0\0", 2), "\xff\xff\xff", "\x40")), 1);
-    EXPECT_EQ(alpha("a.png", png(1, 1, 2, std::string("\0\xff\xff\xff", 4), "", std::string("\0\xff\0\xff\0\xff", 6))), 1);
-    std::string rgba = tga(1, 1, "\xff\xff\xff\x40");
-    rgba[16] = 32;
-    rgba[17] = 8;
-    EXPECT_EQ(alpha("a.tga", rgba), 1);
-}
-
-TEST(ImportTexture, PrimariesOfExrFilesBecomeThoseOfSrgb) {
-    constexpr std::array<float, 8> kRec709{0.64f, 0.33f, 0.3f, 0.6f, 0.15f, 0.06f, 0.3127f, 0.329f};
-    constexpr std::array<float, 8> kRec2020{0.708f, 0.292f, 0.17f, 0.797f, 0.131f, 0.046f, 0.3127f, 0.329f};
-    constexpr std::array<float, 8> kAces{0.7347f, 0.2653f, 0, 1, 0.0001f, -0.077f, 0.32168f, 0.33767f};
-    const std::string texture = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"c.exr\" ";
-    const auto colour = [&](const Rgb& c, const std::array<float, 8>& xy) {
-        const SceneDescription d =
-            world(texture + "Material \"diffuse\" \"texture reflectance\" \"t\"" + kShape, {{"c.exr", exr(c, xy)}});
-        return value(d, material_of(d).reflectance);
-    };
-    const Rgb kept = colour({0.9f, 0.5f, 0.1f}, kRec709);
-    EXPECT_FLOAT_EQ(kept.r, 0.9f);
-    EXPECT_FLOAT_EQ(kept.b, 0.1f);
-    const Rgb white = colour(Rgb(0.5f), kRec2020), red = colour({0.5f, 0.1f, 0.1f}, kRec2020);
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(white[c], 0.5, 1e-6);
-    EXPECT_NEAR(red.r, 0.7642, 1e-4);
-    EXPECT_NEAR(red.g, 0.0502, 1e-4);
-    EXPECT_EQ(colour({0.5f, 0, 0}, kRec2020).g, 0) << "outside of sRGB";
-    EXPECT_NEAR(colour({0.5f, 0, 0}, kRec2020).luminance(), 0.5 * 0.2627, 1e-4);
-    expect_warning(texture, "gamut", {{"c.exr", exr({0.5f, 0, 0}, kRec2020)}});
-    expect_warning(texture, "negative", {{"c.exr", exr({0.5f, 0.5f, -0.1f}, kRec709)}});
-    expect_error(texture, {"c.exr", "chromaticities"}, {{"c.exr", exr(Rgb(0.5f), kAces)}});
-}
-
-/// The same spectrum is reduced in one way as a reflectance and in another as an index.
-TEST(ImportTexture, SpectraAreReducedByTheirUse) {
-    const std::string green = "[400 0.05 499 0.05 500 0.9 560 0.9 561 0.05 700 0.05]";
-    const SceneDescription direct = world("Material \"diffuse\" \"spectrum reflectance\" " + green + kShape);
-    const Rgb expected = value(direct, material_of(direct).reflectance);
-    const std::string texture = "Texture \"t\" \"spectrum\" \"constant\" \"spectrum value\" " + green +
-                                " Texture \"half\" \"spectrum\" \"scale\" \"texture tex\" \"t\" \"float scale\" 0.5 ";
-    SceneDescription d = world(texture + "Material \"diffuse\" \"texture reflectance\" \"t\"" + kShape);
-    EXPECT_EQ(value(d, material_of(d).reflectance), expected);
-    d = world(texture + "Material \"diffuse\" \"texture reflectance\" \"half\"" + kShape);
-    EXPECT_EQ(value(d, material_of(d).reflectance), expected * 0.5f);
-    d = world(texture + "Material \"conductor\" \"texture eta\" \"t\" \"texture k\" \"t\"" + kShape);
-    const SceneDescription index = world("Material \"conductor\" \"spectrum eta\" " + green + " \"rgb k\" [1 1 1]" + kShape);
-    EXPECT_EQ(value(d, material_of(d).eta), value(index, material_of(index).eta));
-    EXPECT_NE(value(d, material_of(d).eta), expected);
-    // In per cent, as a texture's scale may have it.
-    d = world("Texture \"p\" \"spectrum\" \"constant\" \"spectrum value\" [300 80 900 80] "
-              "Texture \"t\" \"spectrum\" \"scale\" \"texture tex\" \"p\" \"float scale\" 0.01 "
-              "Material \"diffuse\" \"texture reflectance\" \"t\"" + kShape);
-    EXPECT_NEAR(value(d, material_of(d).reflectance).g, 0.8, 1e-5);
-}
-
-TEST(ImportTexture, Errors) {
-    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.png\"", {"scene.pbrt:3", "no.png"});
-    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.bmp\"", {"bmp", "png"},
-                 {{"no.bmp", "BM"}});
-    for (const char* name : {"a.png", "a.jpg", "a.hdr", "a.tga", "a.exr"})
-        expect_error(std::string("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"") + name + "\"",
-                     {name}, {{name, "rubbish"}});
-    std::string huge = tga(1, 1, "");
-    huge[12] = huge[13] = huge[14] = huge[15] = '\x3f';
-    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.tga\"", {"cannot hold"},
-                 {{"a.tga", huge}});
-    expect_error("Texture \"t\" \"spectrum\" \"marble\"", {"marble", "not supported"});
-    expect_error("Texture \"t\" \"spectrum\" \"checkerboard\" \"string mapping\" \"planar\"", {"mapping", "uv"});
-    expect_error("Texture \"t\" \"spectrum\" \"checkerboard\" \"integer dimension\" 3", {"dimension"});
-    expect_error("Texture \"t\" \"spectrum\" \"scale\" \"texture tex\" \"t\"", {"itself"});
-    expect_error("Texture \"t\" \"colour\" \"constant\"", {"float or spectrum"});
-    expect_error("Texture \"t\" \"float\" \"constant\" Texture \"t\" \"float\" \"constant\"", {"twice"});
-    expect_error("Texture \"t\" \"float\" \"constant\" Material \"diffuse\" \"texture reflectance\" \"t\"",
-                 {"other type"});
-    expect_warning("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"t.tga\" \"string filter\" \"trilinear\"",
-                   "bilinear", {{"t.tga", tga(1, 1, "abc")}});
-    std::string chain = "Texture \"t0\" \"float\" \"checkerboard\"", wide = chain;
-    for (int i = 1; i < 40; ++i) {
-        const std::string name = "\"t" + std::to_string(i) + "\"", previous = "\"t" + std::to_string(i - 1) + "\"";
-        chain += " Shape \"sphere\" \"texture alpha\" " + previous + " Texture " + name +
-                 " \"float\" \"scale\" \"texture tex\" " + previous;
-        if (i < 20)
-            wide += " Texture " + name + " \"float\" \"scale\" \"texture tex\" " + previous + " \"texture scale\" " +
-                    previous;
-    }
-    expect_error(chain, {"31 levels"});
-    expect_error(wide, {"4096"});
 }
 
 TEST(ImportLight, AreaLights) {
