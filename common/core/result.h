@@ -62,8 +62,9 @@ class [[nodiscard]] Result {
     T&& value() && { return *std::move(value_); }
     T* operator->() { return &*value_; }
     const T* operator->() const { return &*value_; }
-    T& operator*() { return *value_; }
-    const T& operator*() const { return *value_; }
+    T& operator*() & { return *value_; }
+    const T& operator*() const& { return *value_; }
+    T&& operator*() && { return *std::move(value_); }  // as of std::optional: *std::move(r) moves
 
   private:
     std::optional<T> value_;
