@@ -30,9 +30,9 @@ for preset in "${presets[@]}"; do
     tests=(-LE statistical)
     targets=(all)
     if [ "$preset" = tsan ]; then
-        tests=(-R '^((coordinator|bookkeeping|client|worker|training|broadcast|guided|process|work|transport)_test|race_control)\.')
-        targets=(coordinator_test bookkeeping_test client_test worker_test training_test broadcast_test guided_test
-                 process_test work_test transport_test race_control)
+        names=(coordinator bookkeeping client worker training learn_tables broadcast guided process work transport)
+        tests=(-R "^(($(IFS='|' && echo "${names[*]}"))_test|race_control)\.")
+        targets=("${names[@]/%/_test}" race_control)
     fi
     "${run[@]}" cmake --build --preset "$preset" --target "${targets[@]}"
     reports="$root/build/$preset/reports"

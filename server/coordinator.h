@@ -13,7 +13,6 @@
 #include <thread>
 
 #include "common/film/partial_exr.h"
-#include "common/tables/train.h"
 #include "common/work/service.h"
 #include "server/scene_facts.h"
 #include "server/table_cache.h"
@@ -23,6 +22,7 @@
 namespace lightloom {
 
 struct JobRecord;
+struct LearnedTables;
 
 struct CoordinatorOptions {
     std::filesystem::path directory;  ///< Assets and finished images; made if need be.
@@ -32,6 +32,7 @@ struct CoordinatorOptions {
     double lease_seconds = 10;
     double heartbeat_seconds = 1;
     std::optional<uint64_t> shuffle_seed;          ///< Lease units in a random order (tests).
+    /// Called by any thread at any time.
     std::function<TimePoint()> clock = [] { return std::chrono::steady_clock::now(); };
     uint64_t waiting_bytes = uint64_t(512) << 20;  ///< Room for partials that wait for earlier groups.
     std::filesystem::path table_cache;             ///< Tables of earlier jobs; empty: none are kept.
@@ -90,8 +91,8 @@ class Coordinator {
     Status check_assets(const JobSpec& spec) const;
     void fail_job(JobRecord& job, const Status& why);
     void end_job(JobRecord& job, JobState state);
-    /// Runs a task on a thread of the job's own. Its error, too little memory for it, or no thread to be had fails the job and nothing
-    /// else; false in the last case. `purpose` completes "the coordinator has too little memory ...". Under mutex_.
+    /// Runs a task on a thread of the job's own. Its error, too little memory for it, or no thread to be had fails the job and
+    /// nothing else; false in the last case. `purpose` completes "the coordinator has too little memory ...". Under mutex_.
     bool start_task(JobRecord& job, std::jthread* thread, const char* purpose, std::function<Status(std::stop_token)> task);
     void run_task(JobRecord& job, const char* purpose, const std::function<Status()>& task);
     Status prepare(JobRecord& job, std::stop_token stop);
@@ -105,13 +106,10 @@ class Coordinator {
     void prepared_further(JobRecord& job);
     Status take_over_tables(JobRecord& job);
     void open_training(JobRecord& job, UnitKind kind, const TrainingWork& work);
-    Status finish_tables(JobRecord& job, const JobSpec& spec, const SubspaceTables& tables, const TrainingReport& report,
-                         TablesInfo info);
     void open_first_round(JobRecord& job);
-    Status open_guided_round(JobRecord& job, const SubspaceTables& pilot);
+    class Tracing;  ///< What learning asks of the coordinator for one job.
     Status learn(JobRecord& job, std::stop_token stop);
-    Result<TrainingData> collect_training(JobRecord& job, size_t emitter_count, std::stop_token stop);
-    Status choose_training_samples(JobRecord& job, const TrainingData& probe, const Scene& scene, std::stop_token stop);
+    Status finish_tables(JobRecord& job, LearnedTables learned);
     bool adopt_cached_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts);
     Status adopt_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts, std::string_view bytes, TablesInfo tables);
     bool repair_tables(const std::string& job_id);

@@ -31,7 +31,8 @@ bool Coordinator::start_task(JobRecord& job, std::jthread* thread, const char* p
         return true;
     } catch (const std::exception& e) {  // no thread, or no memory for one
         --job.running_tasks;
-        fail_job(job, {StatusCode::kResourceExhausted, std::string("the coordinator cannot start a thread ") + purpose + ": " + e.what()});
+        fail_job(job, {StatusCode::kResourceExhausted,
+                       std::string("the coordinator cannot start a thread ") + purpose + ": " + e.what()});
         return false;
     }
 }
@@ -127,7 +128,8 @@ void Coordinator::finish_if_complete(JobRecord& job) {
     job.finishing = options_.clock();
     job.units->close();
     changed(job);
-    start_task(job, &job.finish_task, "to write the image of this job", [this, &job](std::stop_token) { return write_results(job); });
+    start_task(job, &job.finish_task, "to write the image of this job",
+               [this, &job](std::stop_token) { return write_results(job); });
 }
 
 Status Coordinator::write_results(JobRecord& job) {

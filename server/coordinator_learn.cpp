@@ -1,224 +1,179 @@
-// How the coordinator learns tables: it waits for the training units of a job, chooses the size of the set where a time
-// limit asks for it, and trains in one or two rounds (see TrainingGenerator).
+// The coordinator's side of learning: learn_tables() runs on a thread of the job's own and asks through a TracingPort for what only
+// the coordinator has: units that workers trace, other jobs with the same tables, and the mutex.
 
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <chrono>
 
-#include "common/transport/catalog.h"
 #include "common/transport/parameters.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
-#include "server/training_budget.h"
+#include "server/learn_tables.h"
 
 namespace lightloom {
 namespace {
 
 constexpr auto kPoll = std::chrono::milliseconds(100);
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
-
 Status over() { return {StatusCode::kCancelled, "the job ended while its tables were made"}; }
 
 double learning_seconds(const TablesInfo& info) { return info.classifier_seconds + info.energy_seconds + info.gamma_seconds; }
 
-/// The spec with another size of the training set, in canonical text.
-JobSpec with_training_samples(const JobSpec& spec, uint64_t samples) {
-    JobSpec out = spec;
-    out.parameters[kTrainingPaths] = std::to_string(samples);
-    const auto algorithm = find_algorithm(out.algorithm);
-    const auto parameters = parse_parameters(**algorithm, out.parameters);
-    out.parameters = complete_parameters(**algorithm, *parameters);
-    return out;
-}
-
 }  // namespace
 
+class Coordinator::Tracing final : public TracingPort {
+  public:
+    Tracing(Coordinator& coordinator, JobRecord& job, size_t emitter_count, std::stop_token stop)
+        : coordinator_(coordinator), job_(job), emitter_count_(emitter_count), stop_(std::move(stop)) {}
+
+    Result<TracedRound> collect() override {
+        std::unique_lock lock(coordinator_.mutex_);
+        for (;;) {
+            coordinator_.work_changed_.wait_for(lock, kPoll, [&] { return !alive() || job_.round->complete(); });
+            if (!alive()) return over();
+            TrainingRound& round = *job_.round;
+            if (!round.complete()) continue;
+            TracedRound traced{.kind = round.kind(), .work = round.work(), .data = {}, .worker_seconds = round.traced_seconds()};
+            const TimePoint begin = job_.round_begin;
+            auto parts = round.take();
+            lock.unlock();
+            // Digest and size were right; a worker whose data are nonsense all the same loses its unit.
+            std::vector<std::pair<uint32_t, Status>> bad;
+            for (uint32_t i = 0; i < parts.size(); ++i)
+                if (Status s = parts[i].data.validate(emitter_count_); !s.ok()) bad.emplace_back(i, std::move(s));
+            if (bad.empty()) {
+                auto data = join(std::move(parts), stop_);
+                if (!data.ok()) return data.status();
+                traced.data = *std::move(data);
+            }
+            lock.lock();
+            if (!alive()) return over();
+            if (bad.empty()) {
+                traced.seconds = seconds_between(begin, coordinator_.options_.clock());
+                return traced;
+            }
+            job_.round->put_back(std::move(parts));
+            for (const auto& [unit, why] : bad) {
+                ++job_.rejected;
+                coordinator_.unit_failed(job_, {unit, 0, job_.round->kind()}, job_.round->refuse(unit), why);
+                if (!alive()) return over();  // the unit has failed too often
+            }
+        }
+    }
+
+    WorkerRegistry::Crew crew() const override {
+        const std::lock_guard lock(coordinator_.mutex_);
+        return coordinator_.workers_.crew(coordinator_.options_.clock());
+    }
+
+    Result<bool> settle(const AffordableSet& set) override {
+        spdlog::info("{}: the time limit has room for {} of {} training samples; {} traced in {:.3f} s, learned in {:.3f} s",
+                     job_.id, set.samples, set.wanted, set.probe_samples, set.probe_traced_seconds, set.probe_learned_seconds);
+        const bool smaller = set.samples < set.wanted;
+        SceneFacts facts;
+        {
+            const std::lock_guard lock(coordinator_.mutex_);
+            if (!alive()) return over();
+            job_.capped_by_time_limit = smaller;
+            job_.table_key = table_key(coordinator_.options_.identity, set.spec);
+            facts = job_.facts;
+        }
+        // A smaller set makes other tables, which nobody has looked for yet.
+        if (smaller && coordinator_.adopt_cached_tables(job_, set.spec, facts)) return false;
+        const std::lock_guard lock(coordinator_.mutex_);
+        if (!alive()) return over();
+        job_.spec = set.spec;
+        if (smaller && coordinator_.wait_for_maker(job_)) return false;
+        job_.training_begin = coordinator_.options_.clock();
+        coordinator_.open_first_round(job_);
+        return true;
+    }
+
+    void learning_begins() override {
+        const std::lock_guard lock(coordinator_.mutex_);
+        if (!alive()) return;
+        job_.phase = PreparePhase::kLearning;
+        job_.learning = {.begin = coordinator_.options_.clock(), .share = 0, .heard = {}};
+        coordinator_.prepared_further(job_);
+    }
+
+    void learning_goes_on(double share) override {
+        const std::lock_guard lock(coordinator_.mutex_);
+        if (!alive()) return;
+        job_.learning.share = share;
+        job_.learning.heard = coordinator_.options_.clock();
+        coordinator_.prepared_further(job_);
+    }
+
+    Status open_guided_round(const SubspaceTables& pilot, const TrainingWork& work) override {
+        auto bytes = std::make_shared<const std::string>(serialize(pilot));
+        const Digest digest = sha256(*bytes);
+        {
+            const std::lock_guard lock(coordinator_.mutex_);
+            if (!alive()) return over();
+            job_.guide = {digest, bytes->size()};  // before the bytes are there, so that no job that ends takes them away
+            job_.guide_bytes = bytes;
+        }
+        LL_RETURN_IF_ERROR(coordinator_.store_tables(digest, *bytes));
+        const std::lock_guard lock(coordinator_.mutex_);
+        if (!alive()) {
+            coordinator_.drop_tables(digest);
+            return over();
+        }
+        coordinator_.open_training(job_, UnitKind::kTraining, work);
+        return {};
+    }
+
+  private:
+    /// Under the mutex.
+    bool alive() const { return job_.state == JobState::kPreparing && !stop_.stop_requested(); }
+
+    Coordinator& coordinator_;
+    JobRecord& job_;
+    const size_t emitter_count_;
+    const std::stop_token stop_;
+};
+
 Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
+    JobSpec spec;
     std::function<Result<std::shared_ptr<const Scene>>()> build_scene;
     {
         const std::lock_guard lock(mutex_);
         if (job.state != JobState::kPreparing) return over();
+        spec = job.spec;
         build_scene = job.facts.build_scene;
     }
     if (!build_scene) return internal_error("this coordinator cannot build the scene that tables are learned for");
     const auto scene = build_scene();
     if (!scene.ok()) return scene.status();
     const EmitterSet& emitters = (*scene)->emitters();
-
-    TablesInfo info;  // of both rounds
-    for (;;) {
-        const auto data = collect_training(job, emitters.all().size(), stop);
-        if (!data.ok()) return data.status();
-        JobSpec spec;
-        UnitKind kind;
-        {
-            const std::lock_guard lock(mutex_);
-            if (job.state != JobState::kPreparing) return over();
-            spec = job.spec;
-            kind = job.round->kind();
-            if (kind != UnitKind::kProbe) {
-                info.trace_seconds = seconds_between(job.training_begin, options_.clock()) - learning_seconds(info);
-                info.capped_by_time_limit = job.capped_by_time_limit;
-                job.phase = PreparePhase::kLearning;
-                job.learning = {.begin = options_.clock(), .share = 0, .heard = {}};
-                prepared_further(job);
-            }
-        }
-        if (kind == UnitKind::kProbe) {
-            LL_RETURN_IF_ERROR(choose_training_samples(job, *data, **scene, stop));
-            const std::lock_guard lock(mutex_);
-            if (job.state != JobState::kPreparing || job.maker) return {};  // it has tables or waits for them, or was cancelled
-            continue;
-        }
-        const auto parameters = TransportParameters::read(render_settings(spec));
-        if (!parameters.ok()) return parameters.status();
-        TrainingReport report;
-        const auto progress = [&](double share) {
-            const std::lock_guard lock(mutex_);
-            if (job.state != JobState::kPreparing) return;
-            job.learning.share = share;
-            job.learning.heard = options_.clock();
-            prepared_further(job);
-        };
-        const auto tables = train_tables(*data, emitters, parameters->training, {stop, progress}, &report);
-        if (!tables.ok()) return tables.status();
-        info.training_samples += data->samples;
-        info.classifier_seconds += report.classifier_seconds;
-        info.energy_seconds += report.energy_seconds;
-        info.gamma_seconds += report.gamma_seconds;
-        if (kind == UnitKind::kTraining) return finish_tables(job, spec, *tables, report, std::move(info));
-        LL_RETURN_IF_ERROR(open_guided_round(job, *tables));
-    }
+    Tracing tracing(*this, job, emitters.all().size(), stop);
+    auto learned = learn_tables(std::move(spec), emitters, tracing, options_.clock, stop);
+    if (!learned.ok()) return learned.status();
+    return *learned ? finish_tables(job, **std::move(learned)) : Status();
 }
 
-Status Coordinator::finish_tables(JobRecord& job, const JobSpec& spec, const SubspaceTables& tables, const TrainingReport& report,
-                                  TablesInfo info) {
-    info.light_subspaces = tables.light_count;
-    info.eye_subspaces = tables.eye_count;
-    info.uniform_loss = report.gamma.uniform_loss;
-    info.loss = report.gamma.loss;
-    info.prior_strength = report.gamma.prior_strength;
-    info.note = report.note;
-    info.cache_key = table_key(options_.identity, spec);
-    const std::string bytes = serialize(tables);
+Status Coordinator::finish_tables(JobRecord& job, LearnedTables learned) {
+    TablesInfo& info = learned.info;
+    info.cache_key = table_key(options_.identity, learned.spec);
+    SceneFacts facts;  // empty if the job ended meanwhile: its tables are kept all the same
+    {
+        const std::lock_guard lock(mutex_);
+        info.capped_by_time_limit = job.capped_by_time_limit;
+        facts = std::move(job.facts);
+    }
+    const std::string bytes = serialize(learned.tables);
     table_cache_.store(info.cache_key, bytes, info);
     spdlog::info("{}: tables of {} x {} subspaces from {} samples; {:.2f} s traced, {:.2f} s learned{}{}", job.id,
                  info.light_subspaces, info.eye_subspaces, info.training_samples, info.trace_seconds, learning_seconds(info),
                  info.note.empty() ? "" : "; ", info.note);
-    SceneFacts facts;
-    {
-        const std::lock_guard lock(mutex_);
-        if (job.state != JobState::kPreparing) return over();
-        facts = std::move(job.facts);
-    }
-    return adopt_tables(job, spec, facts, bytes, std::move(info));
+    return adopt_tables(job, learned.spec, facts, bytes, std::move(info));
 }
 
 void Coordinator::open_first_round(JobRecord& job) {
     const auto parameters = TransportParameters::read(render_settings(job.spec));  // was read before: valid
     const uint64_t samples = parameters->training_samples, pilot = parameters->pilot_samples;
     open_training(job, pilot > 0 ? UnitKind::kPilot : UnitKind::kTraining, {0, pilot > 0 ? pilot : samples, samples});
-}
-
-Status Coordinator::open_guided_round(JobRecord& job, const SubspaceTables& pilot) {
-    auto bytes = std::make_shared<const std::string>(serialize(pilot));
-    const Digest digest = sha256(*bytes);
-    {
-        const std::lock_guard lock(mutex_);
-        if (job.state != JobState::kPreparing) return over();
-        job.guide = {digest, bytes->size()};  // before the bytes are there, so that no job that ends takes them away
-        job.guide_bytes = bytes;
-    }
-    LL_RETURN_IF_ERROR(store_tables(digest, *bytes));
-    const std::lock_guard lock(mutex_);
-    if (job.state != JobState::kPreparing) return drop_tables(digest), over();
-    const uint64_t total = job.round->work().total_samples, first = job.round->work().sample_count;
-    open_training(job, UnitKind::kTraining, {first, total - first, total});
-    return {};
-}
-
-Result<TrainingData> Coordinator::collect_training(JobRecord& job, size_t emitter_count, std::stop_token stop) {
-    std::unique_lock lock(mutex_);
-    const auto alive = [&] { return job.state == JobState::kPreparing && !stop.stop_requested(); };
-    for (;;) {
-        work_changed_.wait_for(lock, kPoll, [&] { return !alive() || job.round->complete(); });
-        if (!alive()) return over();
-        if (!job.round->complete()) continue;
-        auto parts = job.round->take();
-        lock.unlock();
-        // Digest and size were right; a worker whose data are nonsense all the same loses its unit.
-        std::vector<std::pair<uint32_t, Status>> bad;
-        for (uint32_t i = 0; i < parts.size(); ++i)
-            if (Status s = parts[i].data.validate(emitter_count); !s.ok()) bad.emplace_back(i, std::move(s));
-        if (bad.empty()) return join(std::move(parts), stop);
-        lock.lock();
-        if (!alive()) return over();
-        job.round->put_back(std::move(parts));
-        for (const auto& [unit, why] : bad) {
-            ++job.rejected;
-            unit_failed(job, {unit, 0, job.round->kind()}, job.round->refuse(unit), why);
-            if (!alive()) return over();  // the unit has failed too often
-        }
-    }
-}
-
-Status Coordinator::choose_training_samples(JobRecord& job, const TrainingData& probe, const Scene& scene, std::stop_token stop) {
-    JobSpec spec;
-    SceneFacts facts;
-    double traced = 0;
-    WorkerRegistry::Crew crew;
-    {
-        const std::lock_guard lock(mutex_);
-        if (job.state != JobState::kPreparing) return over();
-        spec = job.spec;
-        facts = job.facts;
-        traced = job.round->traced_seconds();
-        crew = workers_.crew(options_.clock());
-    }
-    const auto parameters = TransportParameters::read(render_settings(spec));
-    if (!parameters.ok()) return parameters.status();
-    const auto begin = Clock::now();
-    TrainingReport report;
-    const auto tables = train_tables(probe, scene.emitters(), parameters->training, {stop, {}}, &report);
-    if (!tables.ok()) return tables.status();
-    const double learned = seconds_since(begin), samples = double(std::max<uint64_t>(1, probe.samples));
-    const uint64_t wanted = parameters->training_samples;
-    const uint32_t threads = std::max(1u, crew.most_threads);  // of the worker that traced the probe: the largest, to be safe
-    const auto affordable = [&](bool guided, uint64_t most) {
-        // Every round learns once more what the probe's learning cost.
-        const double budget = kTrainingShare * spec.time_limit_seconds - traced - (guided ? 3 : 2) * learned;
-        const double per_sample = (guided ? kGuidedCost : 1) * traced / samples;
-        const TrainingRate rate{per_sample / double(std::max<size_t>(1, crew.workers)), kLearningOverTracing * per_sample * threads};
-        return affordable_training_samples(rate, budget, most);
-    };
-    const auto has_pilot = [&](uint64_t n) {
-        const auto p = TransportParameters::read(render_settings(with_training_samples(spec, n)));
-        return p.ok() && p->pilot_samples > 0;
-    };
-    uint64_t chosen = affordable(has_pilot(wanted), wanted);
-    // A set too small for two rounds costs what one round costs.
-    if (has_pilot(wanted) && !has_pilot(chosen)) chosen = affordable(false, std::min(wanted, kTrainingUnitSamples));
-    spec = with_training_samples(spec, chosen);
-    spdlog::info("{}: the time limit has room for {} of {} training samples; {} traced in {:.3f} s, learned in {:.3f} s", job.id,
-                 chosen, wanted, probe.samples, traced, learned);
-    {
-        const std::lock_guard lock(mutex_);
-        if (job.state != JobState::kPreparing) return over();
-        job.capped_by_time_limit = chosen < wanted;
-        job.table_key = table_key(options_.identity, spec);
-    }
-    if (chosen < wanted && adopt_cached_tables(job, spec, facts)) return {};
-    const std::lock_guard lock(mutex_);
-    if (job.state != JobState::kPreparing) return over();
-    job.spec = std::move(spec);
-    if (chosen < wanted && wait_for_maker(job)) return {};
-    job.training_begin = options_.clock();
-    open_first_round(job);
-    return {};
 }
 
 }  // namespace lightloom

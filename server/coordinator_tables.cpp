@@ -37,6 +37,7 @@ void Coordinator::discard_round(JobRecord& job) {
 
 void Coordinator::open_training(JobRecord& job, UnitKind kind, const TrainingWork& work) {
     job.round.emplace(kind, work, options_.shuffle_seed);
+    job.round_begin = {};
     job.phase = kind == UnitKind::kProbe ? PreparePhase::kProbing : PreparePhase::kTracing;
     prepared_further(job);
     work_changed_.notify_all();

@@ -45,9 +45,10 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
         const auto unit = units->lease(worker.index, lease_end());
         if (!unit) continue;
         const bool render = unit->key.kind == UnitKind::kRender;
+        if (!render && job->round_begin == TimePoint()) job->round_begin = options_.clock();
         if (!render && job->training_begin == TimePoint()) {
             // Only a job that workers have begun with takes a thread and a built scene; both are made while paths are traced.
-            job->training_begin = options_.clock();
+            job->training_begin = job->round_begin;
             JobRecord& record = *job;
             if (!start_task(record, &record.train_task,
                             "to learn the tables of this job; choose fewer training-paths, energy-paths or subspaces",

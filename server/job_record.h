@@ -62,6 +62,7 @@ struct JobRecord {
     bool makes_tables = false;          ///< It probes, traces and learns itself.
     std::shared_ptr<JobRecord> maker;   ///< Makes the same tables; this job waits for them.
     TimePoint training_begin;           ///< The first training unit was leased; unset before.
+    TimePoint round_begin;              ///< The same of the open round.
     struct Learning {
         TimePoint begin;   ///< Of the phase kLearning.
         double share = 0;  ///< Of that phase that is done, about.

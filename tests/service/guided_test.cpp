@@ -5,9 +5,10 @@
 namespace lightloom::testing {
 namespace {
 
-/// Delivers the pilot of a job and takes all units of the round that it guides.
-std::vector<std::pair<std::string, UnitLease>> deliver_pilot(TableService& service) {
+/// Delivers the pilot of a job, as if it had taken `milliseconds`, and takes all units of the round that it guides.
+std::vector<std::pair<std::string, UnitLease>> deliver_pilot(TableService& service, int milliseconds = 0) {
     const auto pilot = lease_all(service);
+    service.now_ms += milliseconds;
     EXPECT_EQ(pilot.size(), 1u);
     for (const auto& [worker, lease] : pilot) {
         EXPECT_EQ(lease.unit.key.kind, UnitKind::kPilot);
@@ -60,6 +61,20 @@ TEST(GuidedTables, AreThoseOfASingleMachine) {
     ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
 }
 
+TEST(GuidedTables, TracingIsTimedFromItsFirstLeaseAndEachRoundOnce) {
+    TableService service;
+    const std::string id = service.submit_training(service.guided_spec());
+    service.now_ms += 5000;
+    const auto units = deliver_pilot(service, 2000);
+    ASSERT_EQ(units.size(), 2u);
+    service.now_ms += 3000;
+    for (const auto& [worker, lease] : units) service.give(worker, lease, guided(service, lease));
+    const JobInfo info = service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
+    ASSERT_EQ(info.state, JobState::kRunning) << info.message;
+    EXPECT_EQ(info.tables.trace_seconds, 5);
+    ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
+}
+
 TEST(GuidedTables, AreCancelledInTheSecondRoundWithoutATrace) {
     TableService service;
     const std::string id = service.submit_training(service.guided_spec());
@@ -100,15 +115,13 @@ TEST(GuidedTables, OfATimeLimitedJobAreThoseOfItsSpec) {
     const auto probe = lease_all(service);
     ASSERT_EQ(probe.size(), 1u);
     ASSERT_EQ(probe[0].second.unit.key.kind, UnitKind::kProbe);
-    // At such a rate 32768 samples fit, with the two workers of lease_all(), if learning from the probe takes less than
-    // 0.29 s; 65536 never do.
+    // At such a rate 32768 samples fit, with the two workers of lease_all(); 65536 do not.
     const std::string& payload = traced(probe[0].second);
     service.give(probe[0].first, probe[0].second, payload, sha256(payload), 0.11);
     JobInfo info = service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing; });
     JobSpec recorded = service.guided_spec();
     recorded.parameters["training-paths"] = info.spec.parameters.at("training-paths");
-    if (std::stoull(recorded.parameters["training-paths"]) <= kTrainingUnitSamples)
-        GTEST_SKIP() << "this machine learns too slowly to afford two rounds";
+    EXPECT_EQ(recorded.parameters["training-paths"], "32768");
     for (const auto& [worker, lease] : deliver_pilot(service))
         EXPECT_EQ(service.give(worker, lease, guided(service, lease)).outcome, SubmitOutcome::kAccepted);
     info = service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; });

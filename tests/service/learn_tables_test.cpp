@@ -1,0 +1,174 @@
+// Learning without a coordinator: whatever traces the rounds, the rounds that are asked for, the set that a time limit affords, and
+// what becomes of errors.
+
+#include "server/learn_tables.h"
+
+#include "tests/service/table_service.h"
+
+namespace lightloom::testing {
+namespace {
+
+/// Traces every round itself, and remembers what was asked of it.
+class FakeTracing : public TracingPort {
+  public:
+    FakeTracing(const JobSpec& job, UnitKind first) : spec(job), kind(first) {
+        const auto p = TransportParameters::read(render_settings(spec));
+        const uint64_t samples = p->training_samples;
+        work = {0, first == UnitKind::kTraining ? samples : kFirstSamples, samples};
+    }
+
+    Result<TracedRound> collect() override {
+        asked += kind == UnitKind::kProbe ? "probe " : kind == UnitKind::kPilot ? "pilot " : "set ";
+        if (asked.ends_with(stops_at)) stop.request_stop();
+        if (asked.ends_with(fails_at)) return data_loss("boom");
+        const auto generator = TrainingGenerator::create(*golden(), render_settings(spec), guide ? &*guide : nullptr);
+        TracedRound round{kind, work, {}, worker_seconds, 2};
+        const uint64_t end = work.first_sample + work.sample_count;
+        for (uint64_t first = work.first_sample; first < end; first += kTrainingUnitSamples) {
+            const auto unit = generator->trace({first, std::min(kTrainingUnitSamples, end - first), work.total_samples}, {});
+            EXPECT_TRUE(round.data.append(*unit).ok());
+        }
+        return round;
+    }
+    WorkerRegistry::Crew crew() const override { return {2, 1}; }
+    Result<bool> settle(const AffordableSet& set) override {
+        asked += "settle ";
+        settled = set;
+        spec = set.spec;
+        kind = UnitKind::kTraining, work = {0, set.samples, set.samples};
+        if (asked.ends_with(fails_at)) return data_loss("boom");
+        return goes_on;
+    }
+    void learning_begins() override {
+        asked += "learn ";
+        share = 0;
+    }
+    void learning_goes_on(double now) override {
+        EXPECT_GE(now, share);
+        EXPECT_LE(now, 1);
+        share = now;
+    }
+    Status open_guided_round(const SubspaceTables& pilot, const TrainingWork& rest) override {
+        asked += "guide ";
+        guide = pilot, work = rest, kind = UnitKind::kTraining;
+        return asked.ends_with(fails_at) ? data_loss("boom") : Status();
+    }
+
+    static constexpr uint64_t kFirstSamples = kTrainingUnitSamples;  ///< Of a probe or pilot.
+
+    JobSpec spec;
+    UnitKind kind;
+    TrainingWork work;
+    std::optional<SubspaceTables> guide;
+    std::optional<AffordableSet> settled;
+    std::string asked, fails_at = "nothing", stops_at = "nothing";
+    std::stop_source stop;
+    double share = 0, worker_seconds = 1;
+    bool goes_on = true;
+};
+
+JobSpec complete(JobSpec spec) {
+    spec.max_depth = 5;
+    spec.frame = kFrame;
+    const auto algorithm = find_algorithm(spec.algorithm);
+    spec.parameters = complete_parameters(**algorithm, *parse_parameters(**algorithm, spec.parameters));
+    return spec;
+}
+
+const auto no_time_passes = [] { return TimePoint(); };
+
+Result<std::optional<LearnedTables>> learn(FakeTracing& tracing, const std::function<TimePoint()>& clock = no_time_passes) {
+    return learn_tables(tracing.spec, golden()->emitters(), tracing, clock, tracing.stop.get_token());
+}
+
+TEST(LearnTables, TwoRoundsAreThoseOfASingleMachine) {
+    const TableService service;
+    const JobSpec spec = complete(service.guided_spec());
+    FakeTracing tracing(spec, UnitKind::kPilot);
+    const auto learned = learn(tracing);
+    ASSERT_TRUE(learned.ok()) << learned.status().message();
+    ASSERT_TRUE(learned->has_value());
+    EXPECT_EQ(tracing.asked, "pilot learn guide set learn ");
+    EXPECT_EQ(tracing.work.first_sample, kTrainingUnitSamples);
+    EXPECT_EQ(tracing.work.sample_count, kSamples - kTrainingUnitSamples);
+    EXPECT_EQ(sha256(serialize((*learned)->tables)), tables_alone(spec));
+    EXPECT_EQ((*learned)->info.training_samples, kSamples);
+    EXPECT_EQ((*learned)->info.trace_seconds, 4) << "of both rounds";
+    EXPECT_EQ((*learned)->info.light_subspaces, (*learned)->tables.light_count);
+    EXPECT_LT((*learned)->info.loss, (*learned)->info.uniform_loss);
+    EXPECT_GT(tracing.share, 0.1) << "learning tells how far it has come";
+}
+
+TEST(LearnTables, ALimitWithRoomForLessMakesTheSetSmaller) {
+    const TableService service;
+    JobSpec spec = complete(service.table_spec(0));
+    spec.time_limit_seconds = 20;
+    FakeTracing tracing(spec, UnitKind::kProbe);
+    const auto learned = learn(tracing);
+    ASSERT_TRUE(learned.ok() && learned->has_value()) << learned.status().message();
+    EXPECT_EQ(tracing.asked, "probe settle set learn ");
+    ASSERT_TRUE(tracing.settled.has_value());
+    EXPECT_EQ(tracing.settled->wanted, kSamples);
+    EXPECT_EQ(tracing.settled->probe_samples, FakeTracing::kFirstSamples);
+    // 2 s, 1 of which the probe took. On two workers a sample costs half of the probe's 61 us, and 0.35 of them to learn from:
+    // room for 19275.
+    EXPECT_EQ(tracing.settled->samples, 16384u);
+    EXPECT_EQ((*learned)->spec.parameters.at("training-paths"), "16384");
+    EXPECT_EQ((*learned)->info.training_samples, 16384u);
+    EXPECT_EQ(sha256(serialize((*learned)->tables)), tables_alone((*learned)->spec));
+}
+
+/// Every round of learning costs what the probe's cost.
+TEST(LearnTables, WhatLearningFromTheProbeTookIsNotThereForTracing) {
+    const TableService service;
+    JobSpec spec = complete(service.table_spec(0));
+    spec.time_limit_seconds = 20;
+    FakeTracing tracing(spec, UnitKind::kProbe);
+    tracing.goes_on = false;
+    TimePoint now;
+    const auto slow = [&] { return now += std::chrono::milliseconds(250); };
+    ASSERT_TRUE(learn(tracing, slow).ok());
+    EXPECT_EQ(tracing.settled->probe_learned_seconds, 0.25);
+    EXPECT_EQ(tracing.settled->samples, 8192u) << "half of the second that the tracing has left: room for 9637";
+}
+
+TEST(LearnTables, NothingIsLearnedWhereTheTablesExist) {
+    const TableService service;
+    JobSpec spec = complete(service.table_spec(0));
+    spec.time_limit_seconds = 20;
+    FakeTracing tracing(spec, UnitKind::kProbe);
+    tracing.goes_on = false;
+    const auto learned = learn(tracing);
+    ASSERT_TRUE(learned.ok()) << learned.status().message();
+    EXPECT_FALSE(learned->has_value());
+    EXPECT_EQ(tracing.asked, "probe settle ");
+}
+
+TEST(LearnTables, EveryErrorEndsIt) {
+    const TableService service;
+    JobSpec timed = complete(service.table_spec(0));
+    timed.time_limit_seconds = 20;
+    for (const char* where : {"pilot ", "guide ", "set ", "probe ", "settle "}) {
+        const bool probes = std::string_view(where) == "probe " || std::string_view(where) == "settle ";
+        FakeTracing tracing(probes ? timed : complete(service.guided_spec()), probes ? UnitKind::kProbe : UnitKind::kPilot);
+        tracing.fails_at = where;
+        const auto learned = learn(tracing);
+        EXPECT_EQ(learned.status().code(), StatusCode::kDataLoss) << where;
+        EXPECT_TRUE(tracing.asked.ends_with(where)) << tracing.asked;
+    }
+}
+
+TEST(LearnTables, AStopEndsIt) {
+    const TableService service;
+    JobSpec timed = complete(service.table_spec(0));
+    timed.time_limit_seconds = 20;
+    for (const UnitKind first : {UnitKind::kProbe, UnitKind::kTraining}) {
+        FakeTracing tracing(timed, first);
+        tracing.stops_at = first == UnitKind::kProbe ? "probe " : "set ";
+        EXPECT_EQ(learn(tracing).status().code(), StatusCode::kCancelled);
+        EXPECT_EQ(tracing.asked, first == UnitKind::kProbe ? "probe " : "set learn ");
+    }
+}
+
+}  // namespace
+}  // namespace lightloom::testing
