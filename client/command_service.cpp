@@ -49,7 +49,8 @@ int service_error(const ServiceOptions& options, const Status& status) {
 int submit_job(const ServiceOptions& options) {
     GrpcJobPort port = connect(options);
     if (!options.detach)
-        if (Status s = check_outputs(options.job, beside_image(options.job, AfterFetch::kImageStays)); !s.ok()) return report_error(s);
+        if (Status s = check_outputs(options.job, beside_image(options.job, AfterFetch::kImageStays)); !s.ok())
+            return report_error(s);
     const auto scene = load_scene(options.job);
     if (!scene.ok()) return report_error(scene.status());
     const auto spec = make_spec(options.job, *scene);

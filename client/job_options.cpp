@@ -99,7 +99,8 @@ Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
     spec.time_limit_seconds = options.time_seconds;
     spec.samples_per_pixel = options.samples_per_pixel;
     if (spec.samples_per_pixel == 0 && spec.time_limit_seconds == 0)
-        spec.samples_per_pixel = uint32_t(std::clamp<int64_t>(scene.imported.description.samples_per_pixel, 1, int64_t(JobSpec::kMaxSamplesPerPixel) + 1));
+        spec.samples_per_pixel = uint32_t(
+            std::clamp<int64_t>(scene.imported.description.samples_per_pixel, 1, int64_t(JobSpec::kMaxSamplesPerPixel) + 1));
     spec.max_depth = options.max_depth;
     spec.first_hit_layers = options.layers;
     if (!options.resolution.empty()) {

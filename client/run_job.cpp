@@ -144,7 +144,8 @@ Status check_outputs(const JobOptions& options, const std::vector<const char*>& 
         std::error_code ignored;
         const auto status = std::filesystem::status(path, ignored);
         if (!std::filesystem::exists(status) && std::filesystem::is_symlink(std::filesystem::symlink_status(path, ignored)))
-            return invalid_argument(path + ": is a link to nothing, which may be another output; remove it or give another file name");
+            return invalid_argument(path +
+                                    ": is a link to nothing, which may be another output; remove it or give another file name");
         if (std::filesystem::is_directory(status)) return invalid_argument(path + ": is a directory; give a file name");
         if (std::filesystem::is_other(status)) continue;  // a pipe or a device
         for (const std::filesystem::path& other : taken)

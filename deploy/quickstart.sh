@@ -61,7 +61,11 @@ for i in 1 2; do
 done
 for i in 1 2; do
     until grep -qs 'registered as' "$output/worker$i.log"; do
-        kill -0 "${started[i]}" 2>/dev/null || { echo "quickstart: a worker did not start:" >&2; cat "$output/worker$i.log" >&2; exit 1; }
+        if ! kill -0 "${started[i]}" 2>/dev/null; then
+            echo "quickstart: a worker did not start:" >&2
+            cat "$output/worker$i.log" >&2
+            exit 1
+        fi
         sleep 0.1
     done
 done

@@ -7,7 +7,8 @@ namespace lightloom {
 
 Result<HostPort> parse_host_port(std::string_view text, std::string_view option) {
     const auto wrong = [&] {
-        return invalid_argument(std::string(option) + " takes HOST:PORT with a port from 0 to 65535 and [] around an IPv6 address, not \"" +
+        return invalid_argument(std::string(option) +
+                                " takes HOST:PORT with a port from 0 to 65535 and [] around an IPv6 address, not \"" +
                                 std::string(text) + "\"");
     };
     const size_t colon = text.rfind(':');
@@ -21,7 +22,8 @@ Result<HostPort> parse_host_port(std::string_view text, std::string_view option)
     if (brackets) out.host = out.host.substr(1, out.host.size() - 2);
     boost::system::error_code name;
     const auto address = boost::asio::ip::make_address(out.host, name);
-    if (out.host.empty() || (name ? brackets || out.host.find(':') != std::string::npos : address.is_v6() != brackets)) return wrong();
+    if (out.host.empty() || (name ? brackets || out.host.find(':') != std::string::npos : address.is_v6() != brackets))
+        return wrong();
     return out;
 }
 

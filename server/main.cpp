@@ -45,10 +45,13 @@ Exit codes: 0 stopped as asked, 1 failed to start, 2 bad command line.)";
 class OwnWorker {
   public:
     OwnWorker(Coordinator& coordinator, const BuildIdentity& identity, uint32_t threads, const std::filesystem::path& cache)
-        : parallelism_(tbb::global_control::max_allowed_parallelism, std::max(threads, 1u)), port_(coordinator), fetcher_(port_, cache),
-          worker_(port_, {.identity = identity, .thread_count = threads, .host = "coordinator", .process_id = uint64_t(::getpid())},
-                  [this](const UnitLease& lease, std::stop_token stop) { return renderers_.renderer(lease, stop); },
-                  [this](const UnitLease& lease, std::stop_token stop) { return renderers_.tracer(lease, stop); }),
+        : parallelism_(tbb::global_control::max_allowed_parallelism, std::max(threads, 1u)),
+          port_(coordinator),
+          fetcher_(port_, cache),
+          worker_(
+              port_, {.identity = identity, .thread_count = threads, .host = "coordinator", .process_id = uint64_t(::getpid())},
+              [this](const UnitLease& lease, std::stop_token stop) { return renderers_.renderer(lease, stop); },
+              [this](const UnitLease& lease, std::stop_token stop) { return renderers_.tracer(lease, stop); }),
           thread_([this](std::stop_token stop) {
               if (const Status s = worker_.run(stop); !s.ok()) spdlog::error("the coordinator's own worker: {}", s.message());
           }) {}
@@ -88,7 +91,9 @@ int main(int argc, char** argv) {
         ->check(whole_number_between(0, 1024))->capture_default_str();
     app.add_option("--table-cache-size", table_cache_mb,
                    "MB of the table cache: learned tables that later jobs find again, also after a restart; those used "
-                   "least recently go first; 0 keeps none")->check(whole_number_between(0, uint64_t(1) << 30))->capture_default_str();
+                   "least recently go first; 0 keeps none")
+        ->check(whole_number_between(0, uint64_t(1) << 30))
+        ->capture_default_str();
     app.add_option("--port-file", port_file, "Write \"GRPC_PORT STATUS_PORT\" here once both listen (a unix: socket has port 0)");
     app.add_flag("--allow-plaintext", plaintext, "Listen on other than loopback addresses");
     app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
@@ -167,7 +172,8 @@ int main(int argc, char** argv) {
                  tcp ? "port " + std::to_string((*server)->port()) : listen,
                  http ? http->port() : 0);
     if (!port_file.empty()) {
-        const std::string ports = std::to_string(tcp ? (*server)->port() : 0) + " " + std::to_string(http ? http->port() : 0) + "\n";
+        const std::string ports =
+            std::to_string(tcp ? (*server)->port() : 0) + " " + std::to_string(http ? http->port() : 0) + "\n";
         if (const Status written = write_file_atomically(port_file, ports); !written.ok()) {
             spdlog::error("{}", written.message());
             return 1;

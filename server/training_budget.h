@@ -9,8 +9,8 @@ namespace lightloom {
 /// Share of a time limit that preparation may take unless the user chose the training set.
 inline constexpr double kTrainingShare = 0.1;
 /// Samples of the unit that measures, thrown away afterwards: at least so many, and more where the limit has room, because a
-/// small probe tells little. Workers trace a part of it untimed first (worker.cpp), beyond kTrainingShare: whatever a cold worker does
-/// first takes that time.
+/// small probe tells little. Workers trace a part of it untimed first (worker.cpp), beyond kTrainingShare: whatever a cold worker
+/// does first takes that time.
 inline constexpr uint64_t kProbeSamples = 2048;
 inline constexpr double kProbeSamplesPerSecond = 300;  ///< Of the time limit.
 /// Below this, tables are worth less than what they cost to learn.

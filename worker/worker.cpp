@@ -147,7 +147,8 @@ bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
     {
         const std::lock_guard lock(mutex_);
         const auto [item, fresh] = running_.try_emplace(reference);
-        if (!fresh) return true;  // the other lane has it: its lease came back to us, and if its result fails, that lane gives it back
+        if (!fresh)
+            return true;  // the other lane has it: its lease came back to us, and if its result fails, that lane gives it back
         unit_stop = item->second.stop.get_token();
     }
     const bool training = reference.key.kind != UnitKind::kRender;
@@ -192,7 +193,8 @@ Status Worker::render_unit(const UnitLease& lease, std::stop_token unit_stop, st
         in_turn(lease, unit_stop, drain, [&] { partial = (*renderer)->render(unit_work(lease.unit), unit_stop); });
     if (!seconds.ok()) return seconds.status();
     if (!partial.ok()) return partial.status();
-    return submit(lease, [&](const std::string& worker_id) { return port_.submit_result(worker_id, lease, *partial, *seconds); }, drain);
+    return submit(
+        lease, [&](const std::string& worker_id) { return port_.submit_result(worker_id, lease, *partial, *seconds); }, drain);
 }
 
 Status Worker::trace_unit(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain) {
@@ -225,7 +227,8 @@ Status Worker::submit(const UnitLease& lease, const Send& send, std::stop_token 
         const std::string worker_id = id();
         const auto ack = send(worker_id);
         if (ack.ok()) {
-            if (ack->outcome == SubmitOutcome::kDuplicateDifferent) spdlog::error("{}: {}", name_of(lease.reference()), ack->reason);
+            if (ack->outcome == SubmitOutcome::kDuplicateDifferent)
+                spdlog::error("{}: {}", name_of(lease.reference()), ack->reason);
             // The coordinator has counted that. But a heartbeat may have taken the unit back for us meanwhile, or our other lane.
             if (ack->outcome == SubmitOutcome::kRejected) return {StatusCode::kAborted, ack->reason};
             return {};

@@ -1,6 +1,7 @@
 #pragma once
 // Numbers on the command line. Every option of client, server and worker that is a number is checked by one of these, because CLI11
-// alone takes NaN for a number of any range, reads a leading 0 as octal, wraps negative numbers around and lets large ones saturate.
+// alone takes NaN for a number of any range, reads a leading 0 as octal, wraps negative numbers around and lets large ones
+// saturate.
 
 #include <CLI/CLI.hpp>
 

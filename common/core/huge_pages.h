@@ -31,8 +31,8 @@ struct HugePageAllocator {
     friend bool operator==(const HugePageAllocator&, const HugePageAllocator&) { return true; }
 };
 
-/// A huge page of its own, uninitialised. What is given back is kept for the next owner, up to a bound: the kernel clears every page
-/// that it hands out, which takes a tenth of the time in which a light-vertex cache is traced into it. Throws std::bad_alloc.
+/// A huge page of its own, uninitialised. What is given back is kept for the next owner, up to a bound: the kernel clears every
+/// page that it hands out, which takes a tenth of the time in which a light-vertex cache is traced into it. Throws std::bad_alloc.
 class HugePage {
   public:
     static constexpr size_t kBytes = HugePageAllocator<std::byte>::kPage;

@@ -29,8 +29,8 @@ class InverseCdfTable {
             draw_strata(u, 1, &draw);
             return draw;
         }
-        /// (u + n) / count for n = 0 .. count - 1, count <= kMaxStrata. A large table lies far from the processor, and the draws wait
-        /// for it together.
+        /// (u + n) / count for n = 0 .. count - 1, count <= kMaxStrata. A large table lies far from the processor, and the draws
+        /// wait for it together.
         void draw_strata(double u, int count, Draw* out) const {
             double scaled[kMaxStrata];
             uint32_t cut[kMaxStrata];

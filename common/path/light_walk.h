@@ -11,7 +11,8 @@ class LightSampler : public WalkSampler {
   public:
     /// `key.index` is the number of the path; numbers that differ above 32 bits belong to different sequences.
     explicit LightSampler(const RngKey& key)
-        : WalkSampler(key, Rng({key.seed, Stage::kLightScramble, key.iteration, uint64_t(key.stage) << 56 | key.index >> 32}).next_u64(),
+        : WalkSampler(key,
+                      Rng({key.seed, Stage::kLightScramble, key.iteration, uint64_t(key.stage) << 56 | key.index >> 32}).next_u64(),
                       uint32_t(key.index), 3) {}
 
     /// In [0, 1): which light. A point of the sequence has 24 bits, too few to tell a million lights apart.

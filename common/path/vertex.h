@@ -30,8 +30,8 @@ struct PathVertex {
     /// Light subspace of the prefix, or eye subspace of the suffix, that ends here as traced; and of the other kind, seen from
     /// the successor. kNoLabel until a method with tables asks for them.
     uint16_t label = kNoLabel, reverse_label = kNoLabel;
-    /// Where the classifier of reverse_label goes on for this vertex as seen from wo's side (SubspaceTree::label_and_settle()); 0: the
-    /// root.
+    /// Where the classifier of reverse_label goes on for this vertex as seen from wo's side (SubspaceTree::label_and_settle()); 0:
+    /// the root.
     uint32_t reverse_branch = 0;
     /// Product of the survival probabilities that alpha was divided by: alpha * survival is free of Russian roulette.
     float survival = 1;

@@ -175,8 +175,8 @@ struct SceneDescription {
 };
 
 /// What rendering relies on in shapes, instances, and the strength of area and infinite lights: indices in range, finite numbers,
-/// areas within single precision, invertible matrices. kInvalidArgument names the first that breaks it, a shape with its place in the
-/// scene file. import_pbrt() and Scene::build() check it; everything else is the importer's to guarantee.
+/// areas within single precision, invertible matrices. kInvalidArgument names the first that breaks it, a shape with its place in
+/// the scene file. import_pbrt() and Scene::build() check it; everything else is the importer's to guarantee.
 Status validate(const SceneDescription& description);
 
 /// Whether a transformation is made of rotations, translations, reflections and one scale for all axes, as a camera's must be.

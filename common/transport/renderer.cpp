@@ -49,7 +49,8 @@ Result<std::unique_ptr<Renderer>> Renderer::create(std::shared_ptr<const Scene> 
     if (settings.algorithm == "bdpt") return make(BdptAlgorithm<>{{light_paths_per_iteration}, p.heuristic});
     if (settings.algorithm == "lvcbpt")
         return make(LvcbptAlgorithm<>{
-            {{light_paths_per_iteration, double(p.connections) / tables->vertices_per_path, TypicalSurvival(p.roulette)}, p.connections},
+            {{light_paths_per_iteration, double(p.connections) / tables->vertices_per_path, TypicalSurvival(p.roulette)},
+             p.connections},
             p.heuristic,
             p.minimum_paths});
     return make(make_spcbpt(p, std::make_shared<const PreparedTables>(*tables), light_paths_per_iteration));

@@ -77,7 +77,8 @@ struct SubspaceConnections {
 
     static constexpr ViewDetail kDetail = ViewDetail::kSubspace;
 
-    static_assert(kMaxConnections <= InverseCdfTable::Column::kMaxStrata && SubspaceTables::kMaxSubspaces <= InverseCdfTable::kMaxOutcomes);
+    static_assert(kMaxConnections <= InverseCdfTable::Column::kMaxStrata &&
+                  SubspaceTables::kMaxSubspaces <= InverseCdfTable::kMaxOutcomes);
 
     /// A prefix and its part of the alias table of its subspace, drawn in proportion to r.
     struct Candidate {

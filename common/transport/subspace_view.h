@@ -62,7 +62,8 @@ struct SubspaceLabeller {
             const bool end = j == t - 1;
             if (end && hit) break;
             if (end) {
-                view->light_label[k - j + 1] = z[j].bsdf.has_smooth_lobe() ? reverse_label(tables.light_tree, z[j], towards) : kNoLabel;
+                view->light_label[k - j + 1] =
+                    z[j].bsdf.has_smooth_lobe() ? reverse_label(tables.light_tree, z[j], towards) : kNoLabel;
             } else {
                 if (z[j].reverse_label == kNoLabel && z[j].bsdf.has_smooth_lobe())
                     z[j].reverse_label = reverse_label(tables.light_tree, z[j], -z[j + 1].wo);

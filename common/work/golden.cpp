@@ -103,13 +103,15 @@ SceneDescription golden_courtyard() {
     GoldenBuilder g;
     const TextureId white = g.constant(Rgb(0.7f)), tenth = g.constant(Rgb(0.1f)), third = g.constant(Rgb(0.3f));
     const auto texel = [](int x, int y, int c) { return 0.1f + 0.1f * float((3 * x + 5 * y + 7 * c) % 8); };
-    const TextureId picture = g.texture({.kind = TextureKind::kImage, .image = g.image(8, 3, texel), .scale = 0.9f, .su = 3, .sv = 2});
+    const TextureId picture =
+        g.texture({.kind = TextureKind::kImage, .image = g.image(8, 3, texel), .scale = 0.9f, .su = 3, .sv = 2});
     const int32_t coded = g.image(4, 1, texel);
     g.code(coded);
     const TextureId grille =
         g.texture({.kind = TextureKind::kImage, .image = coded, .wrap = WrapMode::kClamp, .nearest = true, .invert = true});
     const TextureId label = g.texture({.kind = TextureKind::kImage, .image = coded, .wrap = WrapMode::kBlack, .su = 2, .sv = 2});
-    const TextureId blend = g.texture({.kind = TextureKind::kMix, .a = picture, .b = g.constant({0.2f, 0.5f, 0.3f}), .amount = third});
+    const TextureId blend =
+        g.texture({.kind = TextureKind::kMix, .a = picture, .b = g.constant({0.2f, 0.5f, 0.3f}), .amount = third});
     const TextureId shade = g.texture({.kind = TextureKind::kScale, .a = blend, .b = white});
 
     const MaterialId ground = g.material({.kind = MaterialKind::kDiffuse, .reflectance = shade});
@@ -122,7 +124,8 @@ SceneDescription golden_courtyard() {
     const MaterialId copper = g.material({.kind = MaterialKind::kConductor, .eta = g.constant({0.2f, 0.9f, 1.1f}),
                                           .k = g.constant({3.9f, 2.4f, 2.2f}), .roughness_u = third, .roughness_v = tenth,
                                           .remap_roughness = false});
-    const MaterialId frosted = g.material({.kind = MaterialKind::kDielectric, .roughness_u = tenth, .roughness_v = tenth, .ior = 1.4f});
+    const MaterialId frosted =
+        g.material({.kind = MaterialKind::kDielectric, .roughness_u = tenth, .roughness_v = tenth, .ior = 1.4f});
     const MaterialId pane = g.material({.kind = MaterialKind::kThinDielectric, .ior = 1.5f});
     const MaterialId patina = g.material({.kind = MaterialKind::kMix, .mix_a = copper, .mix_b = lacquer, .mix_amount = third});
 

@@ -133,11 +133,11 @@ int main(int argc, char** argv) {
                     const Class wanted = Class(c);
                     if (name == "bdpt") return render(ClassOfBdpt{{frame_paths}, wanted});
                     if (name == "lvcbpt") {
-                        const LvcbptAlgorithm<> whole{
-                            {{frame_paths, parameters->connections / tables.vertices_per_path, TypicalSurvival(parameters->roulette)},
-                             parameters->connections},
-                            parameters->heuristic,
-                            parameters->minimum_paths};
+                        const LvcbptAlgorithm<> whole{{{frame_paths, parameters->connections / tables.vertices_per_path,
+                                                        TypicalSurvival(parameters->roulette)},
+                                                       parameters->connections},
+                                                      parameters->heuristic,
+                                                      parameters->minimum_paths};
                         return render(ClassOfCached<LvcbptAlgorithm<>>{whole, wanted});
                     }
                     if (name != "spcbpt") return invalid_argument("no shares of techniques for '" + name + "'");

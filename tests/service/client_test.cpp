@@ -32,7 +32,8 @@ TEST(CommandLine, NumbersAreDecimalAndInRange) {
     for (const char* text : {"1", "10", "1024"}) EXPECT_TRUE(accepts(whole, text)) << text;
     for (const char* text : {"", "0", "1025", "010", "0x10", "+1", "-1", " 1", "1 ", "1.0", "1e2", "nan", "18446744073709551617"})
         EXPECT_FALSE(accepts(whole, text)) << text;
-    for (const char* text : {"0", "-1.5", ".5", "+1", "+.5", "1e3", "010", "-30", "2592000"}) EXPECT_TRUE(accepts(real, text)) << text;
+    for (const char* text : {"0", "-1.5", ".5", "+1", "+.5", "1e3", "010", "-30", "2592000"})
+        EXPECT_TRUE(accepts(real, text)) << text;
     for (const char* text : {"", "+", "+-1", "++1", "nan", "inf", "-30.01", "2592001", "1x", "0x10", "1,5"})
         EXPECT_FALSE(accepts(real, text)) << text;
     EXPECT_TRUE(accepts(whole_number(), "0"));
@@ -59,9 +60,11 @@ TEST(Outputs, ThatAreLinksAreTriedOutWhereTheyPoint) {
     std::filesystem::create_symlink("elsewhere/b.png", path("b.png"));
     EXPECT_TRUE(check("b.png").ok()) << check("b.png").message();
     std::filesystem::create_symlink("/proc/version", path("proc.png"));  // where not even root can make files
-    EXPECT_EQ(check("proc.png").message().rfind(path("proc.png").string() + ": cannot be written", 0), 0u) << check("proc.png").message();
+    EXPECT_EQ(check("proc.png").message().rfind(path("proc.png").string() + ": cannot be written", 0), 0u)
+        << check("proc.png").message();
     size_t files = 0;
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(directory.path)) files += std::filesystem::is_regular_file(entry.symlink_status());
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(directory.path))
+        files += std::filesystem::is_regular_file(entry.symlink_status());
     EXPECT_EQ(files, 2u) << "nothing is left of the trial";
 }
 

@@ -277,9 +277,10 @@ TEST(Processes, ASocketBelongsToTheServerThatHasIt) {
     const auto path = [&](const std::string& name) { return (directory.path / name).string(); };
     const std::string address = "unix:" + path("socket");
     const auto serve = [&](const std::string& name) {
-        return std::make_unique<Process>(
-            "lightloom-server", std::vector<std::string>{"--listen", address, "--status", "off", "--data", path(name), "--port-file",
-                                                         path(name + ".ports")}, path(name + ".log"));
+        return std::make_unique<Process>("lightloom-server",
+                                         std::vector<std::string>{"--listen", address, "--status", "off", "--data", path(name),
+                                                                  "--port-file", path(name + ".ports")},
+                                         path(name + ".log"));
     };
     const auto list = [&] { return Process("lightloom", {"list", "--server", address}, path("list.log")).wait(); };
     const auto first = serve("first");

@@ -166,11 +166,18 @@ TEST(StatusPage, AnswersGetAndSurvivesNonsense) {
 }
 
 TEST(Addresses, AreHostsAndPortsAndNothingElse) {
-    for (const char* wrong : {"", "127.0.0.1", "127.0.0.1:", "127.0.0.1:65536", "127.0.0.1:-1", "127.0.0.1:8x", "::1:80", "[127.0.0.1]:80",
-                              ":80", "[localhost]:80"})
+    for (const char* wrong : {"", "127.0.0.1", "127.0.0.1:", "127.0.0.1:65536", "127.0.0.1:-1", "127.0.0.1:8x", "::1:80",
+                              "[127.0.0.1]:80", ":80", "[localhost]:80"})
         EXPECT_FALSE(parse_host_port(wrong, "--x").ok()) << wrong;
-    for (const auto& [text, loopback] : {std::pair{"127.0.0.1:0", true}, {"localhost:65535", true}, {"[::1]:80", true}, {"127.1.2.3:80", true},
-                                         {"127.example:80", false}, {"host:80", false}, {"0.0.0.0:80", false}, {"[::]:80", false}, {"10.0.0.1:80", false}})
+    for (const auto& [text, loopback] : {std::pair{"127.0.0.1:0", true},
+                                         {"localhost:65535", true},
+                                         {"[::1]:80", true},
+                                         {"127.1.2.3:80", true},
+                                         {"127.example:80", false},
+                                         {"host:80", false},
+                                         {"0.0.0.0:80", false},
+                                         {"[::]:80", false},
+                                         {"10.0.0.1:80", false}})
         EXPECT_EQ(is_loopback(*parse_host_port(text, "--x")), loopback) << text;
 }
 

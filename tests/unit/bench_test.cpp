@@ -154,7 +154,8 @@ TEST(BenchHistory, ATornLastLineIsIgnoredWhereverItIsCut) {
 }
 
 TEST(BenchHistory, AFileOfSomethingElseIsLeftAlone) {
-    for (const std::string text : {"my only notes\n", "my only notes", "{\"run\":\n", "{}\n", "{\"a\":1}", "{\"a\":1", "{ my notes"})
+    for (const std::string text :
+         {"my only notes\n", "my only notes", "{\"run\":\n", "{}\n", "{\"a\":1}", "{\"a\":1", "{ my notes"})
         EXPECT_EQ(parse_history(text, "notes", {"a"}).status().code(), StatusCode::kInvalidArgument) << text;
 }
 

@@ -172,8 +172,8 @@ TEST(Gamma, ColumnsWithoutPathsKeepThePrior) {
         GammaReport report;
         const std::vector<float> gamma = train_gamma(data, options, &report);
         for (uint32_t i = 0; i < data.light_count; ++i)
-            EXPECT_NEAR(double(gamma[unnamed * data.light_count + i]), 0.5 / data.light_count + 0.5 * double(data.energy[i]) / total,
-                        1e-6);
+            EXPECT_NEAR(double(gamma[unnamed * data.light_count + i]),
+                        0.5 / data.light_count + 0.5 * double(data.energy[i]) / total, 1e-6);
     }
 }
 

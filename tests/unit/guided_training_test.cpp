@@ -156,7 +156,8 @@ TEST(GuidedTraining, InfiniteLightsLieInTheDirectionOfTheirLight) {
     EXPECT_GT(seen, 2000);
 }
 
-/// Units are held out against one another: what they share would confirm itself. Paths on a lamp are told apart by where they begin.
+/// Units are held out against one another: what they share would confirm itself. Paths on a lamp are told apart by where they
+/// begin.
 TEST(GuidedTraining, UnitsShareNoLightSubPath) {
     const auto scene = testing::diffuse_box();
     testing::RandomTableOptions random;

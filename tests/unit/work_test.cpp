@@ -351,7 +351,8 @@ TEST(Golden, PathAndBdptAgreeOnTheCourtyard) {
     testing::TestFamily family;
     std::vector<testing::RegionMeans> means;
     for (const char* algorithm : {"path", "bdpt"})
-        means.push_back(testing::replicate(testing::catalog_image(scene, algorithm, 6, 16), scene->frame().crop, 24, means.size() + 1));
+        means.push_back(
+            testing::replicate(testing::catalog_image(scene, algorithm, 6, 16), scene->frame().crop, 24, means.size() + 1));
     testing::compare(means[0], means[1], "path and bdpt", &family);
     EXPECT_GT(family.size(), 5);
     family.check();
