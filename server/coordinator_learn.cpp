@@ -45,13 +45,12 @@ class Coordinator::Tracing final : public TracingPort {
                 auto data = join(std::move(parts), stop_);
                 if (!data.ok()) return data.status();
                 traced.data = *std::move(data);
+                lock.lock();
+                traced.seconds = seconds_between(begin, coordinator_.options_.clock());
+                return alive() ? Result<TracedRound>(std::move(traced)) : over();
             }
             lock.lock();
             if (!alive()) return over();
-            if (bad.empty()) {
-                traced.seconds = seconds_between(begin, coordinator_.options_.clock());
-                return traced;
-            }
             job_.round->put_back(std::move(parts));
             for (const auto& [unit, why] : bad) {
                 ++job_.rejected;

@@ -75,6 +75,14 @@ JobSpec complete(JobSpec spec) {
     return spec;
 }
 
+/// Of a tenth of its limit, 2 s, the probe takes one.
+JobSpec limited_spec() {
+    const TableService service;
+    JobSpec spec = complete(service.table_spec(0));
+    spec.time_limit_seconds = 20;
+    return spec;
+}
+
 const auto no_time_passes = [] { return TimePoint(); };
 
 Result<std::optional<LearnedTables>> learn(FakeTracing& tracing, const std::function<TimePoint()>& clock = no_time_passes) {
@@ -100,18 +108,14 @@ TEST(LearnTables, TwoRoundsAreThoseOfASingleMachine) {
 }
 
 TEST(LearnTables, ALimitWithRoomForLessMakesTheSetSmaller) {
-    const TableService service;
-    JobSpec spec = complete(service.table_spec(0));
-    spec.time_limit_seconds = 20;
-    FakeTracing tracing(spec, UnitKind::kProbe);
+    FakeTracing tracing(limited_spec(), UnitKind::kProbe);
     const auto learned = learn(tracing);
     ASSERT_TRUE(learned.ok() && learned->has_value()) << learned.status().message();
     EXPECT_EQ(tracing.asked, "probe settle set learn ");
     ASSERT_TRUE(tracing.settled.has_value());
     EXPECT_EQ(tracing.settled->wanted, kSamples);
     EXPECT_EQ(tracing.settled->probe_samples, FakeTracing::kFirstSamples);
-    // 2 s, 1 of which the probe took. On two workers a sample costs half of the probe's 61 us, and 0.35 of them to learn from:
-    // room for 19275.
+    // On two workers a sample costs half of the probe's 61 us, and 0.35 of them to learn from: room for 19275.
     EXPECT_EQ(tracing.settled->samples, 16384u);
     EXPECT_EQ((*learned)->spec.parameters.at("training-paths"), "16384");
     EXPECT_EQ((*learned)->info.training_samples, 16384u);
@@ -120,10 +124,7 @@ TEST(LearnTables, ALimitWithRoomForLessMakesTheSetSmaller) {
 
 /// Every round of learning costs what the probe's cost.
 TEST(LearnTables, WhatLearningFromTheProbeTookIsNotThereForTracing) {
-    const TableService service;
-    JobSpec spec = complete(service.table_spec(0));
-    spec.time_limit_seconds = 20;
-    FakeTracing tracing(spec, UnitKind::kProbe);
+    FakeTracing tracing(limited_spec(), UnitKind::kProbe);
     tracing.goes_on = false;
     TimePoint now;
     const auto slow = [&] { return now += std::chrono::milliseconds(250); };
@@ -133,10 +134,7 @@ TEST(LearnTables, WhatLearningFromTheProbeTookIsNotThereForTracing) {
 }
 
 TEST(LearnTables, NothingIsLearnedWhereTheTablesExist) {
-    const TableService service;
-    JobSpec spec = complete(service.table_spec(0));
-    spec.time_limit_seconds = 20;
-    FakeTracing tracing(spec, UnitKind::kProbe);
+    FakeTracing tracing(limited_spec(), UnitKind::kProbe);
     tracing.goes_on = false;
     const auto learned = learn(tracing);
     ASSERT_TRUE(learned.ok()) << learned.status().message();
@@ -146,11 +144,9 @@ TEST(LearnTables, NothingIsLearnedWhereTheTablesExist) {
 
 TEST(LearnTables, EveryErrorEndsIt) {
     const TableService service;
-    JobSpec timed = complete(service.table_spec(0));
-    timed.time_limit_seconds = 20;
     for (const char* where : {"pilot ", "guide ", "set ", "probe ", "settle "}) {
         const bool probes = std::string_view(where) == "probe " || std::string_view(where) == "settle ";
-        FakeTracing tracing(probes ? timed : complete(service.guided_spec()), probes ? UnitKind::kProbe : UnitKind::kPilot);
+        FakeTracing tracing(probes ? limited_spec() : complete(service.guided_spec()), probes ? UnitKind::kProbe : UnitKind::kPilot);
         tracing.fails_at = where;
         const auto learned = learn(tracing);
         EXPECT_EQ(learned.status().code(), StatusCode::kDataLoss) << where;
@@ -159,11 +155,8 @@ TEST(LearnTables, EveryErrorEndsIt) {
 }
 
 TEST(LearnTables, AStopEndsIt) {
-    const TableService service;
-    JobSpec timed = complete(service.table_spec(0));
-    timed.time_limit_seconds = 20;
     for (const UnitKind first : {UnitKind::kProbe, UnitKind::kTraining}) {
-        FakeTracing tracing(timed, first);
+        FakeTracing tracing(limited_spec(), first);
         tracing.stops_at = first == UnitKind::kProbe ? "probe " : "set ";
         EXPECT_EQ(learn(tracing).status().code(), StatusCode::kCancelled);
         EXPECT_EQ(tracing.asked, first == UnitKind::kProbe ? "probe " : "set learn ");
