@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -13,6 +14,7 @@
 #include "client/bench_reference.h"
 #include "client/commands.h"
 #include "client/job_options.h"
+#include "client/output_files.h"
 #include "client/run_job.h"
 #include "common/cli/numbers.h"
 #include "common/film/atomic_file.h"
@@ -149,6 +151,9 @@ int bench(BenchOptions& options) {
     }
     auto local = load_scene(options.scene);
     if (!local.ok()) return report_error(local.status());
+    std::vector<std::filesystem::path> inputs = files_of(*local);
+    inputs.push_back(options.reference);
+    if (Status s = check_output_files(inputs, std::array{options.out}); !s.ok()) return report_error(s);
     const auto spec = make_spec(options.scene, *local);
     if (!spec.ok()) return report_error(spec.status());
     const int max_depth = spec->max_depth >= 0 ? spec->max_depth : local->imported.description.max_depth;

@@ -1,11 +1,13 @@
 // lightloom compare: how far an image is from a reference.
 
+#include <array>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "client/commands.h"
+#include "client/output_files.h"
 #include "common/cli/numbers.h"
 #include "common/film/atomic_file.h"
 #include "common/film/exr_io.h"
@@ -122,6 +124,8 @@ void print_table(const CompareOptions& options, const Comparison& comparison) {
 }
 
 int run(const CompareOptions& options) {
+    const std::array<std::filesystem::path, 2> inputs{options.image, options.reference};
+    if (const Status s = check_output_files(inputs, std::array{options.json, options.heat}); !s.ok()) return refuse(s);
     Result<ExrImage> image = read_exr(options.image);
     if (!image.ok()) return refuse(image.status());
     Result<ExrImage> reference = read_exr(options.reference);

@@ -12,6 +12,7 @@
 #include "client/commands.h"
 #include "client/inspect_tables.h"
 #include "client/job_options.h"
+#include "client/output_files.h"
 #include "common/film/atomic_file.h"
 #include "common/import/import.h"
 #include "common/scene/scene.h"
@@ -99,7 +100,7 @@ void print(const SceneDescription& d, const SceneSummary& s, const std::string& 
                 d.film.height, d.max_depth, d.samples_per_pixel);
     std::printf("  lights     %zu\n", s.lights.size());
     for (const SceneSummary::Light& l : s.lights) {
-        std::printf("    %-9s power %.6g", l.kind.c_str(), l.power);
+        std::printf("    %-9s power %.6g W", l.kind.c_str(), l.power);
         if (l.primitives > 1) std::printf(", %" PRIu64 " primitives", l.primitives);
         std::printf("%s%s\n", l.where.empty() ? "" : ", ", l.where.c_str());
     }
@@ -122,6 +123,13 @@ int run(const Options& options) {
         std::fprintf(stderr, "%s\n", imported.status().message().c_str());
         return kUsage;
     }
+    std::vector<std::filesystem::path> inputs{options.tables};
+    for (const std::string& file : imported->files)
+        inputs.push_back(std::filesystem::path(options.scene).parent_path() / file);
+    std::vector<std::string> outputs{options.json};
+    if (!options.draw.empty())
+        for (const char* picture : kTablePictures) outputs.push_back(options.draw + picture);
+    if (const Status s = check_output_files(inputs, outputs); !s.ok()) return report_error(s);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     const Result<std::unique_ptr<Scene>> scene = Scene::build(std::move(imported->description));
     if (!scene.ok()) {

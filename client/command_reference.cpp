@@ -83,7 +83,6 @@ nlohmann::ordered_json describe(const ReferenceOptions& options, const JobSpec& 
 
 int reference(ReferenceOptions& options) {
     (void)interrupt_token();
-    if (Status s = check_outputs(options.job, {".json"}); !s.ok()) return report_error(s);
     AlgorithmChoice checker_choice;
     if (!options.cross_check.empty()) {
         auto parsed = parse_algorithm(options.cross_check);
@@ -96,6 +95,7 @@ int reference(ReferenceOptions& options) {
     }
     auto local = load_scene(options.job);
     if (!local.ok()) return report_error(local.status());
+    if (Status s = check_outputs(options.job, {".json"}, &*local); !s.ok()) return report_error(s);
     auto spec = make_spec(options.job, *local);
     if (!spec.ok()) return report_error(spec.status());
     if (spec->max_depth < 0) spec->max_depth = local->imported.description.max_depth;

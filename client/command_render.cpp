@@ -56,9 +56,9 @@ std::string default_table_cache() {
 
 int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, const TableCacheOptions& cache) {
     (void)interrupt_token();
-    if (Status s = check_outputs(options, beside_image(options, AfterFetch::kImageGoes)); !s.ok()) return report_error(s);
     auto scene = load_scene(options);
     if (!scene.ok()) return report_error(scene.status());
+    if (Status s = check_outputs(options, beside_image(options, AfterFetch::kImageGoes), &*scene); !s.ok()) return report_error(s);
     const auto spec = make_spec(options, *scene);
     if (!spec.ok()) return report_error(spec.status());
     if (Status s = check_bound(options, *spec); !s.ok()) return report_error(s);

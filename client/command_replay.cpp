@@ -1,7 +1,11 @@
 // lightloom replay: one camera sample of one iteration, or one whole unit, rendered again exactly as a job rendered it.
 
+#include <tbb/global_control.h>
+
+#include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <thread>
 #include <vector>
 
 #include "client/commands.h"
@@ -20,8 +24,8 @@ constexpr const char* kFooter = R"(Examples:
   lightloom replay room.pbrt --algorithm bdpt --unit 3,0
 
 A manifest lists these commands for the samples that were dropped. --algorithm, --set, --seed, --max-depth and --resolution
-must be those of the job. The printed value is the sample's camera part; what its light path splats elsewhere is listed
-behind it.)";
+must be those of the job. The printed value is the sample's camera part, at the film's exposure, as in the EXR; what its light
+path splats elsewhere is listed behind it.)";
 
 struct ReplayOptions {
     JobOptions job;
@@ -29,6 +33,7 @@ struct ReplayOptions {
     std::vector<int> pixel;      ///< X, Y, or empty.
     std::vector<uint32_t> unit;  ///< Group, tile, or empty.
     uint64_t spp = 0;
+    uint32_t threads = 0;
 };
 
 /// A job's last group may be cut short, and what a unit traces depends on how long its group is.
@@ -70,6 +75,8 @@ int replay(const ReplayOptions& options) {
     auto spec = make_spec(options.job, *local);
     if (!spec.ok()) return report_error(spec.status());
     if (spec->max_depth < 0) spec->max_depth = local->imported.description.max_depth;
+    const double exposure_scale = double(local->imported.description.film.exposure_scale);
+    const tbb::global_control parallelism(tbb::global_control::max_allowed_parallelism, options.threads);
     auto built = Scene::build(std::move(local->imported.description), {.width = spec->width, .height = spec->height});
     if (!built.ok()) return report_error(built.status());
     const std::shared_ptr<const Scene> scene = std::move(built).value();
@@ -104,14 +111,15 @@ int replay(const ReplayOptions& options) {
     const auto partial = (*renderer)->render(work, {});
     if (!partial.ok()) return report_error(partial.status());
     double sum[3] = {};
-    for (size_t i = 0; i < partial->camera.size(); ++i) sum[i % 3] += partial->camera[i];
+    for (size_t i = 0; i < partial->camera.size(); ++i) sum[i % 3] += exposure_scale * partial->camera[i];
     std::printf("unit %u,%u  camera %.9g %.9g %.9g\n", unit->key.group, unit->key.tile, sum[0], sum[1], sum[2]);
     const int width = scene->frame().crop.width();
     // With a cache, the splats are the unit's, not this sample's.
     if (options.unit.empty() && !(*algorithm)->needs_tables) {
         for (const SplatSum& splat : partial->splats) {
             std::printf("splat at %d,%d  %.9g %.9g %.9g\n", scene->frame().crop.x0 + int(splat.pixel) % width,
-                        scene->frame().crop.y0 + int(splat.pixel) / width, splat.rgb[0], splat.rgb[1], splat.rgb[2]);
+                        scene->frame().crop.y0 + int(splat.pixel) / width, exposure_scale * splat.rgb[0],
+                        exposure_scale * splat.rgb[1], exposure_scale * splat.rgb[2]);
         }
     }
     std::printf("dropped %llu\n", static_cast<unsigned long long>(partial->dropped_count));
@@ -140,9 +148,11 @@ void add_replay_command(CLI::App& app, int* exit_code) {
         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     iteration->needs(pixel);
     pixel->excludes(unit);
+    command->add_option("--threads", options->threads, "Threads (default: all processors)")->check(whole_number_between(1, 1024));
     command->add_flag("--strict", options->job.strict, "Exit with 3 if samples were dropped");
     command->callback([options, exit_code] {
         if (options->pixel.empty() && options->unit.empty()) throw CLI::RequiredError("--pixel or --unit");
+        if (options->threads == 0) options->threads = std::max(1u, std::thread::hardware_concurrency());
         *exit_code = replay(*options);
     });
 }

@@ -48,11 +48,11 @@ int service_error(const ServiceOptions& options, const Status& status) {
 
 int submit_job(const ServiceOptions& options) {
     GrpcJobPort port = connect(options);
-    if (!options.detach)
-        if (Status s = check_outputs(options.job, beside_image(options.job, AfterFetch::kImageStays)); !s.ok())
-            return report_error(s);
     const auto scene = load_scene(options.job);
     if (!scene.ok()) return report_error(scene.status());
+    if (!options.detach)
+        if (Status s = check_outputs(options.job, beside_image(options.job, AfterFetch::kImageStays), &*scene); !s.ok())
+            return report_error(s);
     const auto spec = make_spec(options.job, *scene);
     if (!spec.ok()) return report_error(spec.status());
     if (Status s = check_bound(options.job, *spec); !s.ok()) return report_error(s);
@@ -110,7 +110,7 @@ int fetch_job(const ServiceOptions& options) {
         const bool over = is_terminal(job->state);
         return report_error(failed_precondition(over ? what : what + "; `lightloom watch " + options.job_id + "` waits for it"));
     }
-    if (Status s = check_outputs(output, beside_image(output, AfterFetch::kImageStays)); !s.ok()) return report_error(s);
+    if (Status s = check_outputs(output, beside_image(output, AfterFetch::kImageStays), nullptr); !s.ok()) return report_error(s);
     return fetch(port, *job, output, {}, AfterFetch::kImageStays);
 }
 

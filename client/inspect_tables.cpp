@@ -96,8 +96,8 @@ Status draw_kappa(const SubspaceTables& tables, const Scene& scene, const std::s
             }
         }
     });
-    LL_RETURN_IF_ERROR(eye.write(prefix + "-kappa-eye.png"));
-    return light.write(prefix + "-kappa-light.png");
+    LL_RETURN_IF_ERROR(eye.write(prefix + kTablePictures[0]));
+    return light.write(prefix + kTablePictures[1]);
 }
 
 /// First element of cell `i` of `cells` over `count` elements.
@@ -194,8 +194,8 @@ void print(const TableFile& file) {
 
 Status draw(const TableFile& file, const Scene& scene, const std::string& prefix) {
     LL_RETURN_IF_ERROR(draw_kappa(file.tables, scene, prefix));
-    LL_RETURN_IF_ERROR(draw_gamma(file.tables, prefix + "-gamma.png"));
-    return draw_energy(file.tables, prefix + "-q.png");
+    LL_RETURN_IF_ERROR(draw_gamma(file.tables, prefix + kTablePictures[2]));
+    return draw_energy(file.tables, prefix + kTablePictures[3]);
 }
 
 }  // namespace lightloom::client

@@ -1,6 +1,7 @@
 #pragma once
 // What a file of learned tables holds, in numbers and pictures.
 
+#include <array>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -20,6 +21,8 @@ Result<TableFile> read_tables(const std::string& path, const Scene& scene);
 /// Sizes, labels that occur, quantiles of Q, entropy of Gamma's columns in bits, windows, digest.
 nlohmann::ordered_json describe(const TableFile& file);
 void print(const TableFile& file);
+/// What follows PREFIX in the names of the pictures.
+inline constexpr std::array kTablePictures{"-kappa-eye.png", "-kappa-light.png", "-gamma.png", "-q.png"};
 /// PREFIX-kappa-eye.png and PREFIX-kappa-light.png: the subspaces of what the camera sees first, in false colours (a light
 /// sub-path that ends there is taken to come along the normal). PREFIX-gamma.png: a column per eye subspace, a row per
 /// light subspace, brightness by the logarithm of Gamma over uniform. PREFIX-q.png: a bar per light subspace, height by the

@@ -7,6 +7,7 @@
 #include "client/commands.h"
 #include "common/cli/numbers.h"
 #include "common/path/path_view.h"
+#include "common/scene/scene.h"
 #include "common/transport/catalog.h"
 
 namespace lightloom::client {
@@ -74,6 +75,12 @@ Result<LocalScene> load_scene(const JobOptions& options) {
     return scene;
 }
 
+std::vector<std::filesystem::path> files_of(const LocalScene& scene) {
+    std::vector<std::filesystem::path> files;
+    for (const std::string& file : scene.imported.files) files.push_back(scene.directory / file);
+    return files;
+}
+
 Status check_bound(const JobOptions& options, const JobSpec& spec) {
     if (spec.samples_per_pixel <= JobSpec::kMaxSamplesPerPixel) return {};
     return invalid_argument(options.scene + ": its sampler asks for more samples per pixel than the " +
@@ -109,6 +116,8 @@ Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
         if (!parsed || size_t(used) != options.resolution.size() || spec.width < 1 || spec.height < 1)
             return invalid_argument("--resolution takes WIDTHxHEIGHT, for example 640x360, not \"" + options.resolution + "\"");
     }
+    const auto frame = frame_layout(scene.imported.description.film, {.width = spec.width, .height = spec.height});
+    if (!frame.ok()) return frame.status();
     spec.scene_root = scene.manifest.root();
     return spec;
 }

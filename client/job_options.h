@@ -45,6 +45,9 @@ struct LocalScene {
 /// error; with `strict` they are errors.
 Result<LocalScene> load_scene(const JobOptions& options);
 
+/// The files that the scene consists of.
+std::vector<std::filesystem::path> files_of(const LocalScene& scene);
+
 /// What the options ask for, with the scene's samples per pixel where they leave the bound open.
 Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene);
 /// kInvalidArgument where the scene, not the options, asks for more samples than a job may have.

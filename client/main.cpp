@@ -1,6 +1,10 @@
 // lightloom: the client.
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <iostream>
 
 #include "client/commands.h"
 #include "common/cli/log.h"
@@ -42,7 +46,12 @@ int main(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? kSuccess : kUsage;
+        exit_code = app.exit(error) == 0 ? kSuccess : kUsage;
     }
-    return exit_code;
+    // What was printed may be all that a command makes.
+    std::fflush(stdout);
+    std::cout.flush();
+    if (!std::ferror(stdout) && std::cout) return exit_code;
+    std::fprintf(stderr, "lightloom: standard output could not be written: %s\n", std::strerror(errno));
+    return exit_code == kSuccess ? kFailure : exit_code;
 }

@@ -8,7 +8,8 @@ namespace lightloom::client {
 namespace {
 
 constexpr int kBarWidth = 28;
-constexpr double kPlainInterval = 5;  // seconds between plain lines
+constexpr auto kPlainInterval = std::chrono::seconds(5);
+constexpr auto kRedrawInterval = std::chrono::milliseconds(100);
 
 std::string line_of(const JobInfo& job, int percent) {
     const double rate = job.render_seconds > 0 ? double(job.camera_samples) / job.render_seconds : 0;
@@ -85,52 +86,58 @@ std::string tables_line(const TablesInfo& tables) {
     return tables.note.empty() ? line : line + "; " + tables.note;
 }
 
-Progress::Progress(bool quiet) : quiet_(quiet), terminal_(::isatty(STDERR_FILENO) == 1) {}
+Progress::Progress(bool quiet) : quiet_(quiet), terminal_(::isatty(STDERR_FILENO) == 1) {
+    if (!quiet_ && !terminal_) silence_breaker_ = std::jthread([this](std::stop_token stop) { break_silence(stop); });
+}
 
 Progress::~Progress() { finish(); }
 
 void Progress::finish() {
+    silence_breaker_ = {};
     if (open_) std::fputc('\n', stderr);
     open_ = false;
 }
 
+void Progress::break_silence(std::stop_token stop) {
+    std::unique_lock lock(mutex_);
+    while (!stop.stop_requested()) {
+        stopped_.wait_for(lock, stop, std::chrono::seconds(1), [] { return false; });
+        if (!line_.empty() && line_ != printed_ && Clock::now() - last_ >= kPlainInterval) print_line();
+    }
+}
+
+void Progress::print_line() {
+    last_ = Clock::now();
+    printed_ = line_;
+    std::fprintf(stderr, "%s\n", line_.c_str());
+}
+
 void Progress::show(const JobInfo& job) {
     if (quiet_) return;
-    const auto now = std::chrono::steady_clock::now();
-    const double waited = std::chrono::duration<double>(now - last_).count();
+    const std::lock_guard lock(mutex_);
     const bool new_state = !shown_ || job.state != state_;
     const bool new_phase = job.state == JobState::kPreparing && job.phase != phase_;
     phase_ = job.phase;
     const int percent = percent_of(job);
     shown_ = true;
     state_ = job.state;
+    const bool preparing = job.state == JobState::kPreparing, running = job.state == JobState::kRunning;
+    const bool waiting = running && job.render_seconds == 0;
+    line_ = preparing ? phase_line(job) : waiting ? "waiting for a worker" : line_of(job, percent);
+    if (new_state && running && job.tables.asset.size_bytes > 0)
+        std::fprintf(stderr, "%s%s\n", terminal_ ? "\r\033[K" : "", tables_line(job.tables).c_str());
     if (terminal_) {
-        if (!new_state && !new_phase && waited < 0.1) return;
-        last_ = now;
-        if (new_state && job.state == JobState::kRunning && job.tables.asset.size_bytes > 0)
-            std::fprintf(stderr, "\r\033[K%s\n", tables_line(job.tables).c_str());
+        if (!new_state && !new_phase && Clock::now() - last_ < kRedrawInterval) return;
+        last_ = Clock::now();
         const int filled = percent * kBarWidth / 100;
         const std::string bar = std::string(size_t(filled), '=') + std::string(size_t(kBarWidth - filled), ' ');
-        const bool waiting = job.state == JobState::kRunning && job.render_seconds == 0;
-        const std::string text = job.state == JobState::kPreparing ? phase_line(job)
-                                 : waiting                         ? "waiting for a worker"
-                                                                   : line_of(job, percent);
-        std::fprintf(stderr, "\r\033[K[%s] %s", bar.c_str(), text.c_str());
+        std::fprintf(stderr, "\r\033[K[%s] %s", bar.c_str(), line_.c_str());
         std::fflush(stderr);
         open_ = true;
-    } else if (job.state == JobState::kPreparing &&
-               (new_phase || (waited >= kPlainInterval && (job.phase_total > 0 || job.eta_seconds >= 0)))) {
-        last_ = now;
-        std::fprintf(stderr, "%s\n", phase_line(job).c_str());
-    } else if (new_state && job.state == JobState::kRunning && job.tables.asset.size_bytes > 0) {
-        std::fprintf(stderr, "%s\n", tables_line(job.tables).c_str());
-    } else if (job.state == JobState::kRunning && job.unit_done > 0 &&
-               (percent >= last_percent_ + 10 || waited >= kPlainInterval)) {
-        last_ = now;
-        last_percent_ = percent;
-        std::fprintf(stderr, "%s\n", line_of(job, percent).c_str());
-    } else if (new_state && is_terminal(job.state)) {
-        std::fprintf(stderr, "%s\n", line_of(job, percent).c_str());
+    } else if (preparing ? new_phase : running ? job.unit_done > 0 && percent >= last_percent_ + 10
+                                     : new_state && is_terminal(job.state)) {
+        if (running) last_percent_ = percent;
+        print_line();
     }
 }
 

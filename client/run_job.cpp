@@ -7,9 +7,11 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <random>
+#include <set>
 #include <thread>
 
 #include "client/commands.h"
+#include "client/output_files.h"
 #include "client/progress.h"
 #include "common/film/atomic_file.h"
 #include "common/film/exr_io.h"
@@ -73,8 +75,11 @@ void report_dropped(const JobInfo& job, const std::string& manifest) {
                  static_cast<unsigned long long>(job.dropped_samples));
     const Json json = Json::parse(manifest, nullptr, false);
     if (json.is_discarded() || !json.contains("dropped")) return;
-    for (const Json& sample : json["dropped"]["first"])
-        std::fprintf(stderr, "  %s\n", sample.value("replay", std::string()).c_str());
+    std::set<std::string> commands;  // one unit may have dropped several splats
+    for (const Json& sample : json["dropped"]["first"]) {
+        const std::string command = sample.value("replay", std::string());
+        if (commands.insert(command).second) std::fprintf(stderr, "  %s\n", command.c_str());
+    }
 }
 
 /// An image as it is written: the EXR, its manifest, and the EXR's digest, which the manifest names.
@@ -129,38 +134,18 @@ std::vector<const char*> beside_image(const JobOptions& options, AfterFetch afte
     return {kManifest};
 }
 
-Status check_outputs(const JobOptions& options, const std::vector<const char*>& beside) {
+Status check_outputs(const JobOptions& options, const std::vector<const char*>& beside, const LocalScene* scene) {
     const std::filesystem::path output = output_path(options);
-    std::vector<std::filesystem::path> taken;
-    if (!options.scene.empty()) taken.push_back(options.scene);
     std::error_code unknown;
     if (std::filesystem::is_other(std::filesystem::status(output, unknown)))
         return invalid_argument(output.string() + ": is a device or a pipe, beside which no manifest can lie; give a file name");
-    std::vector<std::string> paths{output.string()};
-    for (const char* extension : beside) paths.push_back(std::filesystem::path(output).replace_extension(extension).string());
-    paths.insert(paths.end(), {options.png, options.json});
-    for (const std::string& path : paths) {
-        if (path.empty()) continue;
-        std::error_code ignored;
-        const auto status = std::filesystem::status(path, ignored);
-        if (!std::filesystem::exists(status) && std::filesystem::is_symlink(std::filesystem::symlink_status(path, ignored)))
-            return invalid_argument(path +
-                                    ": is a link to nothing, which may be another output; remove it or give another file name");
-        if (std::filesystem::is_directory(status)) return invalid_argument(path + ": is a directory; give a file name");
-        if (std::filesystem::is_other(status)) continue;  // a pipe or a device
-        for (const std::filesystem::path& other : taken)
-            if (std::filesystem::weakly_canonical(path, ignored) == std::filesystem::weakly_canonical(other, ignored))
-                return invalid_argument(path + ": is " + (other == options.scene ? "the scene itself" : "another output, too") +
-                                        "; give another file name");
-        taken.push_back(path);
-        // Where the bytes will go: what a link points to is replaced, not the link.
-        const auto target = std::filesystem::canonical(path, ignored);
-        const std::string probe = (target.empty() ? path : target.string()) + ".probe-" + std::to_string(::getpid());
-        if (const Status s = write_file_atomically(probe, {}); !s.ok())
-            return {s.code(), path + s.message().substr(probe.size())};  // whose message begins with the name
-        std::filesystem::remove(probe, ignored);
-    }
-    return {};
+    for (const char* picture : {".png", ".jpg", ".jpeg"})
+        if (output.extension() == picture)
+            return invalid_argument(output.string() + ": the image is an EXR; name it so, and a picture with --png");
+    std::vector<std::string> outputs{output.string()};
+    for (const char* extension : beside) outputs.push_back(std::filesystem::path(output).replace_extension(extension).string());
+    outputs.insert(outputs.end(), {options.png, options.json});
+    return check_output_files(scene ? files_of(*scene) : std::vector<std::filesystem::path>(), outputs);
 }
 
 Status upload_scene(JobPort& port, const LocalScene& scene) {

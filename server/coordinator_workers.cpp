@@ -130,7 +130,7 @@ Status Coordinator::release_unit(const std::string& worker_id, const UnitReferen
         units->release(unit.key, worker->index);
     } else {
         const UnitTable::Failures failures = units->fail(unit.key, worker->index);
-        unit_failed(*job, unit.key, failures, why);
+        unit_failed(*job, unit.key, failures, {why.code(), worker->id + " on " + worker->hello.host + ": " + why.message()});
     }
     work_changed_.notify_all();
     return {};

@@ -89,6 +89,7 @@ std::string to_json(const Manifest& m) {
     json["spec"] = settings_json(spec);
     json["spec"].update(Json{{"requested_samples_per_pixel", spec.samples_per_pixel},
                              {"time_limit_seconds", spec.time_limit_seconds},
+                             {"layers", spec.first_hit_layers},
                              {"scene", m.scene_main},
                              {"scene_root", spec.scene_root.hex()},
                              {"frame",
@@ -143,7 +144,9 @@ Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, 
     image.frame = spec.frame;
     image.color = std::move(developed.color);
     image.layers = std::move(layers);
-    image.layers.push_back({"variance", "RGB", std::move(developed.variance.pixels)});
+    // Unknown is not zero.
+    if (!developed.variance.pixels.empty())
+        image.layers.push_back({"variance", "RGB", std::move(developed.variance.pixels)});
     image.attributes = {{exr_attribute::kAlgorithm, spec.algorithm},
                         {exr_attribute::kParameters, parameters},
                         {exr_attribute::kSeed, std::to_string(spec.seed)},

@@ -58,7 +58,7 @@ struct DevelopedImage {
     uint32_t groups = 0;
 };
 
-/// The EXR's bytes: colour, its variance, and `layers`. Who rendered it, and how, does not enter.
+/// The EXR's bytes: colour, its variance where that is known, and `layers`. Who rendered it, and how, does not enter.
 Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers);
 /// The same for the merged groups of `reducer`.
 Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, float exposure_scale,

@@ -99,6 +99,10 @@ int main(int argc, char** argv) {
     arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2000);
     GrpcWorkerPort port(grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments));
     SceneFetcher fetcher(port, cache);
+    if (const Status usable = fetcher.check_directory(); !usable.ok()) {
+        spdlog::error("--cache {}", usable.message());
+        return 1;
+    }
     RendererCache renderers([&](const JobSpec& spec, std::stop_token s) { return fetcher.scene(spec, s); },
                             [&](const AssetReference& tables, std::stop_token s) { return fetcher.tables(tables, s); });
     Worker worker(port, {.identity = *identity, .thread_count = threads, .host = host_name(), .process_id = uint64_t(::getpid())},

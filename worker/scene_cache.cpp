@@ -6,6 +6,7 @@
 #include <random>
 #include <thread>
 
+#include "common/film/atomic_file.h"
 #include "common/import/import.h"
 #include "common/transport/training.h"
 
@@ -33,6 +34,16 @@ SceneFetcher::SceneFetcher(WorkerPort& port, std::filesystem::path directory)
 SceneFetcher::~SceneFetcher() {
     std::error_code ignored;
     std::filesystem::remove_all(scratch_, ignored);
+}
+
+Status SceneFetcher::check_directory() const {
+    std::error_code error;
+    std::filesystem::create_directories(scratch_, error);
+    if (error) return failed_precondition(scratch_.parent_path().string() + ": no files can be kept there: " + error.message());
+    const std::string probe = scratch_ / "probe";
+    LL_RETURN_IF_ERROR(write_file_atomically(probe, "probe"));
+    std::filesystem::remove(probe, error);
+    return {};
 }
 
 Status SceneFetcher::fetch(const Digest& digest, uint64_t size_bytes, std::stop_token stop) {

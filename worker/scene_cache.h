@@ -24,6 +24,8 @@ class SceneFetcher {
   public:
     SceneFetcher(WorkerPort& port, std::filesystem::path directory);
     ~SceneFetcher();
+    /// Whether files can be kept there: a worker without that fails every unit that it gets.
+    Status check_directory() const;
     Result<std::shared_ptr<const Scene>> scene(const JobSpec& spec, std::stop_token stop);
     Result<std::string> tables(const AssetReference& tables, std::stop_token stop);
 

@@ -12,7 +12,7 @@ constexpr double kRange = FixedSums::kRange;
 double loosened(double bound) { return bound * (1 + 0x1p-40) + 0x1p-44; }
 
 Status out_of_range() {
-    return data_loss("accumulation: a sum would exceed the range of about 1e25 radiance units; the partial was not added");
+    return data_loss("the light in a pixel adds up to more than 1e25 radiance units; scale the lights down");
 }
 
 /// Value of one channel of a group or of the whole: camera mean plus splats per light path.
@@ -131,8 +131,8 @@ RgbImage Accumulation::develop(float scale) const {
 }
 
 RgbImage Accumulation::variance(float scale) const {
+    if (group_count_ < 2) return {};
     RgbImage image{frame_.crop.width(), frame_.crop.height(), std::vector<float>(camera_.size())};
-    if (group_count_ < 2) return image;
     const double factor = double(scale) * double(scale) / (double(group_count_ - 1) * double(iterations_));
     for (size_t i = 0; i < moment_.size(); ++i) image.pixels[i] = float(moment_[i] * factor);
     return image;

@@ -56,7 +56,8 @@ class Accumulation {
     /// camera sum / camera count + splat sum / light paths, per pixel, times `scale` (the film's exposure).
     RgbImage develop(float scale = 1) const;
     /// Variance of each developed pixel and channel, from the second moments of whole group images (never of single
-    /// samples, which share light paths): sum_g n_g (X_g - mean)^2 / ((G - 1) sum n_g). Zero for fewer than two groups.
+    /// samples, which share light paths): sum_g n_g (X_g - mean)^2 / ((G - 1) sum n_g). Empty for fewer than
+    /// two groups, which say nothing of it.
     RgbImage variance(float scale = 1) const;
 
   private:

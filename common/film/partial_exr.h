@@ -22,9 +22,6 @@
 
 namespace lightloom {
 
-/// Largest crop window whose units can travel: 28 bytes a pixel must fit EXR's 31-bit chunk size.
-inline constexpr int64_t kMaxPartialPixels = (int64_t(1) << 31) / 28 - 1;
-
 /// Everything in a partial that is not a sum, and what the payload must be.
 struct PartialDescriptor {
     uint64_t splat_count = 0;  ///< Pixels with a non-zero splat sum. Decides the layout of the splat part.

@@ -142,6 +142,9 @@ Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions
         if (frame.crop.empty() || frame.crop.x1 > frame.width || frame.crop.y1 > frame.height)
             return invalid_argument("the film's crop window is empty or outside of the frame");
     }
+    if (frame.crop.area() > kMaxPartialPixels)
+        return invalid_argument("the resolution gives " + std::to_string(frame.crop.area()) + " pixels to render; at most " +
+                                std::to_string(kMaxPartialPixels) + " are possible");
     return frame;
 }
 
@@ -220,7 +223,7 @@ void Scene::summarise() {
         SceneSummary::Light& light = s.lights[size_t(e.light)];
         light.kind = kKinds[int(e.kind)];
         light.where = light_sources_[size_t(e.light)];
-        light.power += emitters_.power(e);
+        light.power += emitters_.power(e) / double(scalar_of({1, 1, 1}));
         ++light.primitives;
         s.emissive_triangle_count += e.kind == EmitterKind::kTriangle;
     }

@@ -17,6 +17,7 @@ std::vector<ImageLayer> first_hit_layers(const Scene& scene, uint64_t seed, int 
             Rgb albedo;
             Vec3 normal;
             float depth = 0;
+            int hits = 0;
             for (int i = 0; i < samples; ++i) {
                 const CameraSampler sampler(seed, uint64_t(i), pixel);
                 const Camera::CameraRay ray = sampler.ray(scene.camera(), crop.x0 + column, crop.y0 + row);
@@ -25,13 +26,15 @@ std::vector<ImageLayer> first_hit_layers(const Scene& scene, uint64_t seed, int 
                 albedo += scene.bsdf_at(point).albedo();
                 normal += face_forward(point.shading.n, -ray.direction);
                 depth += length(point.p - ray.origin);
+                ++hits;
             }
             const float scale = 1.0f / float(samples);
             for (int c = 0; c < 3; ++c) {
                 layers[0].pixels[3 * pixel + size_t(c)] = albedo[c] * scale;
                 layers[1].pixels[3 * pixel + size_t(c)] = normal[c] * scale;
             }
-            layers[2].pixels[pixel] = depth * scale;
+            // Not of all rays: at a silhouette before nothing that would be a place in front of everything.
+            layers[2].pixels[pixel] = hits > 0 ? depth / float(hits) : 0;
         }
     });
     return layers;

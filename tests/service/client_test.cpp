@@ -49,7 +49,7 @@ TEST(Outputs, ThatAreLinksAreTriedOutWhereTheyPoint) {
     options.output = path("a.exr").string();
     const auto check = [&](const char* png) {
         options.png = path(png).string();
-        return client::check_outputs(options, client::beside_image(options, AfterFetch::kImageGoes));
+        return client::check_outputs(options, client::beside_image(options, AfterFetch::kImageGoes), nullptr);
     };
     std::filesystem::create_symlink("a.exr", path("same.png"));
     EXPECT_NE(check("same.png").message().find("same.png: is a link to nothing"), std::string::npos) << "it will be the image";
@@ -66,6 +66,35 @@ TEST(Outputs, ThatAreLinksAreTriedOutWhereTheyPoint) {
     for (const auto& entry : std::filesystem::recursive_directory_iterator(directory.path))
         files += std::filesystem::is_regular_file(entry.symlink_status());
     EXPECT_EQ(files, 2u) << "nothing is left of the trial";
+}
+
+TEST(Outputs, NeverTakeThePlaceOfAnInput) {
+    const TempDirectory directory;
+    const auto path = [&](const char* name) { return (directory.path / name).string(); };
+    std::filesystem::create_directory(path("scene"));
+    for (const char* name : {"scene/main.pbrt", "scene/sky.exr", "scene/inner.pbrt"}) std::ofstream(path(name)) << name;
+    std::filesystem::create_directory_symlink("scene", path("link"));
+    client::LocalScene scene;
+    scene.directory = path("scene");
+    scene.imported.files = {"main.pbrt", "sky.exr", "inner.pbrt"};
+    const auto check = [&](const char* output, const char* png, const char* json) {
+        client::JobOptions options;
+        options.output = path(output), options.png = path(png), options.json = path(json);
+        return client::check_outputs(options, client::beside_image(options, AfterFetch::kImageGoes), &scene).message();
+    };
+    EXPECT_EQ(check("scene/out.exr", "out.png", "out.json"), "");
+    EXPECT_EQ(check("scene/sky.exr", "out.png", "out.json"), path("scene/sky.exr") +
+                                                                 ": is an input, which would be lost; give another file name");
+    EXPECT_NE(check("out.exr", "link/../scene/./main.pbrt", "out.json"), "");
+    EXPECT_NE(check("out.exr", "out.png", "link/inner.pbrt"), "");
+    EXPECT_NE(check("out.exr", "out.exr", "out.json").find("another output"), std::string::npos);
+    EXPECT_NE(check("out.exr", "out.png", "out.manifest.json").find("another output"), std::string::npos);
+    EXPECT_NE(check("out.png", "small.png", "out.json").find("the image is an EXR"), std::string::npos);
+    for (const char* name : {"scene/main.pbrt", "scene/sky.exr", "scene/inner.pbrt"}) {
+        std::string text;
+        std::getline(std::ifstream(path(name)), text);
+        EXPECT_EQ(text, name);
+    }
 }
 
 /// A service that has one finished job, and whose submissions fail as the test says.

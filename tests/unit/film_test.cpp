@@ -109,7 +109,7 @@ TEST(Accumulation, DevelopsSumsOverCounts) {
     EXPECT_EQ(total.develop().pixels, (std::vector<float>{1, 2, 3, 4 + 2, 5, 6 + 1}));
     EXPECT_EQ(total.develop(2).pixels, (std::vector<float>{2, 4, 6, 12, 10, 14}));
     EXPECT_EQ(total.iterations(), 2u);
-    EXPECT_EQ(total.variance().pixels, std::vector<float>(6, 0.0f));
+    EXPECT_TRUE(total.variance().pixels.empty()) << "one group says nothing of it";
 }
 
 TEST(Accumulation, VarianceComesFromGroupImages) {
