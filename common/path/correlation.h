@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "common/path/path_view.h"
 #include "common/path/vertex.h"
 #include "common/scene/emitter.h"
 

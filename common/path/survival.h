@@ -10,7 +10,8 @@
 
 namespace lightloom {
 
-/// A typical share, in (0, 1], of the sub-paths with n vertices that roulette leaves: kPerEvent for each time that it was played.
+/// A typical share, in (0, 1], of the sub-paths with n vertices that roulette leaves: kPerEvent, or rr-min
+/// if that is more, for each time that it was played.
 class TypicalSurvival {
   public:
     /// What survives a surface of middling reflectance, once the throughput stays near the survival that it is divided by. Between

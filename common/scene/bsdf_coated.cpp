@@ -88,11 +88,13 @@ struct ConductorSide {
     float coat_pmf, base_pmf;  ///< The diffuse lobe takes the rest.
 };
 
-ConductorSide conductor_side(const Bsdf& b, float cos) {
+ConductorSide conductor_side(const Bsdf& b, const Vec3& w) {
     ConductorSide s;
-    s.coat = coat_side(b, cos);
-    s.trapped = look_up(b.trapped, cos);
-    const float base = s.coat.transmitted * b.base_weight * (1 - s.trapped);
+    s.coat = coat_side(b, w.z);
+    s.trapped = look_up(b.trapped, w.z);
+    // A rough coat transmits something beyond the critical angle too, but no refracted direction says where it meets the base: that
+    // lobe has no value there, so it must not be drawn either.
+    const float base = refracted(w, b.eta).z > 0 ? s.coat.transmitted * b.base_weight * (1 - s.trapped) : 0.0f;
     const float diffuse = s.coat.transmitted * s.trapped * b.trapped_reflectance.average();
     const float sum = s.coat.reflected + base + diffuse;
     s.coat_pmf = sum > 0 ? s.coat.reflected / sum : 1.0f;
@@ -178,7 +180,7 @@ bool sample_coated_diffuse(const Bsdf& b, Vec3 wo, float lobe, Vec2 u, BsdfSampl
 
 BsdfEval eval_coated_conductor(const Bsdf& b, Vec3 wo, Vec3 wi) {
     if (b.base_alpha_x == 0 || !to_upper_side(&wo, &wi)) return {};
-    const ConductorSide o = conductor_side(b, wo.z), i = conductor_side(b, wi.z);
+    const ConductorSide o = conductor_side(b, wo), i = conductor_side(b, wi);
     const float t2 = o.coat.transmitted * i.coat.transmitted;
     BsdfEval e;
     e.f = b.trapped_reflectance * (t2 * o.trapped * i.trapped * b.trapped_norm * kInvPi);
@@ -213,7 +215,7 @@ bool sample_coated_conductor(const Bsdf& b, Vec3 wo, float lobe, Vec2 u, BsdfSam
         const auto series = [=](float r) { return t2 > 0 ? coat.reflected + t2 * r / (1 - returned * r) : coat.reflected; };
         return finish_delta({-wo.x, -wo.y, side * wo.z}, {series(base.r), series(base.g), series(base.b)}, 1, out);
     }
-    const ConductorSide o = conductor_side(b, wo.z);
+    const ConductorSide o = conductor_side(b, wo);
     Vec3 wi;
     if (lobe < o.coat_pmf) {
         if (b.alpha_x == 0)

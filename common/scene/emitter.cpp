@@ -164,17 +164,16 @@ bool EmitterSet::sample_next_event(const Vec3& reference, double pick, Vec2 u, N
             const float d2 = length_squared(to_centre);
             Vec3 n;
             if (samples_cone(e, d2)) {
-                // A direction in the cone, then the near intersection, expressed as a normal of the sphere.
-                const float h = cone_height(e.radius, d2);
-                const float one_minus_cos = h * u.x, cos_t = 1 - one_minus_cos;
+                // A direction in the cone, t from its axis, then the near intersection, expressed as the normal of the sphere,
+                // a from the axis: sin(a + t) = sin t d / r. Nothing cancels, however small the sphere looks [Pharr, Jakob and
+                // Humphreys 2023, 6.2.4].
+                const float one_minus_cos = cone_height(e.radius, d2) * u.x;
                 const float sin2 = one_minus_cos * (2 - one_minus_cos);
-                const float d = std::sqrt(d2);
-                const float along = d * cos_t - safe_sqrt(e.radius * e.radius - d2 * sin2);
+                const float d = std::sqrt(d2), sin_max = e.radius / d;
+                const float cos_a = sin2 / sin_max + (1 - one_minus_cos) * safe_sqrt(1 - sin2 / (sin_max * sin_max));
+                const float sin_a = safe_sqrt(1 - cos_a * cos_a);
                 const math::SinCos sc = math::sincos_turns(u.y);
-                const float sin_t = safe_sqrt(sin2);
-                const Frame f(to_centre / d);
-                const Vec3 w = f.to_world({sin_t * float(sc.cos), sin_t * float(sc.sin), cos_t});
-                n = normalize(reference + w * along - e.position);
+                n = Frame(to_centre / d).to_world({sin_a * float(sc.cos), sin_a * float(sc.sin), -cos_a});
             } else {
                 n = sample_sphere(u);
             }

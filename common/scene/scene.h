@@ -43,7 +43,7 @@ struct SceneSummary {
 struct SurfacePoint {
     Vec3 p;
     Vec3 ng;             ///< Geometric normal, unit; outside as the scene defines it.
-    Frame shading;       ///< Shading frame, n in the hemisphere of ng.
+    Frame shading;       ///< Shading frame, n in the hemisphere of ng (but for emitters whose normals point inwards).
     Vec2 uv;
     MaterialId material = kNone;
     int32_t emitter = kNone;

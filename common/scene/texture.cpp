@@ -55,6 +55,7 @@ Rgb evaluate_texture(const TextureTables& tables, TextureId id, Vec2 uv, Texture
             return evaluate_texture(tables, node.a, uv, use) * (Rgb(1.0f) - t) + evaluate_texture(tables, node.b, uv, use) * t;
         }
         case TextureKind::kCheckerboard: {
+            if (!(std::fabs(st.x) < 1e9f && std::fabs(st.y) < 1e9f)) return evaluate_texture(tables, node.a, uv, use);
             const int64_t cells = int64_t(std::floor(st.x)) + int64_t(std::floor(st.y));
             return evaluate_texture(tables, (cells & 1) == 0 ? node.a : node.b, uv, use);
         }

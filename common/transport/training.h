@@ -1,6 +1,6 @@
 #pragma once
 // Training units: full paths of the scene for the tables, made by bidirectional algorithms with all of their techniques, so that
-// light that is hard to find is in them too. They never enter an image, and their random numbers are not those of any image.
+// light that is hard to find is in them too. They never enter an image, and their random numbers are not those of the same job's.
 
 #include <cstdint>
 #include <stop_token>

@@ -36,6 +36,8 @@ inline std::vector<BsdfCase> bsdf_cases() {
         {"smooth coat on metal .1/.5", make_coated_conductor(gold_eta(), gold_k(), 0.1f, 0.5f, 1.7f, 0.01f, 0, 0), 0.1f},
         {"rough coat on mirror", make_coated_conductor(gold_eta(), gold_k(), 0, 0, 1.5f, 0.01f, 0.4f, 0.4f), 0.09f},
         {"rough coat on rough metal", make_coated_conductor(gold_eta(), gold_k(), 0.6f, 0.6f, 1.5f, 0.01f, 0.2f, 0.2f), 0.2f},
+        {"rough bubble on metal", make_coated_conductor(gold_eta(), gold_k(), 0.2f, 0.2f, 0.9f, 0.01f, 0.3f, 0.3f), 0.2f},
+        {"rough bubble on metal .7", make_coated_conductor(gold_eta(), gold_k(), 0.4f, 0.4f, 0.7f, 0.01f, 0.3f, 0.3f), 0.3f},
         {"metal .1/.4", make_conductor(gold_eta(), gold_k(), 0.1f, 0.4f), 0.1f},
         {"metal .002/.3", make_conductor(gold_eta(), gold_k(), 0.002f, 0.3f), 0.002f},
         {"rough glass .1/.4", make_dielectric(1.5f, 0.1f, 0.4f), 0.1f},

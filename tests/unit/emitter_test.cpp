@@ -351,6 +351,29 @@ TEST(Emission, NarrowSpotsKeepTheirPower) {
     }
 }
 
+/// Irradiance of a sphere, facing it: pi L (r / d)^2, down to a lamp of a millimetre seen from ten kilometres.
+TEST(NextEvent, FindsASphereHoweverSmallItLooks) {
+    for (const double ratio : {2.0, 1e3, 1e5, 1e6, 1e7}) {
+        Emitter e = sphere(false);
+        const Vec3 reference = e.position + normalize(Vec3{0.3f, -1.2f, 0.8f}) * float(ratio * double(e.radius));
+        const EmitterSet set({e}, Environment(), {}, float(2 * ratio));
+        const double d = double(length(reference - e.position));
+        Rng rng({7, Stage::kTraining, 0, 0});
+        double sum = 0;
+        constexpr int kCount = 20000;
+        for (int i = 0; i < kCount; ++i) {
+            NextEventSample s;
+            const double pick = rng.uniform_double();
+            const Vec2 u = rng.uniform2();
+            if (!set.sample_next_event(reference, pick, u, &s)) continue;
+            const double cosine = double(dot(s.wi, normalize(e.position - reference)));
+            sum += double(s.radiance.g) * double(s.geometry) * cosine / double(s.pdf);
+        }
+        const double exact = kPiD * double(e.radiance.g) * double(e.radius) * double(e.radius) / (d * d);
+        EXPECT_NEAR(sum / kCount / exact, 1, ratio < 10 ? 0.01 : 1e-3) << ratio;
+    }
+}
+
 /// Next event from a point outside (and, for the room-like sphere, inside): the points found follow
 /// pdf_next_event.
 TEST(NextEvent, IsDrawnWithItsDensity) {
