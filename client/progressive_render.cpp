@@ -21,14 +21,6 @@ double process_seconds() {
     return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
 }
 
-void add(UnitCounters& sum, const UnitCounters& unit) {
-    sum.camera_samples += unit.camera_samples;
-    sum.light_paths += unit.light_paths;
-    sum.rays += unit.rays;
-    sum.vertices += unit.vertices;
-    sum.connections += unit.connections;
-}
-
 }  // namespace
 
 Result<AlgorithmChoice> parse_algorithm(const std::string& text) {
@@ -108,7 +100,7 @@ Status ProgressiveRender::advance(uint64_t iteration_limit, std::stop_token stop
         seconds += seconds_since(begin);
         if (!partial.ok()) return partial.status();
         LL_RETURN_IF_ERROR(sum.add(*partial));
-        add(counters, partial->counters);
+        counters += partial->counters;
     }
     LL_RETURN_IF_ERROR(total_.fold(sum, group.iteration_count));
     last_ = std::move(sum);

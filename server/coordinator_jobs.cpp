@@ -82,7 +82,6 @@ void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, Tab
     const Plan plan(frame, light_paths_per_pixel(**algorithm, *parameters));
     const double unit_light_paths = light_paths_per_pixel(**algorithm, *parameters) * plan.max_group_iterations() *
                                     double(frame.crop.area()) / plan.tile_count();
-    // Gigabytes for a large frame: made before anybody has to wait for the mutex.
     std::optional<UnitTable> units;
     units.emplace(plan, spec.samples_per_pixel, 1, options_.shuffle_seed);
     auto reducer = std::make_shared<Reducer>(frame, plan.tile_count());
@@ -162,8 +161,8 @@ Status Coordinator::write_results(JobRecord& job) {
         job.units->advance(job.merged_groups);
         manifest.units = job.units->merged();
         for (const UnitTable::Merged& unit : manifest.units) job.workers.insert(unit.worker);
+        job.counters = reducer->counters();
         job.dropped = reducer->dropped();
-        std::erase_if(job.dropped_samples, [&](const auto& d) { return d.unit.group >= job.merged_groups; });
         manifest.job = job.info(options_.clock());
         manifest.identity = options_.identity;
         manifest.created_at = job.created_at;
@@ -174,7 +173,7 @@ Status Coordinator::write_results(JobRecord& job) {
             const WorkerRecord& w = workers_.at(index);
             manifest.workers.push_back({index, w.id, w.hello.host, w.hello.process_id, w.hello.thread_count});
         }
-        for (const JobRecord::Dropped& d : job.dropped_samples) manifest.dropped.push_back({d.unit, d.sample});
+        manifest.dropped = reducer->first_dropped();
         manifest.expired_leases = job.expired_leases;
         manifest.rejected_results = job.rejected;
     }

@@ -32,7 +32,9 @@ Result<WorkerGrant> Coordinator::register_worker(const WorkerHello& hello) {
 }
 
 std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
-    if (!worker.has_room()) return std::nullopt;
+    const TimePoint now = options_.clock();
+    if (!worker.has_room() || workers_.rests(worker, now)) return std::nullopt;
+    const auto anyone_else = [&](const std::set<uint32_t>& but) { return workers_.anyone_else(but, now); };
     // A second unit only if enough are left for those workers that have none: a unit must not wait behind another one
     // while somebody idles.
     const size_t idle = worker.held.empty() ? 0 : workers_.idle();
@@ -42,10 +44,10 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
         if (job != in_line && job->state != JobState::kPreparing) continue;
         UnitTable* const units = job->open_units();
         if (!units || (!worker.held.empty() && !units->has_more_than(idle))) continue;
-        const auto unit = units->lease(worker.index, lease_end());
+        const auto unit = units->lease(worker.index, lease_end(), anyone_else);
         if (!unit) continue;
         const bool render = unit->key.kind == UnitKind::kRender;
-        if (!render && job->round_begin == TimePoint()) job->round_begin = options_.clock();
+        if (!render && job->round_begin == TimePoint()) job->round_begin = now;
         if (!render && job->training_begin == TimePoint()) {
             // Only a job that workers have begun with takes a thread and a built scene; both are made while paths are traced.
             job->training_begin = job->round_begin;
@@ -129,8 +131,9 @@ Status Coordinator::release_unit(const std::string& worker_id, const UnitReferen
     if (why.ok() || blameless) {
         units->release(unit.key, worker->index);
     } else {
+        workers_.unit_failed(*worker, options_.clock());
         const UnitTable::Failures failures = units->fail(unit.key, worker->index);
-        unit_failed(*job, unit.key, failures, {why.code(), worker->id + " on " + worker->hello.host + ": " + why.message()});
+        unit_failed(*job, unit.key, failures, {why.code(), worker->id + ": " + why.message()});
     }
     work_changed_.notify_all();
     return {};
@@ -176,6 +179,7 @@ Result<SubmitAck> Coordinator::submit_payload(const std::string& worker_id, cons
     worker->held.erase(unit);
     if (const auto job = find_job(unit.job_id); job && job->state == JobState::kRunning) {
         ++job->rejected;
+        workers_.unit_failed(*worker, options_.clock());
         unit_failed(*job, unit.key, job->units->fail(unit.key, worker->index), partial.status());
     }
     return SubmitAck{SubmitOutcome::kRejected, partial.status().message()};
@@ -223,7 +227,6 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     }
     const UnitCounters counters = partial.counters;
     const uint64_t dropped = partial.dropped_count;
-    const std::vector<DroppedSample> samples = partial.dropped;
     const double splats_per_path = unit.light_path_count > 0 ? double(partial.splats.size()) / double(unit.light_path_count) : 0;
     const auto refused = reducer->add(unit, std::move(partial));
 
@@ -240,24 +243,20 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
         if (refusal.unit == unit.key) own = refusal.why;
         unit_failed(*job, refusal.unit, job->units->reopen(refusal.unit), refusal.why);
     }
-    if (!own.ok()) return SubmitAck{SubmitOutcome::kRejected, own.message()};
+    if (!own.ok()) {
+        workers_.unit_failed(workers_.at(index), options_.clock());
+        return SubmitAck{SubmitOutcome::kRejected, own.message()};
+    }
     if (job->state != JobState::kRunning) return SubmitAck{SubmitOutcome::kStale, "the job failed meanwhile: " + job->message};
     if (unit.light_path_count > 0 && splats_per_path > job->splats_per_path.value_or(-1)) {
         job->splats_per_path = splats_per_path;
         size_window(*job);
     }
     ++workers_.at(index).merged;
+    workers_.unit_succeeded(workers_.at(index));
     job->workers.insert(index);
-    job->counters.camera_samples += counters.camera_samples;
-    job->counters.light_paths += counters.light_paths;
-    job->counters.rays += counters.rays;
-    job->counters.vertices += counters.vertices;
-    job->counters.connections += counters.connections;
+    job->counters += counters;
     job->dropped += dropped;
-    for (const DroppedSample& sample : samples) {
-        if (job->dropped_samples.size() >= kMaxDroppedPerJob) break;
-        job->dropped_samples.push_back({unit.key, sample});
-    }
     const uint32_t groups = reducer->folded_groups();
     if (groups > job->merged_groups) {
         job->merged_groups = groups;

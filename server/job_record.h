@@ -41,13 +41,8 @@ struct JobRecord {
     uint32_t merged_groups = 0;        ///< Complete groups merged so far.
     uint64_t merged_iterations = 0;    ///< Iterations of these.
     std::set<uint32_t> workers;        ///< Indices of those whose units were merged.
-    UnitCounters counters;
+    UnitCounters counters;  ///< Of all units that arrived; in the end, of those that are in the image. So is `dropped`.
     uint64_t dropped = 0;
-    struct Dropped {
-        UnitKey unit;
-        DroppedSample sample;
-    };
-    std::vector<Dropped> dropped_samples;  ///< The first few.
     uint64_t duplicates_same = 0, duplicates_different = 0, expired_leases = 0, rejected = 0;
     Digest image_digest;
     uint64_t image_size = 0;
@@ -92,7 +87,6 @@ inline std::string unit_name(const UnitKey& key) {
                                          : "of training " + std::to_string(key.group);
 }
 
-inline constexpr size_t kMaxDroppedPerJob = 64;
 /// A unit that failed on this many workers fails its job: it is the unit, not the workers.
 inline constexpr int kMaxFailedWorkers = 3;
 /// The same for a unit that failed this often where there are fewer workers.

@@ -1,15 +1,28 @@
 #include "server/reducer.h"
 
+#include <new>
+#include <string>
+#include <utility>
+
 namespace lightloom {
 
-Reducer::Reducer(const FrameLayout& frame, uint32_t tile_count)
-    : frame_(frame), tile_count_(tile_count), accumulation_(frame), current_(frame) {}
+Reducer::Reducer(const FrameLayout& frame, uint32_t tile_count) : frame_(frame), tile_count_(tile_count) {}
 
 Result<std::vector<Reducer::Refusal>> Reducer::add(const WorkUnit& unit, Partial partial) {
     const std::lock_guard lock(mutex_);
+    try {
+        return add_locked(unit, std::move(partial));
+    } catch (const std::bad_alloc&) {
+        return Status(StatusCode::kResourceExhausted,
+                      "the coordinator has too little memory for the sums of " + std::to_string(frame_.crop.area()) + " pixels");
+    }
+}
+
+Result<std::vector<Reducer::Refusal>> Reducer::add_locked(const WorkUnit& unit, Partial partial) {
     if (frozen_) return Status(StatusCode::kCancelled, "the image is being finished");
+    if (!sums_) sums_ = std::make_unique<Sums>(Sums{Accumulation(frame_), GroupSum(frame_)});
     std::vector<Refusal> refused;
-    if (unit.key.group < accumulation_.group_count()) {
+    if (unit.key.group < group_count()) {
         refused.push_back({unit.key, internal_error("the unit was merged twice")});
         return refused;
     }
@@ -18,7 +31,7 @@ Result<std::vector<Reducer::Refusal>> Reducer::add(const WorkUnit& unit, Partial
         refused.push_back({unit.key, data_loss("the partial is of another unit")});
         return refused;
     }
-    if (unit.key.group > accumulation_.group_count()) {
+    if (unit.key.group > group_count()) {
         if (const auto checked = check_partial(partial, frame_); !checked.ok()) {
             refused.push_back({unit.key, checked.status()});
         } else {
@@ -28,8 +41,7 @@ Result<std::vector<Reducer::Refusal>> Reducer::add(const WorkUnit& unit, Partial
     }
     LL_RETURN_IF_ERROR(add_to_current(unit, partial, refused));
     // A group that has just been folded may have been all that complete later ones waited for.
-    for (auto next = waiting_.find(accumulation_.group_count()); next != waiting_.end();
-         next = waiting_.find(accumulation_.group_count())) {
+    for (auto next = waiting_.find(group_count()); next != waiting_.end(); next = waiting_.find(group_count())) {
         const auto partials = std::move(next->second);
         waiting_.erase(next);
         for (const auto& [waiting_unit, waiting_partial] : partials)
@@ -39,13 +51,17 @@ Result<std::vector<Reducer::Refusal>> Reducer::add(const WorkUnit& unit, Partial
 }
 
 Status Reducer::add_to_current(const WorkUnit& unit, const Partial& partial, std::vector<Refusal>& refused) {
-    if (const Status added = current_.add(partial); !added.ok()) {
+    if (const Status added = sums_->current.add(partial); !added.ok()) {
         refused.push_back({unit.key, added});
         return {};
     }
+    current_counters_ += partial.counters;
+    for (const DroppedSample& sample : partial.dropped)
+        if (dropped_.size() < kMaxDropped) dropped_.push_back({unit.key, sample});
     if (++current_units_ < tile_count_) return {};
-    LL_RETURN_IF_ERROR(accumulation_.fold(current_, unit.iteration_count));
-    current_ = GroupSum(frame_);
+    LL_RETURN_IF_ERROR(sums_->all.fold(sums_->current, unit.iteration_count));
+    counters_ += std::exchange(current_counters_, {});
+    sums_->current = GroupSum(frame_);
     current_units_ = 0;
     return {};
 }
@@ -58,29 +74,40 @@ void Reducer::freeze() {
 
 uint32_t Reducer::folded_groups() const {
     const std::lock_guard lock(mutex_);
-    return accumulation_.group_count();
+    return group_count();
 }
 
 uint64_t Reducer::iterations() const {
     const std::lock_guard lock(mutex_);
-    return accumulation_.iterations();
+    return sums_ ? sums_->all.iterations() : 0;
+}
+
+UnitCounters Reducer::counters() const {
+    const std::lock_guard lock(mutex_);
+    return counters_;
 }
 
 uint64_t Reducer::dropped() const {
     const std::lock_guard lock(mutex_);
-    return accumulation_.dropped();
+    return sums_ ? sums_->all.dropped() : 0;
+}
+
+std::vector<Reducer::Dropped> Reducer::first_dropped() const {
+    const std::lock_guard lock(mutex_);
+    std::vector<Dropped> out = dropped_;
+    std::erase_if(out, [&](const Dropped& d) { return d.unit.group >= group_count(); });
+    return out;
 }
 
 Result<RgbImage> Reducer::image(float scale) const {
     const std::lock_guard lock(mutex_);
-    if (accumulation_.group_count() == 0)
-        return failed_precondition("no group of iterations is complete yet; ask again later");
-    return accumulation_.develop(scale);
+    if (group_count() == 0) return failed_precondition("no group of iterations is complete yet; ask again later");
+    return sums_->all.develop(scale);
 }
 
 Result<RgbImage> Reducer::variance(float scale) const {
     const std::lock_guard lock(mutex_);
-    return accumulation_.variance(scale);
+    return sums_ ? sums_->all.variance(scale) : RgbImage();
 }
 
 }  // namespace lightloom

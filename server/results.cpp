@@ -59,7 +59,7 @@ std::string utc_now() {
     return text;
 }
 
-std::string replay_command(const JobSpec& spec, const std::string& scene, const ManifestDropped& dropped) {
+std::string replay_command(const JobSpec& spec, const std::string& scene, const Reducer::Dropped& dropped) {
     const DroppedSample& sample = dropped.sample;
     const int width = spec.frame.crop.width();
     const int x = spec.frame.crop.x0 + int(sample.pixel) % width, y = spec.frame.crop.y0 + int(sample.pixel) / width;
@@ -113,7 +113,7 @@ std::string to_json(const Manifest& m) {
                     {"duplicates_same", m.job.duplicates_same},
                     {"duplicates_different", m.job.duplicates_different}};
     Json dropped = Json::array();
-    for (const ManifestDropped& d : m.dropped) {
+    for (const Reducer::Dropped& d : m.dropped) {
         dropped.push_back({{"unit", {d.unit.group, d.unit.tile}},
                            {"iteration", d.sample.iteration},
                            {"pixel", d.sample.pixel},

@@ -21,11 +21,6 @@ struct ManifestWorker {
     uint32_t thread_count = 0;
 };
 
-struct ManifestDropped {
-    UnitKey unit;
-    DroppedSample sample;
-};
-
 struct Manifest {
     JobInfo job;
     BuildIdentity identity;
@@ -35,7 +30,7 @@ struct Manifest {
     uint64_t iterations = 0;
     std::vector<UnitTable::Merged> units;
     std::vector<ManifestWorker> workers;
-    std::vector<ManifestDropped> dropped;  ///< The first few.
+    std::vector<Reducer::Dropped> dropped;  ///< The first few.
     uint64_t expired_leases = 0, rejected_results = 0;
 };
 
@@ -43,7 +38,7 @@ struct Manifest {
 std::string utc_now();
 /// Command line for a shell that renders one dropped sample again; its unit for a splat, which is known only by where it
 /// would have landed.
-std::string replay_command(const JobSpec& spec, const std::string& scene, const ManifestDropped& dropped);
+std::string replay_command(const JobSpec& spec, const std::string& scene, const Reducer::Dropped& dropped);
 /// What light transport was asked for, as manifests and reports of references show it.
 nlohmann::ordered_json settings_json(const JobSpec& spec);
 /// Tables as manifests and statistics show them.

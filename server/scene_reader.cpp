@@ -2,12 +2,29 @@
 
 #include <unistd.h>
 
+#include <memory>
+#include <semaphore>
+
 #include "common/scene/scene.h"
 #include "common/transport/catalog.h"
 #include "common/transport/first_hit.h"
 
 namespace lightloom {
 namespace {
+
+/// Each takes a processor and may take gigabytes, and hundreds of jobs may be submitted at once.
+constexpr ptrdiff_t kScenesAtATime = 2;
+
+class Turn {
+  public:
+    explicit Turn(std::counting_semaphore<kScenesAtATime>& turns) : turns_(turns) { turns_.acquire(); }
+    ~Turn() { turns_.release(); }
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+
+  private:
+    std::counting_semaphore<kScenesAtATime>& turns_;
+};
 
 Result<ImportedScene> read_scene(const AssetStore& assets, const Digest& root, const std::filesystem::path& scratch) {
     const auto text = assets.read(root);
@@ -40,8 +57,11 @@ Result<SceneFacts> scene_facts(const SceneDescription& description, const JobSpe
 }
 
 SceneReader make_scene_reader(std::filesystem::path scratch) {
-    return [scratch = std::move(scratch)](const AssetStore& assets, const JobSpec& spec,
-                                          std::stop_token) -> Result<SceneFacts> {
+    auto turns = std::make_shared<std::counting_semaphore<kScenesAtATime>>(kScenesAtATime);
+    return [scratch = std::move(scratch), turns](const AssetStore& assets, const JobSpec& spec,
+                                                 std::stop_token stop) -> Result<SceneFacts> {
+        const Turn turn(*turns);
+        if (stop.stop_requested()) return Status(StatusCode::kCancelled, "the job ended before its scene was read");
         const auto scene = read_scene(assets, spec.scene_root, scratch);
         if (!scene.ok()) return scene.status();
         auto facts = scene_facts(scene->description, spec);
@@ -49,8 +69,9 @@ SceneReader make_scene_reader(std::filesystem::path scratch) {
         const auto algorithm = find_algorithm(spec.algorithm);
         if (!algorithm.ok() || !(*algorithm)->needs_tables) return facts;
         // Read a second time when it is needed, while workers trace: of the jobs that wait for their turn none holds a scene.
-        facts->build_scene = [&assets, scratch, root = spec.scene_root, width = spec.width,
+        facts->build_scene = [&assets, scratch, turns, root = spec.scene_root, width = spec.width,
                               height = spec.height]() -> Result<std::shared_ptr<const Scene>> {
+            const Turn turn_again(*turns);
             auto again = read_scene(assets, root, scratch);
             if (!again.ok()) return again.status();
             auto built = Scene::build(std::move(again->description), {.width = width, .height = height});

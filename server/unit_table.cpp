@@ -65,12 +65,12 @@ bool UnitTable::has_more_than(size_t n) {
     return true;
 }
 
-std::optional<WorkUnit> UnitTable::lease(uint32_t worker, TimePoint expiry) {
+std::optional<WorkUnit> UnitTable::lease(uint32_t worker, TimePoint expiry, const AnyoneElse& anyone_else) {
     if (closed_) return std::nullopt;
     // A shuffled table first opens several groups, so that whole groups change places too.
     (void)has_more_than(shuffle_ ? 8 : 0);
-    const auto end = pending_.lower_bound({group_limit_, 0});
-    const ptrdiff_t count = std::distance(pending_.begin(), end);
+    const auto end = [&] { return pending_.lower_bound({group_limit_, 0}); };
+    const ptrdiff_t count = std::distance(pending_.begin(), end());
     if (count == 0) return std::nullopt;
     auto chosen = pending_.begin();
     if (shuffle_) {
@@ -80,8 +80,13 @@ std::optional<WorkUnit> UnitTable::lease(uint32_t worker, TimePoint expiry) {
     // One broken worker must not take the same unit again and again while others could render it.
     const auto fresh = [&](const UnitKey& key) { return !entry(key)->failed_on.contains(worker); };
     if (!fresh(*chosen)) {
-        const auto other = std::find_if(pending_.begin(), end, fresh);
-        if (other != end) chosen = other;
+        auto other = std::find_if(pending_.begin(), end(), fresh);
+        while (other == end() && open_group()) other = std::find_if(pending_.begin(), end(), fresh);
+        if (other != end()) {
+            chosen = other;
+        } else if (anyone_else && anyone_else(entry(*chosen)->failed_on)) {
+            return std::nullopt;
+        }
     }
     Entry& e = *entry(*chosen);
     pending_.erase(chosen);

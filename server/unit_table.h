@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <optional>
 #include <set>
 #include <vector>
@@ -22,8 +23,11 @@ class UnitTable {
     /// to wait in memory for a straggler of an earlier one. `shuffle_seed` hands units out in a random order (tests).
     UnitTable(Plan plan, uint64_t iterations, uint32_t window, std::optional<uint64_t> shuffle_seed);
 
-    /// The next unit for `worker` (an index of the caller's choice), or nothing for now.
-    std::optional<WorkUnit> lease(uint32_t worker, TimePoint expiry);
+    /// Whether some other worker than these could render a unit.
+    using AnyoneElse = std::function<bool(const std::set<uint32_t>& workers)>;
+    /// The next unit for `worker` (an index of the caller's choice), or nothing for now. A unit that failed on the worker comes back
+    /// to it only when nobody else is there to render it.
+    std::optional<WorkUnit> lease(uint32_t worker, TimePoint expiry, const AnyoneElse& anyone_else = {});
     /// Whether more than `n` units could be leased now.
     bool has_more_than(size_t n);
     /// True if the unit is not merged yet; then `worker` holds it until `expiry` (unless someone else does already).
@@ -49,8 +53,7 @@ class UnitTable {
     };
     /// The result could not be merged after all; leases the unit again.
     Failures reopen(const UnitKey& key);
-    /// The same for a unit that a worker could not render. Workers that failed a unit get it again only when nothing else
-    /// is left for them.
+    /// The same for a unit that a worker could not render; see lease().
     Failures fail(const UnitKey& key, uint32_t worker);
 
     /// The unit of an opened group.

@@ -1,6 +1,7 @@
 #include "server/worker_registry.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace lightloom {
 
@@ -34,6 +35,20 @@ WorkerRegistry::Crew WorkerRegistry::crew(TimePoint now) const {
         crew.most_threads = std::max(crew.most_threads, worker->hello.thread_count);
     }
     return crew;
+}
+
+bool WorkerRegistry::anyone_else(const std::set<uint32_t>& workers, TimePoint now) const {
+    return std::any_of(workers_.begin(), workers_.end(),
+                       [&](const auto& w) { return !lost(*w, now) && !workers.contains(w->index); });
+}
+
+void WorkerRegistry::unit_failed(WorkerRecord& worker, TimePoint now) {
+    const int repeated = worker.failures_in_a_row++;
+    if (repeated > 0) worker.rests_until = seconds_after(now, std::min(60.0, std::ldexp(1.0, std::min(repeated - 1, 6))));
+}
+
+bool WorkerRegistry::rests(const WorkerRecord& worker, TimePoint now) const {
+    return now < worker.rests_until && anyone_else({worker.index}, now);
 }
 
 bool WorkerRegistry::fell_silent(uint32_t index, TimePoint now) {

@@ -33,6 +33,8 @@ struct WorkerRecord {
     bool left = false;                ///< It said goodbye.
     uint32_t waiting = 0;             ///< Of its calls for units, those that wait now.
     uint64_t merged = 0;              ///< Units of images.
+    int failures_in_a_row = 0;
+    TimePoint rests_until;            ///< Gets no unit before that while others are there.
     std::set<UnitReference> held;
 
     /// A worker may hold one unit beside the one that it renders, so that it does not idle between two.
@@ -57,6 +59,13 @@ class WorkerRegistry {
         uint32_t most_threads = 0;  ///< That one of them has.
     };
     Crew crew(TimePoint now) const;
+    /// Whether one of them is not among these (indices).
+    bool anyone_else(const std::set<uint32_t>& workers, TimePoint now) const;
+    /// A worker could not render a unit. From the second time in a row it rests, every time longer, up to a minute: its disk may be
+    /// full, and it would give every unit back at once.
+    void unit_failed(WorkerRecord& worker, TimePoint now);
+    void unit_succeeded(WorkerRecord& worker) { worker.failures_in_a_row = 0; }
+    bool rests(const WorkerRecord& worker, TimePoint now) const;
     /// Whether the unit whose lease this worker let expire bears the blame for its silence: it does once for each silence. A
     /// worker that was heard of within half a lease has lost a lease on the way, not its life.
     bool fell_silent(uint32_t index, TimePoint now);

@@ -34,6 +34,15 @@ struct UnitCounters {
     uint64_t rays = 0;      ///< Closest-hit and shadow rays together.
     uint64_t vertices = 0;  ///< Surface vertices created by both kinds of walk.
     uint64_t connections = 0;  ///< Connections (next event included) whose visibility was tested.
+
+    UnitCounters& operator+=(const UnitCounters& o) {
+        camera_samples += o.camera_samples;
+        light_paths += o.light_paths;
+        rays += o.rays;
+        vertices += o.vertices;
+        connections += o.connections;
+        return *this;
+    }
 };
 
 struct Partial {

@@ -220,6 +220,14 @@ TEST(Reducer, APartialThatLeavesTheRangeAfterWaitingIsTheOneRefused) {
     EXPECT_EQ(reducer.folded_groups(), 2u);
 }
 
+TEST(Reducer, WithoutAPartialThereIsNoImage) {
+    const Reducer reducer(whole(60000, 1200), 4);  // whose sums would take 18 GB
+    EXPECT_EQ(reducer.folded_groups(), 0u);
+    EXPECT_EQ(reducer.iterations(), 0u);
+    EXPECT_EQ(reducer.dropped(), 0u);
+    EXPECT_EQ(reducer.image(1).status().code(), StatusCode::kFailedPrecondition);
+}
+
 TEST(Reducer, AGroupThatDoesNotFitTheSumsIsAnError) {
     const FrameLayout frame = whole(10, 10);
     const Plan plan(frame, 1);
@@ -300,6 +308,7 @@ TEST(Coordinator, DroppedSamplesOfGroupsBeyondTheImageDoNotCount) {
     ASSERT_EQ(info.state, JobState::kSucceeded) << info.message;
     EXPECT_EQ(info.samples_per_pixel_done, 1u);
     EXPECT_EQ(info.dropped_samples, 1u);
+    EXPECT_EQ(info.camera_samples, 40u * 30u) << "of one group of one iteration";
     const auto manifest = service.coordinator->manifest(id);
     ASSERT_TRUE(manifest.ok());
     EXPECT_NE(manifest->find("\"iteration\": 0"), std::string::npos);

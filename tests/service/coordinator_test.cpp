@@ -209,6 +209,43 @@ TEST(Coordinator, AUnitThatFailsThreeTimesFailsItsJob) {
     EXPECT_NE(info.message.find("boom"), std::string::npos);
 }
 
+TEST(Coordinator, ABrokenWorkerFailsNoJobWhileAnotherWorks) {
+    FakeService service;
+    const std::string id = service.submit(service.spec(40));
+    const std::string broken = service.add_worker(), able = service.add_worker();
+    int attempts = 0, rounds = 0;
+    const auto failed_attempt = [&](const UnitLease& lease) {
+        ++attempts;
+        const Status s = service.coordinator->release_unit(broken, lease.reference(), internal_error("no space left on device"));
+        EXPECT_TRUE(s.ok()) << s.message();
+    };
+    for (; rounds < 100 && service.coordinator->get_job(id)->state == JobState::kRunning; ++rounds) {
+        for (int often = 0; often < 20; ++often)
+            for (const UnitLease& lease : service.lease(broken)) failed_attempt(lease);
+        service.now_ms += 100;
+        for (const UnitLease& lease : service.lease(able))
+            EXPECT_EQ(service.deliver(able, lease).outcome, SubmitOutcome::kAccepted);
+    }
+    const JobInfo info = service.wait_end(id);
+    EXPECT_EQ(info.state, JobState::kSucceeded) << info.message;
+    EXPECT_GE(attempts, 2);
+    EXPECT_LE(attempts, 5) << "in " << 0.1 * rounds << " s: after 1, 2, 4, ... s of rest";
+}
+
+TEST(Coordinator, AWorkerAloneGetsItsFailedUnitsAgain) {
+    FakeService service;
+    const std::string id = service.submit(service.spec(3));
+    const std::string worker = service.add_worker();
+    for (int i = 0; i < 5; ++i) {
+        const auto leases = service.lease(worker);
+        ASSERT_EQ(leases.size(), 1u) << i;
+        ASSERT_TRUE(service.coordinator->release_unit(worker, leases[0].reference(), internal_error("for a moment")).ok());
+    }
+    while (service.coordinator->get_job(id)->state == JobState::kRunning)
+        for (const UnitLease& lease : service.lease(worker)) service.deliver(worker, lease);
+    EXPECT_EQ(service.wait_end(id).state, JobState::kSucceeded);
+}
+
 TEST(Coordinator, ReleasedUnitsGoOnAndGoodbyeReleasesAll) {
     FakeService service;
     service.submit(service.spec(1));

@@ -232,12 +232,13 @@ TEST(Processes, TablesAreKeptForTheNextRenderAndCanBeInspected) {
 TEST(Processes, ATimeLimitedImageCanBeRenderedAgain) {
     const Service service;
     const auto worker = service.worker("worker", 2);
-    ASSERT_EQ(service.submit("timed", {"--algorithm", "bdpt", "--time", "1.5", "--resolution", "64x48"})->wait(), 0)
+    ASSERT_EQ(service.submit("timed", {"--algorithm", "bdpt", "--time", "1.5", "--resolution", "64x48", "--layers"})->wait(), 0)
         << service.log("timed");
     const Json manifest = service.manifest("timed");
+    EXPECT_TRUE(manifest["spec"]["layers"].get<bool>());
     const auto spp = manifest["image"]["samples_per_pixel"].get<uint64_t>();
     ASSERT_GE(spp, 1u);
-    EXPECT_EQ(embedded(service, 2, 1, {"--algorithm", "bdpt", "--spp", std::to_string(spp), "--resolution", "64x48"}),
+    EXPECT_EQ(embedded(service, 2, 1, {"--algorithm", "bdpt", "--spp", std::to_string(spp), "--resolution", "64x48", "--layers"}),
               service.digest("timed"));
 }
 
