@@ -82,7 +82,7 @@ class Coordinator::Tracing final : public TracingPort {
         const std::lock_guard lock(coordinator_.mutex_);
         if (!alive()) return over();
         job_.spec = set.spec;
-        if (smaller && coordinator_.wait_for_maker(job_)) return false;
+        if (coordinator_.wait_for_maker(job_)) return false;
         job_.training_begin = coordinator_.options_.clock();
         coordinator_.open_first_round(job_);
         return true;

@@ -54,9 +54,11 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
     job.table_key = table_key(options_.identity, spec);
     job.spec = std::move(spec);
     job.facts = std::move(facts);
-    if (may_wait && wait_for_maker(job)) return {};
+    // What another job makes at leisure may take far longer than this one's limit allows: it probes first, see settle().
+    const bool probes = open_size && samples > kMinTrainingSamples;
+    if (may_wait && !probes && wait_for_maker(job)) return {};
     job.makes_tables = true;
-    if (open_size && samples > kMinTrainingSamples) {
+    if (probes) {
         const auto roomy = uint64_t(std::min(job.spec.time_limit_seconds * kProbeSamplesPerSecond, double(kTrainingUnitSamples)));
         const uint64_t probe = std::min(std::max(kProbeSamples, roomy), samples);
         open_training(job, UnitKind::kProbe, {0, probe, probe});
@@ -68,7 +70,8 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
 
 std::shared_ptr<JobRecord> Coordinator::find_maker(const JobRecord& job) const {
     for (const auto& other : jobs_) {
-        const bool makes = other->makes_tables && !is_terminal(other->state);
+        // A probe does not know yet which set it is for.
+        const bool makes = other->makes_tables && !is_terminal(other->state) && other->phase != PreparePhase::kProbing;
         if (other.get() != &job && makes && other->table_key == job.table_key) return other;
     }
     return nullptr;
@@ -227,10 +230,12 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
     if (problem.ok()) problem = data->validate(SIZE_MAX);
     if (!problem.ok()) {
         ++job->rejected;
+        workers_.unit_failed(*worker, options_.clock());
         unit_failed(*job, reference.key, units->fail(reference.key, worker->index), problem);
         return SubmitAck{SubmitOutcome::kRejected, problem.message()};
     }
     if (auto answer = repeated_result(*job, *units, reference.key, *worker, digest)) return *std::move(answer);
+    workers_.unit_succeeded(*worker);
     TrainingRound& round = *job->round;
     round.add(reference.key.group, {*std::move(data), payload.size(), trace_seconds});
     // A set that is far too large shows before hours were spent on it.

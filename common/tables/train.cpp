@@ -18,7 +18,8 @@ constexpr uint64_t kFewestNodes = 4;  ///< On average, in a subspace that the da
 /// Share of the time that has passed when these begin, for progress (measured; 5 10^5 samples of a hard interior).
 constexpr double kEnergyBegins = 0.1, kGammaBegins = 0.15;
 
-constexpr uint64_t kMaxGammaCells = uint64_t(1) << 24;  ///< 64 MB in single precision.
+/// Of Gamma: 64 MB in single precision, which go to every worker.
+constexpr uint64_t kMaxGammaCells = uint64_t(1) << 24;
 
 class Stopwatch {
   public:
@@ -192,9 +193,18 @@ GammaDataset gamma_dataset(const TrainingData& d, const std::vector<double>& bri
 
 }  // namespace
 
-Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& emitters, const TrainingOptions& options,
+Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& emitters, const TrainingOptions& asked,
                                     const TrainingControl& control, TrainingReport* report) {
     *report = {};
+    TrainingOptions options = asked;
+    if (const double cells = double(asked.light_subspaces) * asked.eye_subspaces; cells > double(kMaxGammaCells)) {
+        const double smaller = std::sqrt(double(kMaxGammaCells) / cells);
+        options.light_subspaces = std::max(1u, uint32_t(smaller * asked.light_subspaces));
+        options.eye_subspaces = std::max(1u, uint32_t(smaller * asked.eye_subspaces));
+        report->note = "Gamma may have " + std::to_string(kMaxGammaCells) + " entries: at most " +
+                       std::to_string(options.light_subspaces) + " light and " + std::to_string(options.eye_subspaces) +
+                       " eye subspaces";
+    }
     const std::stop_token& stop = control.stop;
     const auto passed = [&](double share) {
         if (control.progress) control.progress(share);
@@ -218,7 +228,8 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
     const GammaDataset dataset = gamma_dataset(data, brightness, emitters, options, stop, tables);
     if (stop.stop_requested()) return cancelled;
     report->paths = dataset.paths.size(), report->nodes = dataset.nodes.size();
-    if (dataset.paths.empty()) report->note = "no path of this scene can be connected: uniform tables";
+    if (dataset.paths.empty())
+        report->note += std::string(report->note.empty() ? "" : "; ") + "no path of this scene can be connected: uniform tables";
     GammaOptions gamma;
     gamma.trainer = options.trainer;
     gamma.mix = options.mix;

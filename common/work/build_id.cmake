@@ -1,7 +1,6 @@
-# cmake -DROOT=... -DVERSION=... -DTOOLS=... -DOUT=... -P build_id.cmake
-file(GLOB_RECURSE sources RELATIVE ${ROOT} ${ROOT}/common/*.h ${ROOT}/common/*.cpp)
-list(FILTER sources EXCLUDE REGEX "^common/cli/")  # computes no light
-list(SORT sources)
+# cmake -DROOT=... -DLIST=... -DVERSION=... -DTOOLS=... -DOUT=... -P build_id.cmake
+# LIST: a file that names the sources, a line each, relative to ROOT.
+file(STRINGS ${LIST} sources)
 set(text "")
 foreach(source ${sources})
     file(SHA256 ${ROOT}/${source} digest)

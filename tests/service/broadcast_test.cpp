@@ -324,26 +324,23 @@ JobSpec poor_job(const TableService& service) {
 const auto in_phase = [](PreparePhase phase) { return [phase](const JobInfo& job) { return job.phase == phase; }; };
 bool is_running(const JobInfo& job) { return job.state == JobState::kRunning; }
 
-/// The second waits for the first's tables twice: for those of the whole set, and, when its own probe has shown that it cannot
-/// afford that either, for those of the set on which both settle.
+/// Both probe; the second waits for the first's tables once its own probe has shown that both can afford the same set.
 TEST(TrainingBudget, JobsThatSettleOnTheSameSetTrainOnce) {
     for (const char* first_ends : {"well", "cancelled", "failed"}) {
         TableService service;
-        const std::string first = service.submit_training(poor_job(service)), second = service.submit_now(poor_job(service));
-        service.wait(second, in_phase(PreparePhase::kWaitingForTables));
-        auto held = lease_all(service);
-        ASSERT_EQ(held.size(), 1u);
-        service.give(held[0].first, held[0].second, traced(held[0].second));
+        const std::string first = service.submit_training(poor_job(service)), second = service.submit_training(poor_job(service));
+        const auto probes = lease_all(service);
+        ASSERT_EQ(probes.size(), 2u);
+        EXPECT_EQ(probes[0].second.job_id, first);
+        EXPECT_EQ(probes[1].second.job_id, second);
+        service.give(probes[0].first, probes[0].second, traced(probes[0].second));
         service.wait(first, in_phase(PreparePhase::kTracing));
-        service.wait(second, in_phase(PreparePhase::kProbing));
-        held = lease_all(service);
-        ASSERT_EQ(held.size(), 2u);
-        EXPECT_EQ(held[0].second.job_id, first);
-        EXPECT_EQ(held[1].second.job_id, second);
-        service.give(held[1].first, held[1].second, traced(held[1].second));
+        service.give(probes[1].first, probes[1].second, traced(probes[1].second));
         service.wait(second, in_phase(PreparePhase::kWaitingForTables));
         EXPECT_EQ(service.coordinator->get_job(second)->waits_for, first);
-        EXPECT_TRUE(lease_all(service).empty());
+        auto held = lease_all(service);
+        ASSERT_EQ(held.size(), 1u);
+        EXPECT_EQ(held[0].second.job_id, first);
         const bool alone = first_ends != std::string("well");
         if (alone) {
             if (first_ends == std::string("cancelled")) {
@@ -368,15 +365,15 @@ TEST(TrainingBudget, JobsThatSettleOnTheSameSetTrainOnce) {
 
 TEST(TrainingBudget, SoDoThreeOfThem) {
     TableService service;
-    std::vector<std::string> jobs = {service.submit_training(poor_job(service))};
-    for (int i = 0; i < 2; ++i) jobs.push_back(service.submit_now(poor_job(service)));
-    const auto settled = [&](const std::string& id) {
+    std::vector<std::string> jobs;
+    for (int i = 0; i < 3; ++i) jobs.push_back(service.submit_training(poor_job(service)));
+    const auto waits = [&](const std::string& id) {
         JobInfo job = *service.coordinator->get_job(id);
-        return job.waits_for == jobs[0] && job.spec.parameters["training-paths"] == std::to_string(kMinTrainingSamples);
+        return !job.waits_for.empty() && job.spec.parameters["training-paths"] == std::to_string(kMinTrainingSamples);
     };
     int probes = 0;
     std::vector<std::pair<std::string, UnitLease>> sets;
-    for (int i = 0; i < 12000 && !(settled(jobs[1]) && settled(jobs[2])); ++i) {
+    for (int i = 0; i < 12000 && (sets.empty() || std::count_if(jobs.begin(), jobs.end(), waits) < 2); ++i) {
         for (const auto& [worker, lease] : lease_all(service)) {
             if (lease.unit.key.kind == UnitKind::kProbe) {
                 ++probes;
@@ -389,14 +386,35 @@ TEST(TrainingBudget, SoDoThreeOfThem) {
     }
     EXPECT_EQ(probes, 3);
     ASSERT_EQ(sets.size(), 1u);
-    EXPECT_EQ(sets[0].second.job_id, jobs[0]);
+    const std::string maker = sets[0].second.job_id;  // who settled first
     service.give(sets[0].first, sets[0].second, traced(sets[0].second));
-    const Digest tables = service.wait(jobs[0], is_running).tables.asset.digest;
+    const Digest tables = service.wait(maker, is_running).tables.asset.digest;
     for (const std::string& id : jobs) {
         const JobInfo job = service.wait(id, is_running);
         EXPECT_EQ(job.tables.asset.digest, tables);
-        EXPECT_EQ(job.tables.from_cache, id != jobs[0]);
+        EXPECT_EQ(job.tables.from_cache, id != maker);
     }
+}
+
+/// Their maker takes its time: it may be tracing for longer than the other's limit.
+TEST(TrainingBudget, ATimeLimitedJobWaitsForNoTablesBeforeItKnowsWhatItCanAfford) {
+    TableService service;
+    JobSpec leisurely = service.table_spec(1);
+    leisurely.parameters.erase("training-paths");
+    const std::string maker = service.submit_training(leisurely), timed = service.submit_training(poor_job(service));
+    EXPECT_EQ(service.coordinator->get_job(timed)->phase, PreparePhase::kProbing);
+    // The maker's units are in work when the probe's turn comes.
+    std::string worker;
+    std::vector<UnitLease> leases;
+    do {
+        worker = service.add_worker();
+        leases = service.lease(worker);
+        ASSERT_EQ(leases.size(), 1u);
+    } while (leases[0].job_id == maker);
+    ASSERT_EQ(leases[0].job_id, timed);
+    service.give(worker, leases[0], traced(leases[0]));
+    const JobInfo settled = service.wait(timed, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing; });
+    EXPECT_EQ(settled.spec.parameters.at("training-paths"), std::to_string(kMinTrainingSamples));
 }
 
 /// Who waits for a younger job's tables does not wait for what has come in between.

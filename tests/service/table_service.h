@@ -108,12 +108,14 @@ inline Digest tables_alone(const JobSpec& spec) {
     return sha256(serialize(*make_tables(*golden(), render_settings(whole), {}, &report)));
 }
 
-/// Submits and delivers all training units, in order; the job then renders.
+/// Submits and delivers all training units, in order; the job then renders. Those who delivered leave.
 inline std::string train_by_hand(TableService& service, const JobSpec& spec) {
     const std::string id = service.submit_training(spec);
     for (const auto& [worker, lease] : lease_all(service))
         EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
     service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
+    for (const WorkerStatus& worker : service.coordinator->workers())
+        if (!worker.lost) (void)service.coordinator->goodbye(worker.worker_id);
     return id;
 }
 
