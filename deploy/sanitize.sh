@@ -7,6 +7,7 @@
 #
 #   deploy/sanitize.sh                 both
 #   deploy/sanitize.sh tsan -R Workers one of them; what follows goes to ctest
+#   deploy/sanitize.sh quick           both, but only the tests that are quick to build and to run; what CI has time for
 #
 # The options and the suppressions (deploy/tsan.supp) are properties of the tests (tests/CMakeLists.txt), so that a plain
 # ctest in build/asan or build/tsan uses them too. Any report fails the run, also one of a process that a test has killed.
@@ -15,8 +16,11 @@ set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 "$root/deploy/install-deps.sh"
 cd "$root"
-presets=(tsan asan)
-if [ $# -gt 0 ]; then
+presets=(tsan asan) quick=
+if [ "${1:-}" = quick ]; then
+    quick=1
+    shift
+elif [ $# -gt 0 ]; then
     presets=("$1")
     shift
 fi
@@ -27,12 +31,19 @@ if setarch -R true 2>/dev/null; then run=(setarch -R); fi
 failed=0
 for preset in "${presets[@]}"; do
     cmake --preset "$preset" >/dev/null
+    names=() controls=()
+    if [ "$preset" = tsan ]; then
+        names=(coordinator bookkeeping learn_tables worker work)
+        controls=(race_control)
+        if [ -z "$quick" ]; then names+=(client training broadcast guided process transport); fi
+    elif [ -n "$quick" ]; then
+        names=(core film image_io import import_shapes import_textures import_looks coordinator bookkeeping client worker)
+    fi
     tests=(-LE statistical)
     targets=(all)
-    if [ "$preset" = tsan ]; then
-        names=(coordinator bookkeeping client worker training learn_tables broadcast guided process work transport)
-        tests=(-R "^(($(IFS='|' && echo "${names[*]}"))_test|race_control)\.")
-        targets=("${names[@]/%/_test}" race_control)
+    if [ ${#names[@]} -gt 0 ]; then
+        targets=("${names[@]/%/_test}" "${controls[@]}")
+        tests=(-R "^($(IFS='|' && echo "${targets[*]}"))\.")
     fi
     "${run[@]}" cmake --build --preset "$preset" --target "${targets[@]}"
     reports="$root/build/$preset/reports"

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs, builds, and runs the whole test suite, then each fuzz target for a minute (LIGHTLOOM_FUZZ_SECONDS).
+# Installs, builds, and runs the whole test suite, then each fuzz target for a minute (LIGHTLOOM_FUZZ_SECONDS), and the quick tests
+# under sanitizers.
 # Arguments go to ctest and leave the rest out. With CI=true, warnings are errors.
 #
 #   deploy/test.sh                     everything
@@ -32,6 +33,8 @@ for target in pbrt ply; do
     (cd "$corpus" && "$root/build/fuzz/bin/${target}_fuzz" -max_total_time="$seconds" -rss_limit_mb=2048 -timeout=20 \
         -verbosity=0 -print_funcs=0 ${dictionary[$target]} -print_final_stats=1 "$corpus/$target" "$root/tests/fuzz/corpus/$target")
 done
+
+"$root/deploy/sanitize.sh" quick
 
 # Last and alone: the statistical tests use all processors themselves.
 cd build/release

@@ -154,6 +154,52 @@ inline std::shared_ptr<const Scene> textured_and_two_sided() {
     return b.build();
 }
 
+/// What a pbrt scene is made of: an object shown twice (once mirrored and stretched), a curtain with holes from a texture, a floor
+/// with an image, a rough coat over metal.
+inline std::shared_ptr<const Scene> instances_and_cutouts() {
+    SceneBuilder b = cornell_builder();
+    Image picture;
+    picture.width = picture.height = 4;
+    for (int i = 0; i < 16; ++i)
+        picture.floats.insert(picture.floats.end(), {0.1f + 0.05f * float(i), 0.3f, 0.8f - 0.04f * float(i)});
+    b.description().images.push_back(picture);
+    TextureNode image;
+    image.kind = TextureKind::kImage;
+    image.image = 0;
+    image.su = image.sv = 2;
+    b.description().textures.push_back(image);
+    Material carpet;
+    carpet.reflectance = TextureId(b.description().textures.size()) - 1;
+    b.description().meshes[0].attributes.material = b.add(carpet);
+
+    TextureNode holes;
+    holes.kind = TextureKind::kCheckerboard;
+    holes.a = b.constant(Rgb(1.0f)), holes.b = b.constant(Rgb(0.0f));
+    holes.su = holes.sv = 5;
+    b.description().textures.push_back(holes);
+    b.quad({-0.9f, 1.3f, -0.4f}, {1.2f, 0, 0}, {0, 0, 0.9f}, b.diffuse({0.5f, 0.6f, 0.3f})).attributes.alpha =
+        TextureId(b.description().textures.size()) - 1;
+
+    Material metal;
+    metal.kind = MaterialKind::kCoatedConductor;
+    metal.eta = b.constant({0.2f, 0.9f, 1.1f}), metal.k = b.constant({3.9f, 2.4f, 2.2f});
+    metal.roughness_u = metal.roughness_v = metal.base_roughness_u = metal.base_roughness_v = b.constant(Rgb(0.3f));
+    metal.remap_roughness = false;
+    b.sphere({-0.55f, 0.45f, -0.25f}, 0.25f, b.add(metal));
+
+    ObjectDefinition object;
+    TriangleMesh mesh;
+    mesh.positions = {{-0.3f, 0, -0.2f}, {0.3f, 0, -0.2f}, {0.1f, 0, 0.3f}, {0, 0.5f, 0}};
+    mesh.indices = {0, 1, 2, 1, 0, 3, 2, 1, 3, 0, 2, 3};
+    mesh.attributes.material = b.diffuse({0.7f, 0.4f, 0.3f});
+    mesh.attributes.source = "test object";
+    object.meshes.push_back(std::move(mesh));
+    b.description().objects.push_back(std::move(object));
+    b.description().instances.push_back({0, translation(-0.5, 0.2, 0.5), "first"});
+    b.description().instances.push_back({0, translation(0.2, 1.0, 0.4) * scaling(-0.8f, 1.5f, 0.6f), "mirrored"});
+    return b.build();
+}
+
 /// Spheres as lights: one seen from outside (next event by its cone), and the room itself, a sphere
 /// that shines inwards.
 inline std::shared_ptr<const Scene> spherical_lights() {
@@ -230,6 +276,7 @@ inline constexpr NamedScene kScenes[] = {
     {"diffuse_box", diffuse_box, "path light bdpt"},
     {"glossy", glossy, "path light bdpt"},
     {"textured_and_two_sided", textured_and_two_sided, "path light bdpt"},
+    {"instances_and_cutouts", instances_and_cutouts, "path light bdpt"},
     {"smooth_normals_and_lens", smooth_normals_and_lens, "path light bdpt"},
     {"spherical_lights", spherical_lights, "path light bdpt"},
     {"environment_lit", environment_lit, "path light bdpt"},

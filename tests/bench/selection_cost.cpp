@@ -1,0 +1,133 @@
+// What selection costs `spcbpt`: the share of the rendering time, of one thread, that goes into kappa (labels of light sub-paths, of
+// camera vertices, and of the prefixes and suffixes that weights ask for), into the index of the cache, and into two-stage sampling.
+//
+//   selection_cost SCENE [--iterations N] [--resolution WxH] [--set key=value ...]
+//
+// Each is timed by the processor's counter around every call; what reading the counter takes is subtracted from calls and whole.
+
+#include <tbb/global_control.h>
+#include <x86intrin.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+
+#include "common/import/import.h"
+#include "common/transport/spcbpt.h"
+#include "common/transport/training.h"
+
+using namespace lightloom;
+
+namespace {
+
+enum Part { kLightLabels, kIndex, kCameraLabels, kDraws, kWeightLabels, kParts };
+constexpr const char* kNames[kParts] = {"kappa of light sub-paths", "index of the cache", "kappa of camera vertices",
+                                        "two-stage sampling", "kappa for weights *"};
+
+struct Clock {
+    uint64_t cycles = 0, calls = 0;
+};
+Clock clocks[kParts];
+
+template <class F>
+auto timed(Part part, F&& f) {
+    struct Stop {
+        Clock& clock;
+        uint64_t begin = __rdtsc();
+        ~Stop() {
+            clock.cycles += __rdtsc() - begin;
+            ++clock.calls;
+        }
+    } stop{clocks[part]};
+    return f();
+}
+
+/// SubspaceConnections, timed.
+struct TimedConnections : SubspaceConnections<> {
+    using Base = SubspaceConnections<>;
+    void label_light_path(const Scene& scene, PathVertex* y, int n) const {
+        timed(kLightLabels, [&] { Base::label_light_path(scene, y, n); });
+    }
+    void label_camera_vertex(const Scene& scene, PathVertex* v) const {
+        timed(kCameraLabels, [&] { Base::label_camera_vertex(scene, v); });
+    }
+    void complete(const Scene& scene, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
+        timed(kWeightLabels, [&] { Base::complete(scene, y, s, z, t, towards, view); });
+    }
+    Index index(const LightCache& cache, uint64_t paths) const {
+        return timed(kIndex, [&] { return Base::index(cache, paths); });
+    }
+    template <class... Arguments>
+    int draw(Arguments&&... arguments) const {
+        return timed(kDraws, [&] { return Base::draw(std::forward<Arguments>(arguments)...); });
+    }
+};
+
+/// Cycles that an empty call seems to take, and that it really takes.
+struct Overhead {
+    double seen, whole;
+};
+Overhead overhead() {
+    constexpr int kCalls = 1000000;
+    Clock& clock = clocks[kIndex];
+    const uint64_t begin = __rdtsc();
+    for (int i = 0; i < kCalls; ++i) timed(kIndex, [] { asm volatile(""); });
+    const Overhead out{double(clock.cycles) / kCalls, double(__rdtsc() - begin) / kCalls};
+    clock = {};
+    return out;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app("What selection costs spcbpt");
+    std::string scene_path, resolution;
+    std::vector<std::string> set;
+    uint32_t iterations = 16;
+    app.add_option("scene", scene_path)->required();
+    app.add_option("--iterations", iterations);
+    app.add_option("--resolution", resolution);
+    app.add_option("--set", set);
+    CLI11_PARSE(app, argc, argv);
+
+    const auto fail = [](const Status& s) { return std::fprintf(stderr, "%s\n", s.message().c_str()), 2; };
+    auto imported = import_pbrt(scene_path);
+    if (!imported.ok()) return fail(imported.status());
+    SceneOptions options;
+    if (!resolution.empty() && std::sscanf(resolution.c_str(), "%dx%d", &options.width, &options.height) != 2) return 2;
+    RenderSettings settings{"spcbpt", {}, 1, imported->description.max_depth};
+    for (const std::string& item : set)
+        if (const size_t eq = item.find('='); eq != std::string::npos) settings.parameters[item.substr(0, eq)] = item.substr(eq + 1);
+    auto built = Scene::build(std::move(imported->description), options);
+    if (!built.ok()) return fail(built.status());
+    const std::shared_ptr<const Scene> scene = std::move(built).value();
+    const auto parameters = TransportParameters::read(settings);
+    if (!parameters.ok()) return fail(parameters.status());
+    TrainingReport report;
+    auto tables = make_tables(*scene, settings, {}, &report);
+    if (!tables.ok()) return fail(tables.status());
+
+    const Rect crop = scene->frame().crop;
+    const double frame_paths = parameters->light_paths * double(crop.area());
+    const auto plain = make_spcbpt(*parameters, std::make_shared<const PreparedTables>(*std::move(tables)), frame_paths);
+    const CachedAlgorithm<TimedConnections> algorithm{{{plain.method}}, plain.heuristic, plain.minimum_paths};
+    const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+    const uint64_t light_paths = std::max<uint64_t>(1, uint64_t(frame_paths * iterations + 0.5));
+    const Overhead empty = overhead();
+    const uint64_t begin = __rdtsc();
+    const auto part =
+        render_unit(algorithm, *scene, settings, parameters->roulette, UnitWork{0, iterations, 0, crop, 0, light_paths}, {});
+    double whole = double(__rdtsc() - begin);
+    if (!part.ok()) return fail(part.status());
+    for (const Clock& clock : clocks) whole -= double(clock.calls) * empty.whole;
+    std::printf("%-26s %12s %14s %8s\n", "", "calls", "cycles a call", "share");
+    double sum = 0;
+    for (int p = 0; p < kParts; ++p) {
+        const double cycles = std::max(0.0, double(clocks[p].cycles) - double(clocks[p].calls) * empty.seen);
+        sum += cycles;
+        std::printf("%-26s %12llu %14.0f %7.1f%%\n", kNames[p], static_cast<unsigned long long>(clocks[p].calls),
+                    clocks[p].calls > 0 ? cycles / double(clocks[p].calls) : 0.0, 100 * cycles / whole);
+    }
+    std::printf("%-26s %12s %14s %7.1f%%\n", "together", "", "", 100 * sum / whole);
+    std::printf("* with the throughput and footprint of every prefix, which the weights need as well\n");
+}
