@@ -20,6 +20,9 @@ constexpr int kTableAttempts = 3;
 /// The list of a scene's files; far above any real scene's.
 constexpr uint64_t kMaxManifestBytes = uint64_t(64) << 20;
 
+/// Between looks at what another process has under its hands.
+constexpr auto kOtherWorker = std::chrono::milliseconds(50);
+
 /// A process id alone is not enough: containers that share the cache may all run as process 1.
 std::string scratch_name() {
     std::random_device device;
@@ -52,7 +55,7 @@ Status SceneFetcher::fetch(const Digest& digest, uint64_t size_bytes, std::stop_
         auto upload = store_.begin_upload(digest, size_bytes);
         if (!upload.ok() && upload.status().code() == StatusCode::kAborted) {
             // Another worker of this host fetches the same file into the same directory.
-            std::this_thread::sleep_for(std::chrono::milliseconds(50));
+            std::this_thread::sleep_for(kOtherWorker);
             continue;
         }
         if (!upload.ok()) return upload.status();
@@ -75,10 +78,14 @@ Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, st
             text += bytes;
             return {};
         }));
-        const Status status = store_.put(root, text);
-        if (!status.ok() && status.code() != StatusCode::kAborted) return status;
-        while (!store_.contains(root) && !stop.stop_requested())
-            std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        for (;;) {
+            const Status status = store_.put(root, text);
+            if (status.ok()) break;
+            if (status.code() != StatusCode::kAborted) return status;
+            // Another worker of this host stores the same list; if it dies over that, the next attempt stores it.
+            if (stop.stop_requested()) return Status(StatusCode::kCancelled, "stopped");
+            std::this_thread::sleep_for(kOtherWorker);
+        }
     }
     const auto text = store_.read(root);
     if (!text.ok()) return text.status();
