@@ -53,7 +53,7 @@ int main(int argc, char** argv) {
     uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
     app.add_option("--server", server, "HOST:PORT of the coordinator")->capture_default_str();
     app.add_option("--threads", threads, "Threads to render with")->check(whole_number_between(1, 1024))->capture_default_str();
-    app.add_option("--cache", cache, "Directory for scene files and tables; may be shared by the workers of a host")
+    app.add_option("--cache", cache, "Directory for scene files, and for tables up to 1 GB; may be shared by the workers of a host")
         ->capture_default_str();
     app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
     app.add_option("--pretend-golden-digest", golden_override, "")->group("");  // tests of the refusal

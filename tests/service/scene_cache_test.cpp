@@ -64,5 +64,47 @@ TEST(SceneFetcher, AFileListThatAnotherProcessDidNotFinishIsStoredAfterAll) {
     EXPECT_EQ(fetcher.scene(spec, stop.get_token()).status().code(), StatusCode::kCancelled);
 }
 
+/// The tables of the coordinator, and what a fetcher of at most 2500 bytes keeps of them.
+struct Tables : ::testing::Test {
+    AssetReference put(const std::string& name, size_t size) {
+        std::string bytes = name;
+        bytes.resize(size, 'x');
+        EXPECT_TRUE(service.coordinator->assets().put(sha256(bytes), bytes).ok());
+        return {sha256(bytes), size};
+    }
+    bool kept(const AssetReference& tables) const { return AssetStore(directory.path / "worker-tables").contains(tables.digest); }
+
+    FakeService service;
+    const TempDirectory directory;
+    LocalWorkerPort port{*service.coordinator};
+    SceneFetcher fetcher{port, directory.path, 2500};
+};
+
+TEST_F(Tables, ThatWereUsedLeastRecentlyAreRemovedAboveTheLimit) {
+    const AssetReference a = put("a", 1000), b = put("b", 1000), c = put("c", 1000), large = put("large", 5000);
+    AssetStore scene_files(directory.path / "assets");
+    const std::string text(10000, 't');
+    ASSERT_TRUE(scene_files.put(sha256(text), text).ok());
+    for (const AssetReference& tables : {a, b, a, c}) ASSERT_TRUE(fetcher.tables(tables, {}).ok());
+    EXPECT_TRUE(kept(a));
+    EXPECT_FALSE(kept(b));
+    EXPECT_TRUE(kept(c));
+    EXPECT_EQ(sha256(*fetcher.tables(b, {})), b.digest) << "they are fetched again";
+    EXPECT_FALSE(kept(a));
+    ASSERT_TRUE(fetcher.tables(large, {}).ok());
+    EXPECT_TRUE(kept(large)) << "what is in use stays";
+    EXPECT_FALSE(kept(b) || kept(c));
+    EXPECT_TRUE(scene_files.contains(sha256(text))) << "scene files are no tables";
+}
+
+TEST_F(Tables, OfWhichAFetchBrokeOffLongAgoAreRemoved) {
+    const std::filesystem::path incoming = directory.path / "worker-tables" / "incoming";
+    for (const char* name : {"old", "young"}) ASSERT_TRUE(write_file_atomically((incoming / name).string(), "half").ok());
+    std::filesystem::last_write_time(incoming / "old", std::filesystem::file_time_type::clock::now() - std::chrono::hours(2));
+    ASSERT_TRUE(fetcher.tables(put("a", 1000), {}).ok());
+    EXPECT_FALSE(std::filesystem::exists(incoming / "old"));
+    EXPECT_TRUE(std::filesystem::exists(incoming / "young"));
+}
+
 }  // namespace
 }  // namespace lightloom
