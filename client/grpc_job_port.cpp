@@ -11,7 +11,11 @@
 namespace lightloom {
 namespace {
 
-constexpr int kWatchAttempts = 20;
+using Clock = std::chrono::steady_clock;
+
+/// A coordinator that is restarted is back by then.
+constexpr auto kReconnect = std::chrono::seconds(5);
+constexpr auto kReconnectInterval = std::chrono::milliseconds(250);
 constexpr int kUploadAttempts = 5;
 constexpr size_t kDigestsPerCall = 1000;
 
@@ -19,6 +23,16 @@ void set_deadline(grpc::ClientContext& context, double seconds) {
     context.set_deadline(std::chrono::system_clock::now() +
                          std::chrono::duration_cast<std::chrono::system_clock::duration>(
                              std::chrono::duration<double>(seconds)));
+}
+
+/// Whether there is a connection before `end`. Looks once at least, after a moment, so that no server is called without a pause.
+bool connected_before(Clock::time_point end, grpc::Channel& channel, const std::stop_token& stop) {
+    std::this_thread::sleep_for(kReconnectInterval);
+    do {
+        // Not GetState(): while nobody waits inside of gRPC, a connection makes a step every 5 s only.
+        if (channel.WaitForConnected(std::chrono::system_clock::now() + kReconnectInterval)) return true;
+    } while (Clock::now() < end && !stop.stop_requested());
+    return false;
 }
 
 Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientContext& context) {
@@ -39,8 +53,8 @@ Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientC
 
 }  // namespace
 
-GrpcJobPort::GrpcJobPort(const std::shared_ptr<grpc::Channel>& channel)
-    : jobs_(v1::JobService::NewStub(channel)), assets_(v1::AssetService::NewStub(channel)) {}
+GrpcJobPort::GrpcJobPort(std::shared_ptr<grpc::Channel> channel)
+    : channel_(std::move(channel)), jobs_(v1::JobService::NewStub(channel_)), assets_(v1::AssetService::NewStub(channel_)) {}
 
 Result<JobInfo> GrpcJobPort::submit_job(const std::string& request_id, const JobSpec& spec) {
     grpc::ClientContext context;
@@ -94,7 +108,8 @@ Result<JobInfo> GrpcJobPort::cancel_job(const std::string& job_id) {
 Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
                               std::stop_token stop) {
     uint64_t seen = 0;
-    for (int attempt = 0;; ++attempt) {
+    Clock::time_point begin = Clock::now(), end = begin + kReconnect;
+    for (;; begin = Clock::now()) {
         grpc::ClientContext context;
         const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
         v1::WatchJobRequest request;
@@ -102,6 +117,7 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<voi
         request.set_after_revision(seen);
         const auto reader = jobs_->WatchJob(&context, request);
         v1::Job message;
+        bool heard = false;
         while (reader->Read(&message)) {
             const auto info = wire::get(message);
             if (!info.ok()) {
@@ -111,13 +127,15 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<voi
             }
             on_change(*info);
             seen = info->revision;
-            attempt = 0;
+            heard = true;
         }
         const grpc::Status status = reader->Finish();
+        const bool lost = status.error_code() == grpc::StatusCode::UNAVAILABLE;
+        // A stream may have nothing to say for hours; one that ends as soon as it has begun does not begin the wait again.
+        if (heard || Clock::now() - begin > kReconnect) end = Clock::now() + kReconnect;
+        const bool again = lost && !stop.stop_requested() && connected_before(end, *channel_, stop);
         if (stop.stop_requested()) return {StatusCode::kCancelled, "interrupted"};
-        if (status.error_code() != grpc::StatusCode::UNAVAILABLE || attempt >= kWatchAttempts)
-            return wire::from_grpc(status);
-        std::this_thread::sleep_for(std::chrono::milliseconds(250));
+        if (!again) return wire::from_grpc(status);
     }
 }
 

@@ -11,7 +11,7 @@ namespace lightloom {
 
 class GrpcJobPort final : public JobPort {
   public:
-    explicit GrpcJobPort(const std::shared_ptr<grpc::Channel>& channel);
+    explicit GrpcJobPort(std::shared_ptr<grpc::Channel> channel);
     Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec) override;
     Result<JobInfo> get_job(const std::string& job_id) override;
     Result<std::vector<JobInfo>> list_jobs() override;
@@ -27,6 +27,7 @@ class GrpcJobPort final : public JobPort {
   private:
     Status send(const Digest& digest, uint64_t size,
                 const std::function<Result<std::string_view>(uint64_t offset)>& source);
+    std::shared_ptr<grpc::Channel> channel_;
     std::unique_ptr<v1::JobService::Stub> jobs_;
     std::unique_ptr<v1::AssetService::Stub> assets_;
 };
