@@ -35,7 +35,7 @@ void add_server_option(CLI::App& command, ServiceOptions& options) {
 
 GrpcJobPort connect(const ServiceOptions& options) {
     (void)interrupt_token();  // before gRPC makes threads
-    return GrpcJobPort(open_channel(options.server));
+    return GrpcJobPort(open_channel(options.server), {.stop = interrupt_token()});
 }
 
 int service_error(const ServiceOptions& options, const Status& status) {

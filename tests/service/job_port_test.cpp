@@ -1,0 +1,73 @@
+// A client's calls over gRPC when others are in the way.
+
+#include <grpcpp/create_channel.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "client/grpc_job_port.h"
+#include "common/film/atomic_file.h"
+#include "server/grpc_services.h"
+#include "tests/service/fake.h"
+
+namespace lightloom {
+namespace {
+
+using testing::FakeService;
+using testing::TempDirectory;
+using Clock = std::chrono::steady_clock;
+
+std::shared_ptr<grpc::Channel> channel_to(int port) {
+    return grpc::CreateChannel("127.0.0.1:" + std::to_string(port), grpc::InsecureChannelCredentials());
+}
+
+/// A file that somebody else has begun to upload.
+struct Upload : ::testing::Test {
+    FakeService service;
+    std::unique_ptr<GrpcServer> server = std::move(GrpcServer::start(*service.coordinator, "127.0.0.1:0")).value();
+    const std::string bytes = std::string(1 << 20, 'x') + "y";
+    const Digest digest = sha256(bytes);
+    std::optional<AssetStore::Upload> other{std::move(service.coordinator->assets().begin_upload(digest, bytes.size())).value()};
+};
+
+TEST_F(Upload, WaitsForAnotherOneOfTheSameFileAndGoesOnWhereThatBreaksOff) {
+    GrpcJobPort jobs(channel_to(server->port()), {.upload_silence_seconds = 10});
+    std::jthread thread([&] {
+        for (int i = 0; i < 10; ++i) {  // in all far longer than a few attempts take
+            EXPECT_TRUE(other->append(std::string(100, 'x')).ok());
+            std::this_thread::sleep_for(std::chrono::milliseconds(400));
+        }
+        other.reset();
+    });
+    const Status status = jobs.upload_bytes(digest, bytes);
+    EXPECT_TRUE(status.ok()) << status.message();
+    EXPECT_FALSE(other);
+    const auto stored = service.coordinator->assets().read(digest);
+    EXPECT_TRUE(stored.ok()) << stored.status().message();
+}
+
+TEST_F(Upload, GivesUpWhenTheOtherOneStandsStill) {
+    const TempDirectory directory;
+    const std::string path = (directory.path / "a.ply").string();
+    ASSERT_TRUE(write_file_atomically(path, bytes).ok());
+    GrpcJobPort jobs(channel_to(server->port()), {.upload_silence_seconds = 1});
+    const Status status = jobs.upload(digest, path);
+    EXPECT_EQ(status.code(), StatusCode::kAborted);
+    EXPECT_EQ(status.message().rfind(path + ": another client is sending this file", 0), 0u) << status.message();
+    EXPECT_NE(status.message().find("for 1 s; try again later"), std::string::npos) << status.message();
+}
+
+TEST_F(Upload, CanBeInterruptedWhileItWaits) {
+    std::stop_source stop;
+    GrpcJobPort jobs(channel_to(server->port()), {.stop = stop.get_token()});
+    std::jthread thread([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(300));
+        stop.request_stop();
+    });
+    const auto begin = Clock::now();
+    EXPECT_EQ(jobs.upload_bytes(digest, bytes).code(), StatusCode::kCancelled);
+    EXPECT_LT(Clock::now() - begin, std::chrono::seconds(20));
+}
+
+}  // namespace
+}  // namespace lightloom
