@@ -4,7 +4,9 @@
 
 #include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <fstream>
+#include <mutex>
 #include <thread>
 
 #include "common/work/wire.h"
@@ -40,10 +42,45 @@ bool connected_before(Clock::time_point end, grpc::Channel& channel, const std::
     return false;
 }
 
-Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientContext& context) {
+/// Cancels a call in which nothing was heard for a while. A deadline would be one of the whole call, whose length is not known.
+class SilenceLimit {
+  public:
+    SilenceLimit(grpc::ClientContext& context, double seconds)
+        : limit_(std::chrono::duration_cast<Clock::duration>(Seconds(seconds))),
+          thread_([this, &context](std::stop_token ended) { watch(context, ended); }) {}
+    void heard() {
+        const std::lock_guard lock(mutex_);
+        last_ = Clock::now();
+    }
+    bool exceeded() {
+        const std::lock_guard lock(mutex_);
+        return exceeded_;
+    }
+
+  private:
+    void watch(grpc::ClientContext& context, const std::stop_token& ended) {
+        std::unique_lock lock(mutex_);
+        while (!ended.stop_requested() && !exceeded_) {
+            wake_.wait_until(lock, ended, last_ + limit_, [] { return false; });
+            exceeded_ = !ended.stop_requested() && Clock::now() >= last_ + limit_;
+        }
+        if (exceeded_) context.TryCancel();
+    }
+
+    const Clock::duration limit_;
+    std::mutex mutex_;
+    std::condition_variable_any wake_;
+    Clock::time_point last_ = Clock::now();
+    bool exceeded_ = false;
+    std::jthread thread_;  // last: ends before anything that it uses goes away
+};
+
+Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientContext& context, double silence_seconds) {
+    SilenceLimit silence(context, silence_seconds);
     std::string bytes;
     v1::Chunk chunk;
     while (reader.Read(&chunk)) {
+        silence.heard();
         if (chunk.offset_bytes() != bytes.size()) {
             context.TryCancel();
             (void)reader.Finish();
@@ -52,8 +89,15 @@ Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientC
         bytes += chunk.data();
     }
     const grpc::Status status = reader.Finish();
-    if (!status.ok()) return wire::from_grpc(status);
-    return bytes;
+    if (status.ok()) return bytes;
+    constexpr const char* kLater = "; nothing is lost, `lightloom fetch` tries again";
+    if (silence.exceeded())
+        return Status(StatusCode::kDeadlineExceeded,
+                      "nothing more has come from the coordinator for " + seconds_text(silence_seconds) + kLater);
+    if (status.error_code() == grpc::StatusCode::UNAVAILABLE)
+        return Status(StatusCode::kUnavailable,
+                      "the connection to the coordinator broke (" + status.error_message() + ")" + kLater);
+    return wire::from_grpc(status);
 }
 
 }  // namespace
@@ -149,21 +193,19 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<voi
 
 Result<std::string> GrpcJobPort::image(const std::string& job_id, ImageKind kind) {
     grpc::ClientContext context;
-    set_deadline(context, 120);
     v1::GetImageRequest request;
     request.set_job_id(job_id);
     request.set_kind(kind == ImageKind::kFinal ? v1::IMAGE_KIND_FINAL : v1::IMAGE_KIND_PREVIEW);
     const auto reader = jobs_->GetImage(&context, request);
-    return collect(*reader, context);
+    return collect(*reader, context, options_.silence_seconds);
 }
 
 Result<std::string> GrpcJobPort::manifest(const std::string& job_id) {
     grpc::ClientContext context;
-    set_deadline(context, 60);
     v1::GetManifestRequest request;
     request.set_job_id(job_id);
     const auto reader = jobs_->GetManifest(&context, request);
-    return collect(*reader, context);
+    return collect(*reader, context, options_.silence_seconds);
 }
 
 Result<std::vector<Digest>> GrpcJobPort::find_missing(const std::vector<Digest>& digests) {

@@ -1,6 +1,7 @@
-// A client's calls over gRPC when others are in the way.
+// A client's calls over gRPC when others are in the way, slow, or gone.
 
 #include <grpcpp/create_channel.h>
+#include <grpcpp/server_builder.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -67,6 +68,46 @@ TEST_F(Upload, CanBeInterruptedWhileItWaits) {
     const auto begin = Clock::now();
     EXPECT_EQ(jobs.upload_bytes(digest, bytes).code(), StatusCode::kCancelled);
     EXPECT_LT(Clock::now() - begin, std::chrono::seconds(20));
+}
+
+/// Sends `chunks` bytes one by one, and then, if it stalls, nothing more.
+struct SlowImages final : v1::JobService::Service {
+    grpc::Status GetImage(grpc::ServerContext* context, const v1::GetImageRequest*,
+                          grpc::ServerWriter<v1::Chunk>* writer) override {
+        for (int i = 0; i < chunks; ++i) {
+            v1::Chunk chunk;
+            chunk.set_offset_bytes(uint64_t(i));
+            chunk.set_data("x");
+            writer->Write(chunk);
+            std::this_thread::sleep_for(std::chrono::milliseconds(400));
+        }
+        while (stalls && !context->IsCancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        return grpc::Status::OK;
+    }
+    int chunks = 10;
+    std::atomic<bool> stalls{false};
+};
+
+TEST(Images, MayTakeAnyTimeAsLongAsSomethingComes) {
+    SlowImages images;
+    grpc::ServerBuilder builder;
+    int number = 0;
+    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &number);
+    builder.RegisterService(&images);
+    const auto server = builder.BuildAndStart();
+    GrpcJobPort jobs(channel_to(number), {.silence_seconds = 2});
+    const auto image = jobs.image("job-1", ImageKind::kFinal);
+    ASSERT_TRUE(image.ok()) << image.status().message();
+    EXPECT_EQ(*image, "xxxxxxxxxx");
+    images.stalls = true;
+    const Status silence = jobs.image("job-1", ImageKind::kFinal).status();
+    EXPECT_EQ(silence.code(), StatusCode::kDeadlineExceeded);
+    EXPECT_NE(silence.message().find("nothing more has come from the coordinator for 2 s"), std::string::npos)
+        << silence.message();
+    server->Shutdown();
+    const Status gone = jobs.image("job-1", ImageKind::kFinal).status();
+    EXPECT_EQ(gone.code(), StatusCode::kUnavailable);
+    EXPECT_NE(gone.message().find("`lightloom fetch` tries again"), std::string::npos) << gone.message();
 }
 
 }  // namespace
