@@ -4,12 +4,12 @@
 #include <grpcpp/server_builder.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
-
 #include "client/grpc_job_port.h"
 #include "common/film/atomic_file.h"
+#include "common/work/channel.h"
 #include "server/grpc_services.h"
 #include "tests/service/fake.h"
+#include "tests/service/process.h"
 
 namespace lightloom {
 namespace {
@@ -108,6 +108,28 @@ TEST(Images, MayTakeAnyTimeAsLongAsSomethingComes) {
     const Status gone = jobs.image("job-1", ImageKind::kFinal).status();
     EXPECT_EQ(gone.code(), StatusCode::kUnavailable);
     EXPECT_NE(gone.message().find("`lightloom fetch` tries again"), std::string::npos) << gone.message();
+}
+
+/// Also when there is nothing new to say for longer than it would wait for a connection.
+TEST(Watch, GoesOnWhenTheCoordinatorIsBackInTime) {
+    FakeService service;
+    const std::string id = service.submit(service.spec(4));
+    auto server = std::move(GrpcServer::start(*service.coordinator, "127.0.0.1:0")).value();
+    const std::string address = "127.0.0.1:" + std::to_string(server->port());
+    GrpcJobPort jobs(open_channel(address));
+    std::atomic<int> changes{0};
+    Status ended;
+    std::jthread watch([&] { ended = jobs.watch_job(id, [&](const JobInfo&) { ++changes; }, {}); });
+    EXPECT_TRUE(testing::wait_until(60, [&] { return changes > 0; }));
+    server.reset();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    auto again = GrpcServer::start(*service.coordinator, address);
+    ASSERT_TRUE(again.ok()) << again.status().message();
+    std::this_thread::sleep_for(std::chrono::seconds(5));  // by then it would have given up
+    EXPECT_TRUE(service.coordinator->cancel_job(id).ok());
+    watch.join();
+    EXPECT_TRUE(ended.ok()) << ended.message();
+    EXPECT_GT(changes, 1);
 }
 
 }  // namespace
