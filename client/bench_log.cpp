@@ -1,7 +1,12 @@
 #include "client/bench_log.h"
 
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cerrno>
+#include <filesystem>
 #include <system_error>
 
 #include "common/core/digest.h"
@@ -15,6 +20,10 @@ bool begins_a_line(std::string_view text) {
     constexpr std::string_view kBegin = "{\"run\":\"";
     const size_t common = std::min(text.size(), kBegin.size());
     return text.substr(0, common) == kBegin.substr(0, common);
+}
+
+Status cannot_be_written(const std::string& path, int error) {
+    return invalid_argument(path + ": cannot be written: " + std::generic_category().message(error));
 }
 
 }  // namespace
@@ -99,17 +108,57 @@ Result<BenchHistory> parse_history(std::string_view text, const std::string& fil
     return history;
 }
 
-Result<BenchWriter> BenchWriter::open(const std::string& path, std::string_view content) {
-    LL_RETURN_IF_ERROR(write_file_atomically(path, content));
-    std::FILE* file = std::fopen(path.c_str(), "a");
-    if (!file) return invalid_argument(path + ": cannot be written: " + std::generic_category().message(errno));
-    return BenchWriter(path, file);
+Status exists_already(const std::string& path) {
+    return invalid_argument(path + " exists; go on with it by --resume or give another name");
+}
+
+Result<BenchWriter> BenchWriter::open(const std::string& path, bool resume) {
+    for (;;) {
+        File file(std::fopen(path.c_str(), resume ? "a" : "ax"));
+        if (!file && errno == EEXIST) return exists_already(path);
+        if (!file) return cannot_be_written(path, errno);
+        struct stat ours {}, named {};
+        if (::fstat(::fileno(file.get()), &ours) != 0) return cannot_be_written(path, errno);
+        if (!S_ISREG(ours.st_mode)) return BenchWriter(path, std::move(file));  // a pipe or a device, which anybody may use
+        if (::flock(::fileno(file.get()), LOCK_EX | LOCK_NB) != 0) {
+            if (errno != EWOULDBLOCK) return cannot_be_written(path, errno);
+            return failed_precondition(path + ": another bench is writing to it; wait for that one or give another name");
+        }
+        // Who had it may have replaced it between our opening and our locking it.
+        if (::stat(path.c_str(), &named) == 0 && named.st_ino == ours.st_ino && named.st_dev == ours.st_dev)
+            return BenchWriter(path, std::move(file));
+    }
+}
+
+Result<std::string> BenchWriter::text() const {
+    std::error_code ignored;
+    return std::filesystem::is_regular_file(path_, ignored) ? read_file(path_) : std::string();
+}
+
+Status BenchWriter::replace(std::string_view content) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path_, error)) return {};  // nothing was read from it either
+    const std::string target = std::filesystem::canonical(path_, error).string();
+    if (error) return cannot_be_written(path_, error.value());
+    // The new file is locked before it has the name, so that at no time anybody can lock what has it.
+    const std::string fresh = target + ".new-" + std::to_string(::getpid());
+    Status status = write_file_atomically(fresh, content);
+    File file(status.ok() ? std::fopen(fresh.c_str(), "a") : nullptr);
+    if (status.ok() && (!file || ::flock(::fileno(file.get()), LOCK_EX | LOCK_NB) != 0 ||
+                        std::rename(fresh.c_str(), target.c_str()) != 0))
+        status = cannot_be_written(path_, errno);
+    if (!status.ok()) {
+        std::filesystem::remove(fresh, error);
+        return status;
+    }
+    file_ = std::move(file);
+    return {};
 }
 
 Status BenchWriter::append(const Json& line) {
     const std::string text = line.dump() + "\n";
     if (std::fwrite(text.data(), 1, text.size(), file_.get()) == text.size() && std::fflush(file_.get()) == 0) return {};
-    return {StatusCode::kResourceExhausted, path_ + ": cannot be written: " + std::generic_category().message(errno)};
+    return {StatusCode::kResourceExhausted, cannot_be_written(path_, errno).message()};
 }
 
 }  // namespace lightloom::client

@@ -54,20 +54,28 @@ struct BenchHistory {
 /// is not JSON is an error that names it.
 Result<BenchHistory> parse_history(std::string_view text, const std::string& file_name, const std::set<std::string>& keys);
 
-/// Appends lines to a file; each is whole before the next begins.
+/// The error of a benchmark that would begin a file which is there.
+Status exists_already(const std::string& path);
+
+/// The file of a benchmark. No other process can open it as such meanwhile; each line is whole before the next begins.
 class BenchWriter {
   public:
-    /// Replaces the file by `content` first.
-    static Result<BenchWriter> open(const std::string& path, std::string_view content);
+    /// Makes the file; one that exists is refused unless `resume` is set, and always while another process has it open.
+    static Result<BenchWriter> open(const std::string& path, bool resume);
+    /// What it holds, for parse_history().
+    Result<std::string> text() const;
+    /// Replaces what it holds; after an error that is still there.
+    Status replace(std::string_view content);
     Status append(const Json& line);
 
   private:
     struct Close {
         void operator()(std::FILE* file) const { std::fclose(file); }
     };
-    BenchWriter(std::string path, std::FILE* file) : path_(std::move(path)), file_(file) {}
+    using File = std::unique_ptr<std::FILE, Close>;
+    BenchWriter(std::string path, File file) : path_(std::move(path)), file_(std::move(file)) {}
     std::string path_;
-    std::unique_ptr<std::FILE, Close> file_;
+    File file_;  ///< Locked.
 };
 
 /// One row per algorithm, in the order of `algorithms`: medians over the seeds, and ratios to the first row.

@@ -138,9 +138,7 @@ int bench(BenchOptions& options) {
     const auto choices = parse_choices(options.algorithms);
     if (!choices.ok()) return report_error(choices.status());
     std::error_code ignored;
-    const bool exists = std::filesystem::exists(options.out, ignored);
-    if (exists && !options.resume)
-        return report_error(invalid_argument(options.out + " exists; go on with it by --resume or give another name"));
+    if (!options.resume && std::filesystem::exists(options.out, ignored)) return report_error(exists_already(options.out));
     const auto reference_bytes = read_file(options.reference);
     if (!reference_bytes.ok()) return report_error(reference_bytes.status());
     const auto reference = decode_exr(*reference_bytes, options.reference);
@@ -177,21 +175,18 @@ int bench(BenchOptions& options) {
             keys.insert(runs.back().key());
         }
     }
-    BenchHistory history;
-    if (exists) {
-        const auto text = read_file(options.out);
-        if (!text.ok()) return report_error(text.status());
-        auto parsed = parse_history(*text, options.out, keys);
-        if (!parsed.ok()) return report_error(parsed.status());
-        history = std::move(parsed).value();
-    }
-    auto writer = BenchWriter::open(options.out, history.kept);
+    auto writer = BenchWriter::open(options.out, options.resume);
     if (!writer.ok()) return report_error(writer.status());
+    const auto text = writer->text();
+    if (!text.ok()) return report_error(text.status());
+    const auto history = parse_history(*text, options.out, keys);
+    if (!history.ok()) return report_error(history.status());
+    if (Status s = writer->replace(history->kept); !s.ok()) return report_error(s);
 
     std::vector<Json> done;
     std::vector<std::unique_ptr<LiveRun>> alive;
     for (const BenchRun& run : runs) {
-        if (const auto old = history.done.find(run.key()); old != history.done.end()) {
+        if (const auto old = history->done.find(run.key()); old != history->done.end()) {
             done.push_back(old->second);
             done.back()["label"] = run.algorithm.label;  // The same run may have been written differently.
             continue;

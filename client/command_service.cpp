@@ -1,7 +1,5 @@
 // lightloom submit, watch, fetch, cancel, list: the commands that talk to a service.
 
-#include <grpcpp/create_channel.h>
-
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -11,6 +9,7 @@
 #include "client/grpc_job_port.h"
 #include "client/progress.h"
 #include "client/run_job.h"
+#include "common/work/channel.h"
 
 namespace lightloom::client {
 namespace {
@@ -36,7 +35,7 @@ void add_server_option(CLI::App& command, ServiceOptions& options) {
 
 GrpcJobPort connect(const ServiceOptions& options) {
     (void)interrupt_token();  // before gRPC makes threads
-    return GrpcJobPort(grpc::CreateChannel(options.server, grpc::InsecureChannelCredentials()));
+    return GrpcJobPort(open_channel(options.server), {.stop = interrupt_token()});
 }
 
 int service_error(const ServiceOptions& options, const Status& status) {

@@ -3,7 +3,10 @@
 #include <grpcpp/client_context.h>
 
 #include <chrono>
+#include <cmath>
+#include <condition_variable>
 #include <fstream>
+#include <mutex>
 #include <thread>
 
 #include "common/work/wire.h"
@@ -11,20 +14,73 @@
 namespace lightloom {
 namespace {
 
-constexpr int kWatchAttempts = 20;
+using Clock = std::chrono::steady_clock;
+using Seconds = std::chrono::duration<double>;
+
+/// A coordinator that is restarted is back by then.
+constexpr auto kReconnect = std::chrono::seconds(5);
+constexpr auto kReconnectInterval = std::chrono::milliseconds(250);
 constexpr int kUploadAttempts = 5;
+/// Between looks at what another client is sending.
+constexpr auto kUploadInterval = std::chrono::milliseconds(500);
 constexpr size_t kDigestsPerCall = 1000;
 
 void set_deadline(grpc::ClientContext& context, double seconds) {
     context.set_deadline(std::chrono::system_clock::now() +
-                         std::chrono::duration_cast<std::chrono::system_clock::duration>(
-                             std::chrono::duration<double>(seconds)));
+                         std::chrono::duration_cast<std::chrono::system_clock::duration>(Seconds(seconds)));
 }
 
-Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientContext& context) {
+std::string seconds_text(double seconds) { return std::to_string(std::lround(seconds)) + " s"; }
+
+/// Whether there is a connection before `end`. Looks once at least, after a moment, so that no server is called without a pause.
+bool connected_before(Clock::time_point end, grpc::Channel& channel, const std::stop_token& stop) {
+    std::this_thread::sleep_for(kReconnectInterval);
+    do {
+        // Not GetState(): while nobody waits inside of gRPC, a connection makes a step every 5 s only.
+        if (channel.WaitForConnected(std::chrono::system_clock::now() + kReconnectInterval)) return true;
+    } while (Clock::now() < end && !stop.stop_requested());
+    return false;
+}
+
+/// Cancels a call in which nothing was heard for a while. A deadline would be one of the whole call, whose length is not known.
+class SilenceLimit {
+  public:
+    SilenceLimit(grpc::ClientContext& context, double seconds)
+        : limit_(std::chrono::duration_cast<Clock::duration>(Seconds(seconds))),
+          thread_([this, &context](std::stop_token ended) { watch(context, ended); }) {}
+    void heard() {
+        const std::lock_guard lock(mutex_);
+        last_ = Clock::now();
+    }
+    bool exceeded() {
+        const std::lock_guard lock(mutex_);
+        return exceeded_;
+    }
+
+  private:
+    void watch(grpc::ClientContext& context, const std::stop_token& ended) {
+        std::unique_lock lock(mutex_);
+        while (!ended.stop_requested() && !exceeded_) {
+            wake_.wait_until(lock, ended, last_ + limit_, [] { return false; });
+            exceeded_ = !ended.stop_requested() && Clock::now() >= last_ + limit_;
+        }
+        if (exceeded_) context.TryCancel();
+    }
+
+    const Clock::duration limit_;
+    std::mutex mutex_;
+    std::condition_variable_any wake_;
+    Clock::time_point last_ = Clock::now();
+    bool exceeded_ = false;
+    std::jthread thread_;  // last: ends before anything that it uses goes away
+};
+
+Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientContext& context, double silence_seconds) {
+    SilenceLimit silence(context, silence_seconds);
     std::string bytes;
     v1::Chunk chunk;
     while (reader.Read(&chunk)) {
+        silence.heard();
         if (chunk.offset_bytes() != bytes.size()) {
             context.TryCancel();
             (void)reader.Finish();
@@ -33,14 +89,24 @@ Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientC
         bytes += chunk.data();
     }
     const grpc::Status status = reader.Finish();
-    if (!status.ok()) return wire::from_grpc(status);
-    return bytes;
+    if (status.ok()) return bytes;
+    constexpr const char* kLater = "; nothing is lost, `lightloom fetch` tries again";
+    if (silence.exceeded())
+        return Status(StatusCode::kDeadlineExceeded,
+                      "nothing more has come from the coordinator for " + seconds_text(silence_seconds) + kLater);
+    if (status.error_code() == grpc::StatusCode::UNAVAILABLE)
+        return Status(StatusCode::kUnavailable,
+                      "the connection to the coordinator broke (" + status.error_message() + ")" + kLater);
+    return wire::from_grpc(status);
 }
 
 }  // namespace
 
-GrpcJobPort::GrpcJobPort(const std::shared_ptr<grpc::Channel>& channel)
-    : jobs_(v1::JobService::NewStub(channel)), assets_(v1::AssetService::NewStub(channel)) {}
+GrpcJobPort::GrpcJobPort(std::shared_ptr<grpc::Channel> channel, GrpcJobPortOptions options)
+    : channel_(std::move(channel)),
+      options_(std::move(options)),
+      jobs_(v1::JobService::NewStub(channel_)),
+      assets_(v1::AssetService::NewStub(channel_)) {}
 
 Result<JobInfo> GrpcJobPort::submit_job(const std::string& request_id, const JobSpec& spec) {
     grpc::ClientContext context;
@@ -94,7 +160,8 @@ Result<JobInfo> GrpcJobPort::cancel_job(const std::string& job_id) {
 Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
                               std::stop_token stop) {
     uint64_t seen = 0;
-    for (int attempt = 0;; ++attempt) {
+    Clock::time_point begin = Clock::now(), end = begin + kReconnect;
+    for (;; begin = Clock::now()) {
         grpc::ClientContext context;
         const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
         v1::WatchJobRequest request;
@@ -102,6 +169,7 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<voi
         request.set_after_revision(seen);
         const auto reader = jobs_->WatchJob(&context, request);
         v1::Job message;
+        bool heard = false;
         while (reader->Read(&message)) {
             const auto info = wire::get(message);
             if (!info.ok()) {
@@ -111,33 +179,33 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<voi
             }
             on_change(*info);
             seen = info->revision;
-            attempt = 0;
+            heard = true;
         }
         const grpc::Status status = reader->Finish();
+        const bool lost = status.error_code() == grpc::StatusCode::UNAVAILABLE;
+        // A stream may have nothing to say for hours; one that ends as soon as it has begun does not begin the wait again.
+        if (heard || Clock::now() - begin > kReconnect) end = Clock::now() + kReconnect;
+        const bool again = lost && !stop.stop_requested() && connected_before(end, *channel_, stop);
         if (stop.stop_requested()) return {StatusCode::kCancelled, "interrupted"};
-        if (status.error_code() != grpc::StatusCode::UNAVAILABLE || attempt >= kWatchAttempts)
-            return wire::from_grpc(status);
-        std::this_thread::sleep_for(std::chrono::milliseconds(250));
+        if (!again) return wire::from_grpc(status);
     }
 }
 
 Result<std::string> GrpcJobPort::image(const std::string& job_id, ImageKind kind) {
     grpc::ClientContext context;
-    set_deadline(context, 120);
     v1::GetImageRequest request;
     request.set_job_id(job_id);
     request.set_kind(kind == ImageKind::kFinal ? v1::IMAGE_KIND_FINAL : v1::IMAGE_KIND_PREVIEW);
     const auto reader = jobs_->GetImage(&context, request);
-    return collect(*reader, context);
+    return collect(*reader, context, options_.silence_seconds);
 }
 
 Result<std::string> GrpcJobPort::manifest(const std::string& job_id) {
     grpc::ClientContext context;
-    set_deadline(context, 60);
     v1::GetManifestRequest request;
     request.set_job_id(job_id);
     const auto reader = jobs_->GetManifest(&context, request);
-    return collect(*reader, context);
+    return collect(*reader, context, options_.silence_seconds);
 }
 
 Result<std::vector<Digest>> GrpcJobPort::find_missing(const std::vector<Digest>& digests) {
@@ -160,52 +228,77 @@ Result<std::vector<Digest>> GrpcJobPort::find_missing(const std::vector<Digest>&
     return missing;
 }
 
-Status GrpcJobPort::send(const Digest& digest, uint64_t size,
-                         const std::function<Result<std::string_view>(uint64_t offset)>& source) {
-    Status last;
-    for (int attempt = 0; attempt < kUploadAttempts; ++attempt) {
-        if (attempt > 0) std::this_thread::sleep_for(std::chrono::milliseconds(200 * attempt));
-        v1::QueryWriteResponse present;
-        {
-            grpc::ClientContext context;
-            set_deadline(context, 10);
-            v1::QueryWriteRequest request;
-            wire::put(digest, request.mutable_digest());
-            last = wire::from_grpc(assets_->QueryWrite(&context, request, &present));
-            if (last.code() == StatusCode::kUnavailable) continue;
-            if (!last.ok()) return last;
-            if (present.complete()) return {};
+Result<v1::QueryWriteResponse> GrpcJobPort::query_write(const Digest& digest) {
+    grpc::ClientContext context;
+    set_deadline(context, 10);
+    const std::stop_callback cancel(options_.stop, [&] { context.TryCancel(); });
+    v1::QueryWriteRequest request;
+    wire::put(digest, request.mutable_digest());
+    v1::QueryWriteResponse response;
+    const grpc::Status status = assets_->QueryWrite(&context, request, &response);
+    if (!status.ok()) return wire::from_grpc(status);
+    return response;
+}
+
+Status GrpcJobPort::write(const Digest& digest, uint64_t size, uint64_t offset, const Source& source) {
+    grpc::ClientContext context;
+    set_deadline(context, 120.0 * double(1 + (size >> 26)));
+    const std::stop_callback cancel(options_.stop, [&] { context.TryCancel(); });
+    v1::WriteResponse response;
+    const auto writer = assets_->Write(&context, &response);
+    v1::WriteRequest message;
+    wire::put(digest, message.mutable_header()->mutable_digest());
+    message.mutable_header()->set_size_bytes(size);
+    bool open = writer->Write(message);
+    while (open && offset < size) {
+        const auto bytes = source(offset);
+        if (!bytes.ok()) {
+            context.TryCancel();
+            (void)writer->Finish();
+            return bytes.status();
         }
-        grpc::ClientContext context;
-        set_deadline(context, 120.0 * double(1 + (size >> 26)));
-        v1::WriteResponse response;
-        const auto writer = assets_->Write(&context, &response);
-        v1::WriteRequest message;
-        wire::put(digest, message.mutable_header()->mutable_digest());
-        message.mutable_header()->set_size_bytes(size);
-        bool open = writer->Write(message);
-        uint64_t offset = present.committed_size_bytes() <= size ? present.committed_size_bytes() : 0;
-        while (open && offset < size) {
-            const auto bytes = source(offset);
-            if (!bytes.ok()) {
-                context.TryCancel();
-                (void)writer->Finish();
-                return bytes.status();
-            }
-            message.mutable_chunk()->set_offset_bytes(offset);
-            message.mutable_chunk()->set_data(bytes->data(), bytes->size());
-            open = writer->Write(message);
-            offset += bytes->size();
-        }
-        writer->WritesDone();
-        last = wire::from_grpc(writer->Finish());
-        if (last.ok()) return last;
-        const StatusCode code = last.code();
-        if (code != StatusCode::kUnavailable && code != StatusCode::kAborted && code != StatusCode::kOutOfRange &&
-            code != StatusCode::kDataLoss)
-            return last;
+        message.mutable_chunk()->set_offset_bytes(offset);
+        message.mutable_chunk()->set_data(bytes->data(), bytes->size());
+        open = writer->Write(message);
+        offset += bytes->size();
     }
-    return last;
+    writer->WritesDone();
+    return wire::from_grpc(writer->Finish());
+}
+
+Status GrpcJobPort::send(const Digest& digest, uint64_t size, const std::string& name, const Source& source) {
+    uint64_t committed = 0;
+    Clock::time_point grown = Clock::now();
+    bool theirs = false;  // another client is sending the same file
+    for (int failures = 0;;) {
+        const auto present = query_write(digest);
+        Status status = present.status();
+        if (present.ok()) {
+            if (present->complete()) return {};
+            const bool growing = present->committed_size_bytes() != committed;
+            committed = present->committed_size_bytes();
+            if (growing) grown = Clock::now();
+            // While theirs moves on, an attempt of ours would only cost both of us time.
+            status = theirs && growing ? Status(StatusCode::kAborted, "")
+                                       : write(digest, size, committed <= size ? committed : 0, source);
+            if (status.ok()) return status;
+        }
+        if (options_.stop.stop_requested()) return {StatusCode::kCancelled, "interrupted"};
+        theirs = status.code() == StatusCode::kAborted;
+        if (theirs) {
+            // The other client may have died: the coordinator takes as long as its keepalive to notice that.
+            if (Clock::now() - grown >= Seconds(options_.upload_silence_seconds))
+                return {StatusCode::kAborted,
+                        name + ": another client is sending this file, but nothing more of it has arrived for " +
+                            seconds_text(options_.upload_silence_seconds) + "; try again later"};
+            std::this_thread::sleep_for(kUploadInterval);
+            continue;
+        }
+        const StatusCode code = status.code();
+        const bool again = code == StatusCode::kUnavailable || code == StatusCode::kOutOfRange || code == StatusCode::kDataLoss;
+        if (!again || ++failures == kUploadAttempts) return status;
+        std::this_thread::sleep_for(std::chrono::milliseconds(200 * failures));
+    }
 }
 
 Status GrpcJobPort::upload(const Digest& digest, const std::filesystem::path& path) {
@@ -213,7 +306,7 @@ Status GrpcJobPort::upload(const Digest& digest, const std::filesystem::path& pa
     if (!in) return not_found(path.string() + ": cannot be opened");
     const auto size = uint64_t(in.tellg());
     std::string buffer;
-    return send(digest, size, [&](uint64_t offset) -> Result<std::string_view> {
+    return send(digest, size, path.string(), [&](uint64_t offset) -> Result<std::string_view> {
         buffer.resize(std::min<uint64_t>(kMaxChunkBytes, size - offset));
         in.seekg(std::streamoff(offset));
         in.read(buffer.data(), std::streamsize(buffer.size()));
@@ -223,7 +316,7 @@ Status GrpcJobPort::upload(const Digest& digest, const std::filesystem::path& pa
 }
 
 Status GrpcJobPort::upload_bytes(const Digest& digest, std::string_view bytes) {
-    return send(digest, bytes.size(), [&](uint64_t offset) -> Result<std::string_view> {
+    return send(digest, bytes.size(), "the scene's list of files", [&](uint64_t offset) -> Result<std::string_view> {
         return bytes.substr(offset, kMaxChunkBytes);
     });
 }

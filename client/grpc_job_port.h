@@ -3,15 +3,23 @@
 
 #include <grpcpp/channel.h>
 
+#include <stop_token>
+
 #include "common/work/service.h"
 #include "lightloom/v1/asset_service.grpc.pb.h"
 #include "lightloom/v1/job_service.grpc.pb.h"
 
 namespace lightloom {
 
+struct GrpcJobPortOptions {
+    std::stop_token stop;  ///< Of uploads: kCancelled soon after a request. What follows one, such as a cancellation, goes on.
+    double silence_seconds = 120;        ///< In which nothing more of an image arrives.
+    double upload_silence_seconds = 60;  ///< In which nothing more of a file arrives that another client is sending.
+};
+
 class GrpcJobPort final : public JobPort {
   public:
-    explicit GrpcJobPort(const std::shared_ptr<grpc::Channel>& channel);
+    explicit GrpcJobPort(std::shared_ptr<grpc::Channel> channel, GrpcJobPortOptions options = {});
     Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec) override;
     Result<JobInfo> get_job(const std::string& job_id) override;
     Result<std::vector<JobInfo>> list_jobs() override;
@@ -25,8 +33,15 @@ class GrpcJobPort final : public JobPort {
     Status upload_bytes(const Digest& digest, std::string_view bytes) override;
 
   private:
-    Status send(const Digest& digest, uint64_t size,
-                const std::function<Result<std::string_view>(uint64_t offset)>& source);
+    using Source = std::function<Result<std::string_view>(uint64_t offset)>;
+    /// Sends what is not there yet, however often it takes. `name` is for people.
+    Status send(const Digest& digest, uint64_t size, const std::string& name, const Source& source);
+    Result<v1::QueryWriteResponse> query_write(const Digest& digest);
+    /// One attempt, from `offset`.
+    Status write(const Digest& digest, uint64_t size, uint64_t offset, const Source& source);
+
+    std::shared_ptr<grpc::Channel> channel_;
+    GrpcJobPortOptions options_;
     std::unique_ptr<v1::JobService::Stub> jobs_;
     std::unique_ptr<v1::AssetService::Stub> assets_;
 };

@@ -7,6 +7,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "common/work/channel.h"
 #include "server/asset_service.h"
 #include "server/job_service.h"
 #include "server/worker_service.h"
@@ -52,9 +53,9 @@ Result<std::unique_ptr<GrpcServer>> GrpcServer::start(Coordinator& coordinator, 
     grpc::ServerBuilder builder;
     // One coordinator per port: without this a second one would share it silently.
     builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 20000);
-    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
-    builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5000);
+    set_keepalive([&](const char* name, int value) { builder.AddChannelArgument(name, value); });
+    // Clients and workers that ask more often than this are cut off.
+    builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kKeepaliveMilliseconds / 4);
     builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 64);
     builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &server->port_);
     builder.RegisterService(&server->services_->job);

@@ -2,15 +2,14 @@
 
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <type_traits>
-#include <vector>
 
 #include "common/film/atomic_file.h"
 #include "common/tables/subspace_tables.h"
+#include "common/work/cache_trim.h"
 
 namespace lightloom {
 namespace {
@@ -20,6 +19,8 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kMagic = "lightloom-table-cache 1 ";
 constexpr const char* kExtension = ".tables";
+/// In the names under which write_file_atomically() begins an entry.
+constexpr const char* kTemporary = ".tables.tmp-";
 
 /// Length-prefixed, so that no two sets of values can have the same text.
 void put(std::string& out, std::string_view name, std::string_view value) {
@@ -170,29 +171,11 @@ void TableCache::store(const Digest& key, std::string_view bytes, const TablesIn
 }
 
 void TableCache::trim(const Digest& newest) const {
-    struct File {
-        fs::file_time_type used;
-        fs::path path;
-        uint64_t size;
-    };
-    std::vector<File> files;
-    uint64_t total = 0;
-    std::error_code error;  // another process may remove a file under our eyes
-    for (const auto& item : fs::directory_iterator(directory_, error)) {
-        if (item.path().extension() != kExtension) continue;
-        File file{item.last_write_time(error), item.path(), 0};
-        if (error) continue;
-        file.size = item.file_size(error);
-        if (error) continue;
-        total += file.size;
-        if (item.path() != path_of(newest)) files.push_back(std::move(file));
-    }
-    std::sort(files.begin(), files.end(), [](const File& a, const File& b) { return a.used < b.used; });
-    for (const File& file : files) {
-        if (total <= max_bytes_) break;
-        fs::remove(file.path, error);
-        total -= file.size;
-    }
+    trim_cache({directory_}, max_bytes_, path_of(newest), [](const fs::path& path) {
+        if (path.extension() == kExtension) return CacheFile::kEntry;
+        const bool temporary = path.filename().string().find(kTemporary) != std::string::npos;
+        return temporary ? CacheFile::kUnfinished : CacheFile::kForeign;
+    });
 }
 
 }  // namespace lightloom

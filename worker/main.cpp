@@ -1,6 +1,5 @@
 // lightloom-worker: renders units for a coordinator.
 
-#include <grpcpp/create_channel.h>
 #include <signal.h>
 #include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
@@ -14,6 +13,7 @@
 
 #include "common/cli/log.h"
 #include "common/cli/numbers.h"
+#include "common/work/channel.h"
 #include "common/work/identity.h"
 #include "worker/grpc_worker_port.h"
 #include "worker/scene_cache.h"
@@ -53,7 +53,7 @@ int main(int argc, char** argv) {
     uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
     app.add_option("--server", server, "HOST:PORT of the coordinator")->capture_default_str();
     app.add_option("--threads", threads, "Threads to render with")->check(whole_number_between(1, 1024))->capture_default_str();
-    app.add_option("--cache", cache, "Directory for scene files and tables; may be shared by the workers of a host")
+    app.add_option("--cache", cache, "Directory for scene files, and for tables up to 1 GB; may be shared by the workers of a host")
         ->capture_default_str();
     app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
     app.add_option("--pretend-golden-digest", golden_override, "")->group("");  // tests of the refusal
@@ -93,11 +93,7 @@ int main(int argc, char** argv) {
         if (!digest.ok()) return 2;
         identity->golden_digest = *digest;
     }
-    grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 20000);
-    arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
-    arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2000);
-    GrpcWorkerPort port(grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments));
+    GrpcWorkerPort port(open_channel(server));
     SceneFetcher fetcher(port, cache);
     if (const Status usable = fetcher.check_directory(); !usable.ok()) {
         spdlog::error("--cache {}", usable.message());

@@ -20,6 +20,9 @@ constexpr int kTableAttempts = 3;
 /// The list of a scene's files; far above any real scene's.
 constexpr uint64_t kMaxManifestBytes = uint64_t(64) << 20;
 
+/// Between looks at what another process has under its hands.
+constexpr auto kOtherWorker = std::chrono::milliseconds(50);
+
 /// A process id alone is not enough: containers that share the cache may all run as process 1.
 std::string scratch_name() {
     std::random_device device;
@@ -28,8 +31,13 @@ std::string scratch_name() {
 
 }  // namespace
 
-SceneFetcher::SceneFetcher(WorkerPort& port, std::filesystem::path directory)
-    : port_(port), scratch_(directory / scratch_name()), store_(directory / "assets") {}
+// "tables" is taken: there the client has the table cache of its own coordinator, by default below the same directory.
+SceneFetcher::SceneFetcher(WorkerPort& port, std::filesystem::path directory, uint64_t max_table_bytes)
+    : port_(port),
+      scratch_(directory / scratch_name()),
+      store_(directory / "assets"),
+      table_store_(directory / "worker-tables"),
+      max_table_bytes_(max_table_bytes) {}
 
 SceneFetcher::~SceneFetcher() {
     std::error_code ignored;
@@ -46,13 +54,13 @@ Status SceneFetcher::check_directory() const {
     return {};
 }
 
-Status SceneFetcher::fetch(const Digest& digest, uint64_t size_bytes, std::stop_token stop) {
-    while (!store_.contains(digest)) {
+Status SceneFetcher::fetch(AssetStore& store, const Digest& digest, uint64_t size_bytes, std::stop_token stop) {
+    while (!store.contains(digest)) {
         if (stop.stop_requested()) return {StatusCode::kCancelled, "stopped"};
-        auto upload = store_.begin_upload(digest, size_bytes);
+        auto upload = store.begin_upload(digest, size_bytes);
         if (!upload.ok() && upload.status().code() == StatusCode::kAborted) {
             // Another worker of this host fetches the same file into the same directory.
-            std::this_thread::sleep_for(std::chrono::milliseconds(50));
+            std::this_thread::sleep_for(kOtherWorker);
             continue;
         }
         if (!upload.ok()) return upload.status();
@@ -75,16 +83,21 @@ Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, st
             text += bytes;
             return {};
         }));
-        const Status status = store_.put(root, text);
-        if (!status.ok() && status.code() != StatusCode::kAborted) return status;
-        while (!store_.contains(root) && !stop.stop_requested())
-            std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        for (;;) {
+            const Status status = store_.put(root, text);
+            if (status.ok()) break;
+            if (status.code() != StatusCode::kAborted) return status;
+            // Another worker of this host stores the same list; if it dies over that, the next attempt stores it.
+            if (stop.stop_requested()) return Status(StatusCode::kCancelled, "stopped");
+            std::this_thread::sleep_for(kOtherWorker);
+        }
     }
     const auto text = store_.read(root);
     if (!text.ok()) return text.status();
     const auto manifest = AssetManifest::parse(*text);
     if (!manifest.ok()) return manifest.status();
-    for (const AssetEntry& entry : manifest->entries) LL_RETURN_IF_ERROR(fetch(entry.digest, entry.size_bytes, stop));
+    for (const AssetEntry& entry : manifest->entries)
+        LL_RETURN_IF_ERROR(fetch(store_, entry.digest, entry.size_bytes, stop));
 
     const std::filesystem::path directory = scratch_ / root.hex();
     LL_RETURN_IF_ERROR(store_.materialise(*manifest, directory));
@@ -101,12 +114,16 @@ Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, st
 Result<std::string> SceneFetcher::tables(const AssetReference& tables, std::stop_token stop) {
     Status status;
     for (int attempt = 0; attempt < kTableAttempts; ++attempt) {
-        status = fetch(tables.digest, tables.size_bytes, stop);
+        status = fetch(table_store_, tables.digest, tables.size_bytes, stop);
         if (status.ok()) {
-            auto bytes = store_.read(tables.digest);
-            if (bytes.ok()) return bytes;
+            auto bytes = table_store_.read(tables.digest);  // which fails if another worker has just trimmed them away
+            if (bytes.ok()) {
+                table_store_.touch(tables.digest);
+                table_store_.trim(max_table_bytes_, tables.digest);
+                return bytes;
+            }
             status = bytes.status();
-            store_.remove(tables.digest);
+            table_store_.remove(tables.digest);
         } else if (status.code() == StatusCode::kInvalidArgument || status.code() == StatusCode::kOutOfRange) {
             // More or fewer bytes than announced: the file was cut short there, or what is left of an earlier attempt here.
             status = data_loss("the tables have the wrong size: " + status.message());

@@ -19,10 +19,11 @@ using TableSource = std::function<Result<std::string>(const AssetReference& tabl
 /// A table source without a directory, for workers in the coordinator's process. `port` must outlive it.
 TableSource direct_tables(WorkerPort& port);
 
-/// Fetches from the coordinator behind `port`. `directory` may be shared by several workers of a host.
+/// Fetches from the coordinator behind `port`. `directory` may be shared by several workers of a host. Of the tables in it, those
+/// that were used least recently are removed above `max_table_bytes`.
 class SceneFetcher {
   public:
-    SceneFetcher(WorkerPort& port, std::filesystem::path directory);
+    SceneFetcher(WorkerPort& port, std::filesystem::path directory, uint64_t max_table_bytes = uint64_t(1) << 30);
     ~SceneFetcher();
     /// Whether files can be kept there: a worker without that fails every unit that it gets.
     Status check_directory() const;
@@ -30,11 +31,13 @@ class SceneFetcher {
     Result<std::string> tables(const AssetReference& tables, std::stop_token stop);
 
   private:
-    Status fetch(const Digest& digest, uint64_t size_bytes, std::stop_token stop);
+    Status fetch(AssetStore& store, const Digest& digest, uint64_t size_bytes, std::stop_token stop);
 
     WorkerPort& port_;
     std::filesystem::path scratch_;  ///< Of this process; removed at the end.
-    AssetStore store_;
+    AssetStore store_;               ///< Of scene files, and of the lists of them.
+    AssetStore table_store_;
+    const uint64_t max_table_bytes_;
 };
 
 /// Keeps the last few scenes and renderers, and the last tracer.

@@ -59,6 +59,11 @@ class AssetStore {
     Status put(const Digest& digest, std::string_view bytes);
     /// Forgets a file that turned out to be damaged, so that it can be fetched or stored again.
     void remove(const Digest& digest);
+    /// Says that a file was used, for trim().
+    void touch(const Digest& digest) const;
+    /// Removes the complete files that were used least recently until those that are left have `max_bytes` at most, but never
+    /// `newest`, and uploads that broke off an hour ago.
+    void trim(uint64_t max_bytes, const Digest& newest) const;
     /// Removes the complete files that begin with `prefix`; their number.
     size_t remove_all_that_begin_with(std::string_view prefix);
 

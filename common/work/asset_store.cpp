@@ -9,6 +9,7 @@
 
 #include "common/film/atomic_file.h"
 #include "common/work/asset.h"
+#include "common/work/cache_trim.h"
 
 namespace lightloom {
 namespace fs = std::filesystem;
@@ -98,6 +99,22 @@ void AssetStore::remove(const Digest& digest) {
     fs::remove(path_of(digest), ignored);
 }
 
+void AssetStore::touch(const Digest& digest) const {
+    std::error_code ignored;
+    fs::last_write_time(path_of(digest), fs::file_time_type::clock::now(), ignored);
+}
+
+void AssetStore::trim(uint64_t max_bytes, const Digest& newest) const {
+    const fs::path incoming = directory_ / "incoming";
+    std::vector<fs::path> directories;
+    std::error_code error;
+    for (const auto& item : fs::directory_iterator(directory_, error))
+        if (item.is_directory(error)) directories.push_back(item.path());
+    trim_cache(directories, max_bytes, path_of(newest), [&](const fs::path& path) {
+        return path.parent_path() == incoming ? CacheFile::kUnfinished : CacheFile::kEntry;
+    });
+}
+
 size_t AssetStore::remove_all_that_begin_with(std::string_view prefix) {
     size_t count = 0;
     std::error_code error;
@@ -127,8 +144,10 @@ Result<AssetStore::Upload> AssetStore::begin_upload(const Digest& digest, uint64
     const int error = errno;
     Upload upload(this, digest, size_bytes, 0, file);
     if (file < 0) return io_error(path, error);
-    // Another process may share the directory; and it may have published this very file between our open and our lock.
-    if (::flock(file, LOCK_EX | LOCK_NB) != 0 || contains(digest))
+    // Another process may share the directory; and it may have published or removed this very file between our open and our lock.
+    struct stat ours {}, named {};
+    if (::flock(file, LOCK_EX | LOCK_NB) != 0 || contains(digest) || ::fstat(file, &ours) != 0 ||
+        ::stat(path.c_str(), &named) != 0 || ours.st_ino != named.st_ino)
         return Status(StatusCode::kAborted, "asset " + digest.hex() + " is being stored by another process");
     const off_t offset = ::lseek(file, 0, SEEK_END);
     upload.offset_ = uint64_t(offset);

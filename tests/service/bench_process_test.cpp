@@ -135,6 +135,29 @@ TEST_F(Bench, RunsAreLoggedAndResumed) {
     EXPECT_EQ(checkpoints_of_one, 1u) << "lines of the torn run are gone";
 }
 
+TEST_F(Bench, TwoDoNotWriteToOneFile) {
+    make_reference();
+    const std::vector<std::string> arguments{"bench",       kScene, "--reference", path("ref.exr"),    "--algorithms", "path",
+                                             "--threads",   "1",    "--seeds",     "1",                "--time",       "60",
+                                             "--threshold", "20",   "--out",       path("runs.jsonl"), "--resume"};
+    const Process first("lightloom", arguments, path("first.log"));
+    const auto size = [&] {
+        std::error_code none;
+        const auto bytes = std::filesystem::file_size(path("runs.jsonl"), none);
+        return none ? 0 : bytes;
+    };
+    ASSERT_TRUE(testing::wait_until(60, [&] { return size() > 0; })) << *read_file(path("first.log"));
+    EXPECT_EQ(run(arguments), 1) << output();
+    EXPECT_NE(output().find("runs.jsonl: another bench is writing to it"), std::string::npos) << output();
+    const auto before = size();
+    EXPECT_TRUE(testing::wait_until(60, [&] { return size() > before; })) << "the first goes on in the same file";
+    first.signal(SIGKILL);
+    ASSERT_TRUE(testing::wait_until(60, [&] { return first.ended(); }));
+    std::vector<std::string> shorter = arguments;
+    shorter[11] = "0.1";
+    EXPECT_EQ(run(shorter), 0) << "a dead one holds nothing: " << output();
+}
+
 TEST_F(Bench, MistakesAreRefusedBeforeAnythingIsRendered) {
     make_reference();
     const auto bench = [&](std::vector<std::string> more) {

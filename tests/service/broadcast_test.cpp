@@ -52,7 +52,7 @@ TEST(Broadcast, DamagedTablesAreFetchedAgain) {
     EXPECT_EQ(port.reads, 2) << "the first came damaged";
     EXPECT_TRUE(fetcher.tables(asset, {}).ok());
     EXPECT_EQ(port.reads, 2) << "they travel once";
-    const std::filesystem::path file = AssetStore(directory.path / "assets").path_of(asset.digest);
+    const std::filesystem::path file = AssetStore(directory.path / "worker-tables").path_of(asset.digest);
     std::string damaged = bytes;
     damaged[damaged.size() / 2] ^= 1;
     ASSERT_TRUE(write_file_atomically(file.string(), damaged).ok());
@@ -79,7 +79,7 @@ TEST(Broadcast, ShortenedTablesAreFetchedAgain) {
     ASSERT_TRUE(fetcher.tables(asset, {}).ok());
     int reads = 1;
     for (const size_t size : {bytes.size() - 1, bytes.size() / 2, size_t(0)}) {
-        std::filesystem::resize_file(AssetStore(directory.path / "assets").path_of(asset.digest), size);
+        std::filesystem::resize_file(AssetStore(directory.path / "worker-tables").path_of(asset.digest), size);
         const auto got = fetcher.tables(asset, {});
         ASSERT_TRUE(got.ok()) << size << ": " << got.status().message();
         EXPECT_EQ(*got, bytes) << size;

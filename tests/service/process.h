@@ -41,6 +41,10 @@ class Process {
     }
     pid_t pid() const { return pid_; }
     void signal(int number) const { ::kill(pid_, number); }
+    bool ended() const {
+        siginfo_t info{};
+        return ::waitid(P_PID, id_t(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == pid_;
+    }
     /// Exit code, or 128 + signal.
     int wait() {
         int status = 0;

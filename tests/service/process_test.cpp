@@ -130,6 +130,20 @@ TEST(Processes, TwoProcessesRenderDisjointUnits) {
     EXPECT_EQ(manifest["image"]["sha256"].get<std::string>(), service.digest("image").hex());
 }
 
+TEST(Processes, AClientNoticesThatTheCoordinatorHasGoneSilent) {
+    const Service service;
+    const auto submitted = service.submit("image", {"--spp", "4", "--resolution", "16x16"});  // and no worker ever comes
+    ASSERT_TRUE(wait_until(60, [&] {
+        const auto list = service.jobs().list_jobs();
+        return list.ok() && !list->empty() && list->front().state == JobState::kRunning;
+    })) << service.log("image");
+    service.server->signal(SIGSTOP);
+    EXPECT_TRUE(wait_until(60, [&] { return submitted->ended(); })) << "30 s until it notices, and 5 s for a restart";
+    submitted->signal(SIGKILL);  // or else it might wait for ever
+    EXPECT_EQ(submitted->wait(), 4);
+    EXPECT_NE(service.log("image").find("no answer from " + service.address()), std::string::npos) << service.log("image");
+}
+
 TEST(Processes, AWorkerKilledMidUnitCostsTimeOnly) {
     const Service service;
     std::vector<std::string> job{"--algorithm", "bdpt", "--spp", "12", "--resolution", "256x256"};

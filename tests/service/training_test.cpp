@@ -331,6 +331,24 @@ TEST(TableCache, DamagedEntriesAreRemovedAndTheDirectoryStaysBounded) {
     EXPECT_FALSE(TableCache({}, 1000).find(key));
 }
 
+TEST(TableCache, WhatAKilledProcessBeganIsRemoved) {
+    const TempDirectory directory;
+    const std::string bytes = serialize(trivial_tables(golden()->emitters()));
+    const TableCache cache(directory.path, 1 << 20);
+    const auto path = [&](const std::string& name) { return directory.path / name; };
+    const std::string entry = sha256("a").hex() + ".tables", old = entry + ".tmp-1-0", young = entry + ".tmp-2-0";
+    for (const std::string& name : {old, young, std::string("notes.txt")}) {
+        std::ofstream(path(name)) << "x";
+        if (name == young) continue;
+        std::filesystem::last_write_time(path(name), std::filesystem::file_time_type::clock::now() - std::chrono::hours(2));
+    }
+    cache.store(sha256("b"), bytes, {});
+    EXPECT_FALSE(std::filesystem::exists(path(old)));
+    EXPECT_TRUE(std::filesystem::exists(path(young))) << "somebody may be writing it";
+    EXPECT_TRUE(std::filesystem::exists(path("notes.txt"))) << "which is none of ours";
+    EXPECT_TRUE(cache.find(sha256("b")));
+}
+
 TEST(TableCache, AMalformedReportIsADamagedEntry) {
     const TempDirectory directory;
     const std::string bytes = serialize(trivial_tables(golden()->emitters()));

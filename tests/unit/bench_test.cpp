@@ -170,13 +170,46 @@ TEST(BenchHistory, DamageElsewhereIsNamed) {
 TEST(BenchWriter, LinesAreReadBack) {
     const std::string path = (std::filesystem::temp_directory_path() / ("bench-writer-" + std::to_string(::getpid()))).string();
     {
-        auto writer = BenchWriter::open(path, "{\"run\":\"a\",\"done\":true}\n");
+        auto writer = BenchWriter::open(path, false);
         ASSERT_TRUE(writer.ok()) << writer.status().message();
+        ASSERT_TRUE(writer->append({{"run", "x"}, {"done", true}}).ok());
+        EXPECT_EQ(parse_history(*writer->text(), path, {})->done.size(), 1u);
+        ASSERT_TRUE(writer->replace("{\"run\":\"a\",\"done\":true}\n").ok());
         ASSERT_TRUE(writer->append({{"run", "b"}, {"done", true}}).ok());
     }
     EXPECT_EQ(parse_history(*read_file(path), path, {})->done.size(), 2u);
+    EXPECT_NE(BenchWriter::open(path, false).status().message().find("--resume"), std::string::npos);
     std::filesystem::remove(path);
-    EXPECT_FALSE(BenchWriter::open("/no/such/directory/file", "").ok());
+    for (const bool resume : {false, true}) EXPECT_FALSE(BenchWriter::open("/no/such/directory/file", resume).ok());
+}
+
+/// Two processes that both go on with it would lose what the first one finishes.
+TEST(BenchWriter, AFileHasOneWriterUnderAllOfItsNames) {
+    const std::filesystem::path directory =
+        std::filesystem::temp_directory_path() / ("bench-writers-" + std::to_string(::getpid()));
+    std::filesystem::create_directory(directory);
+    const std::string path = directory / "a.jsonl", link = directory / "link.jsonl";
+    std::filesystem::create_symlink("a.jsonl", link);
+    const auto refused = [](const std::string& name) {
+        return BenchWriter::open(name, true).status().message().find("another bench") != std::string::npos;
+    };
+    {
+        auto first = BenchWriter::open(path, true);
+        ASSERT_TRUE(first.ok()) << first.status().message();
+        EXPECT_TRUE(refused(path));
+        ASSERT_TRUE(first->replace("").ok());
+        EXPECT_TRUE(refused(path)) << "the new file is locked, too";
+        EXPECT_TRUE(refused(link));
+    }
+    auto second = BenchWriter::open(link, true);
+    ASSERT_TRUE(second.ok()) << second.status().message();
+    ASSERT_TRUE(second->replace("").ok());
+    EXPECT_TRUE(std::filesystem::is_symlink(link));
+    EXPECT_TRUE(refused(path));
+    size_t files = 0;
+    for ([[maybe_unused]] const auto& item : std::filesystem::directory_iterator(directory)) ++files;
+    EXPECT_EQ(files, 2u) << "nothing else is left there";
+    std::filesystem::remove_all(directory);
 }
 
 Json finished(const std::string& label, double preparation, const std::vector<CurvePoint>& curve) {

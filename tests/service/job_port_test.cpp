@@ -1,0 +1,136 @@
+// A client's calls over gRPC when others are in the way, slow, or gone.
+
+#include <grpcpp/create_channel.h>
+#include <grpcpp/server_builder.h>
+#include <gtest/gtest.h>
+
+#include "client/grpc_job_port.h"
+#include "common/film/atomic_file.h"
+#include "common/work/channel.h"
+#include "server/grpc_services.h"
+#include "tests/service/fake.h"
+#include "tests/service/process.h"
+
+namespace lightloom {
+namespace {
+
+using testing::FakeService;
+using testing::TempDirectory;
+using Clock = std::chrono::steady_clock;
+
+std::shared_ptr<grpc::Channel> channel_to(int port) {
+    return grpc::CreateChannel("127.0.0.1:" + std::to_string(port), grpc::InsecureChannelCredentials());
+}
+
+/// A file that somebody else has begun to upload.
+struct Upload : ::testing::Test {
+    FakeService service;
+    std::unique_ptr<GrpcServer> server = std::move(GrpcServer::start(*service.coordinator, "127.0.0.1:0")).value();
+    const std::string bytes = std::string(1 << 20, 'x') + "y";
+    const Digest digest = sha256(bytes);
+    std::optional<AssetStore::Upload> other{std::move(service.coordinator->assets().begin_upload(digest, bytes.size())).value()};
+};
+
+TEST_F(Upload, WaitsForAnotherOneOfTheSameFileAndGoesOnWhereThatBreaksOff) {
+    GrpcJobPort jobs(channel_to(server->port()), {.upload_silence_seconds = 10});
+    std::jthread thread([&] {
+        for (int i = 0; i < 10; ++i) {  // in all far longer than a few attempts take
+            EXPECT_TRUE(other->append(std::string(100, 'x')).ok());
+            std::this_thread::sleep_for(std::chrono::milliseconds(400));
+        }
+        other.reset();
+    });
+    const Status status = jobs.upload_bytes(digest, bytes);
+    EXPECT_TRUE(status.ok()) << status.message();
+    EXPECT_FALSE(other);
+    const auto stored = service.coordinator->assets().read(digest);
+    EXPECT_TRUE(stored.ok()) << stored.status().message();
+}
+
+TEST_F(Upload, GivesUpWhenTheOtherOneStandsStill) {
+    const TempDirectory directory;
+    const std::string path = (directory.path / "a.ply").string();
+    ASSERT_TRUE(write_file_atomically(path, bytes).ok());
+    GrpcJobPort jobs(channel_to(server->port()), {.upload_silence_seconds = 1});
+    const Status status = jobs.upload(digest, path);
+    EXPECT_EQ(status.code(), StatusCode::kAborted);
+    EXPECT_EQ(status.message().rfind(path + ": another client is sending this file", 0), 0u) << status.message();
+    EXPECT_NE(status.message().find("for 1 s; try again later"), std::string::npos) << status.message();
+}
+
+TEST_F(Upload, CanBeInterruptedWhileItWaits) {
+    std::stop_source stop;
+    GrpcJobPort jobs(channel_to(server->port()), {.stop = stop.get_token()});
+    std::jthread thread([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(300));
+        stop.request_stop();
+    });
+    const auto begin = Clock::now();
+    EXPECT_EQ(jobs.upload_bytes(digest, bytes).code(), StatusCode::kCancelled);
+    EXPECT_LT(Clock::now() - begin, std::chrono::seconds(20));
+}
+
+/// Sends `chunks` bytes one by one, and then, if it stalls, nothing more.
+struct SlowImages final : v1::JobService::Service {
+    grpc::Status GetImage(grpc::ServerContext* context, const v1::GetImageRequest*,
+                          grpc::ServerWriter<v1::Chunk>* writer) override {
+        for (int i = 0; i < chunks; ++i) {
+            v1::Chunk chunk;
+            chunk.set_offset_bytes(uint64_t(i));
+            chunk.set_data("x");
+            writer->Write(chunk);
+            std::this_thread::sleep_for(std::chrono::milliseconds(400));
+        }
+        while (stalls && !context->IsCancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        return grpc::Status::OK;
+    }
+    int chunks = 10;
+    std::atomic<bool> stalls{false};
+};
+
+TEST(Images, MayTakeAnyTimeAsLongAsSomethingComes) {
+    SlowImages images;
+    grpc::ServerBuilder builder;
+    int number = 0;
+    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &number);
+    builder.RegisterService(&images);
+    const auto server = builder.BuildAndStart();
+    GrpcJobPort jobs(channel_to(number), {.silence_seconds = 2});
+    const auto image = jobs.image("job-1", ImageKind::kFinal);
+    ASSERT_TRUE(image.ok()) << image.status().message();
+    EXPECT_EQ(*image, "xxxxxxxxxx");
+    images.stalls = true;
+    const Status silence = jobs.image("job-1", ImageKind::kFinal).status();
+    EXPECT_EQ(silence.code(), StatusCode::kDeadlineExceeded);
+    EXPECT_NE(silence.message().find("nothing more has come from the coordinator for 2 s"), std::string::npos)
+        << silence.message();
+    server->Shutdown();
+    const Status gone = jobs.image("job-1", ImageKind::kFinal).status();
+    EXPECT_EQ(gone.code(), StatusCode::kUnavailable);
+    EXPECT_NE(gone.message().find("`lightloom fetch` tries again"), std::string::npos) << gone.message();
+}
+
+/// Also when there is nothing new to say for longer than it would wait for a connection.
+TEST(Watch, GoesOnWhenTheCoordinatorIsBackInTime) {
+    FakeService service;
+    const std::string id = service.submit(service.spec(4));
+    auto server = std::move(GrpcServer::start(*service.coordinator, "127.0.0.1:0")).value();
+    const std::string address = "127.0.0.1:" + std::to_string(server->port());
+    GrpcJobPort jobs(open_channel(address));
+    std::atomic<int> changes{0};
+    Status ended;
+    std::jthread watch([&] { ended = jobs.watch_job(id, [&](const JobInfo&) { ++changes; }, {}); });
+    EXPECT_TRUE(testing::wait_until(60, [&] { return changes > 0; }));
+    server.reset();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    auto again = GrpcServer::start(*service.coordinator, address);
+    ASSERT_TRUE(again.ok()) << again.status().message();
+    std::this_thread::sleep_for(std::chrono::seconds(5));  // by then it would have given up
+    EXPECT_TRUE(service.coordinator->cancel_job(id).ok());
+    watch.join();
+    EXPECT_TRUE(ended.ok()) << ended.message();
+    EXPECT_GT(changes, 1);
+}
+
+}  // namespace
+}  // namespace lightloom

@@ -1,0 +1,110 @@
+// What a worker keeps on disk, and what other processes do to that directory meanwhile.
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <future>
+
+#include "common/film/atomic_file.h"
+#include "server/local_ports.h"
+#include "tests/service/fake.h"
+#include "worker/scene_cache.h"
+
+namespace lightloom {
+namespace {
+
+using testing::FakeService;
+using testing::TempDirectory;
+
+/// What a process does that stores a file, up to the point at which it dies.
+class Storing {
+  public:
+    Storing(const std::filesystem::path& store, const Digest& digest)
+        : file_(::open((store / "incoming" / digest.hex()).c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644)) {
+        EXPECT_EQ(::flock(file_, LOCK_EX | LOCK_NB), 0);
+    }
+    ~Storing() { ::close(file_); }
+
+  private:
+    int file_;
+};
+
+TEST(SceneFetcher, AFileListThatAnotherProcessDidNotFinishIsStoredAfterAll) {
+    FakeService service;
+    const std::string source = std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/furnace-sphere.pbrt";  // which includes no file
+    const auto text = read_file(source);
+    ASSERT_TRUE(text.ok()) << text.status().message();
+    const AssetManifest manifest{"scene.pbrt", {{"scene.pbrt", sha256(*text), text->size()}}};
+    AssetStore& assets = service.coordinator->assets();
+    ASSERT_TRUE(assets.put(sha256(*text), *text).ok());
+    ASSERT_TRUE(assets.put(manifest.root(), manifest.canonical_text()).ok());
+    JobSpec spec;
+    spec.scene_root = manifest.root();
+    spec.width = spec.height = 16;
+
+    const TempDirectory directory;
+    LocalWorkerPort port(*service.coordinator);
+    SceneFetcher fetcher(port, directory.path);
+    std::optional<Storing> other(std::in_place, directory.path / "assets", manifest.root());
+    std::stop_source stop;
+    auto fetched = std::async(std::launch::async, [&] { return fetcher.scene(spec, stop.get_token()); });
+    EXPECT_EQ(fetched.wait_for(std::chrono::milliseconds(300)), std::future_status::timeout) << "the other one may finish yet";
+    other.reset();
+    EXPECT_EQ(fetched.wait_for(std::chrono::seconds(30)), std::future_status::ready);
+    stop.request_stop();
+    const auto scene = fetched.get();
+    EXPECT_TRUE(scene.ok()) << scene.status().message();
+
+    // Whoever waits can be stopped.
+    other.emplace(directory.path / "assets", sha256("another list"));
+    spec.scene_root = sha256("another list");
+    ASSERT_TRUE(assets.put(spec.scene_root, "another list").ok());
+    EXPECT_EQ(fetcher.scene(spec, stop.get_token()).status().code(), StatusCode::kCancelled);
+}
+
+/// The tables of the coordinator, and what a fetcher of at most 2500 bytes keeps of them.
+struct Tables : ::testing::Test {
+    AssetReference put(const std::string& name, size_t size) {
+        std::string bytes = name;
+        bytes.resize(size, 'x');
+        EXPECT_TRUE(service.coordinator->assets().put(sha256(bytes), bytes).ok());
+        return {sha256(bytes), size};
+    }
+    bool kept(const AssetReference& tables) const { return AssetStore(directory.path / "worker-tables").contains(tables.digest); }
+
+    FakeService service;
+    const TempDirectory directory;
+    LocalWorkerPort port{*service.coordinator};
+    SceneFetcher fetcher{port, directory.path, 2500};
+};
+
+TEST_F(Tables, ThatWereUsedLeastRecentlyAreRemovedAboveTheLimit) {
+    const AssetReference a = put("a", 1000), b = put("b", 1000), c = put("c", 1000), large = put("large", 5000);
+    AssetStore scene_files(directory.path / "assets");
+    const std::string text(10000, 't');
+    ASSERT_TRUE(scene_files.put(sha256(text), text).ok());
+    for (const AssetReference& tables : {a, b, a, c}) ASSERT_TRUE(fetcher.tables(tables, {}).ok());
+    EXPECT_TRUE(kept(a));
+    EXPECT_FALSE(kept(b));
+    EXPECT_TRUE(kept(c));
+    EXPECT_EQ(sha256(*fetcher.tables(b, {})), b.digest) << "they are fetched again";
+    EXPECT_FALSE(kept(a));
+    ASSERT_TRUE(fetcher.tables(large, {}).ok());
+    EXPECT_TRUE(kept(large)) << "what is in use stays";
+    EXPECT_FALSE(kept(b) || kept(c));
+    EXPECT_TRUE(scene_files.contains(sha256(text))) << "scene files are no tables";
+}
+
+TEST_F(Tables, OfWhichAFetchBrokeOffLongAgoAreRemoved) {
+    const std::filesystem::path incoming = directory.path / "worker-tables" / "incoming";
+    for (const char* name : {"old", "young"}) ASSERT_TRUE(write_file_atomically((incoming / name).string(), "half").ok());
+    std::filesystem::last_write_time(incoming / "old", std::filesystem::file_time_type::clock::now() - std::chrono::hours(2));
+    ASSERT_TRUE(fetcher.tables(put("a", 1000), {}).ok());
+    EXPECT_FALSE(std::filesystem::exists(incoming / "old"));
+    EXPECT_TRUE(std::filesystem::exists(incoming / "young"));
+}
+
+}  // namespace
+}  // namespace lightloom
