@@ -52,11 +52,10 @@ float read_index(Context* context, const ParameterList& p, std::string_view name
     return index;
 }
 
-/// "metal-Cu-eta" split into metal and property; empty if it is not of this form.
-std::string metal_of(const Parameter* p, std::string_view suffix) {
-    if (!p || p->strings.size() != 1 || !has_suffix(p->strings[0], suffix) || p->strings[0].rfind("metal-", 0) != 0)
-        return {};
-    return p->strings[0].substr(0, p->strings[0].size() - suffix.size());
+/// The metal that "metal-Cu-eta" names together with its property; nothing for any other spectrum.
+std::optional<ConductorRgb> metal_of(const Parameter* p, std::string_view property) {
+    if (!p || p->strings.size() != 1 || !has_suffix(p->strings[0], property)) return std::nullopt;
+    return named_metal(p->strings[0].substr(0, p->strings[0].size() - property.size()));
 }
 
 /// The reflectance or eta and k of a conductor; `prefix` is "" or "conductor.".
@@ -64,23 +63,18 @@ void read_conductor(Context* context, const ParameterList& p, const std::string&
     m->reflectance = spectrum_texture_parameter(context, p, "reflectance", TextureUse::kReflectance);
     const std::string eta_name = prefix + "eta", k_name = prefix + "k";
     if (m->reflectance != kNone) {
-        if (p.find_any(eta_name) || p.find_any(k_name))
-            fail(p.where(), p.what() + ": give either reflectance or " + eta_name + " and " + k_name + ", not both");
+        for (const std::string_view name : {eta_name, k_name})
+            for (const std::string_view type : {"rgb", "spectrum", "texture"})
+                if (p.find(type, name))
+                    fail(p.where(), p.what() + ": give either reflectance or " + eta_name + " and " + k_name + ", not both");
         return;
     }
     const Parameter *eta = p.find("spectrum", eta_name), *k = p.find("spectrum", k_name);
-    const std::string eta_metal = eta ? metal_of(eta, "-eta") : "", k_metal = k ? metal_of(k, "-k") : "";
-    // A metal's eta and k are reduced together, see spectra.h. pbrt's default is copper for either.
-    const bool eta_is_default = !p.find_any(eta_name), k_is_default = !p.find_any(k_name);
-    const auto metal = [&](const Parameter* where, const std::string& name) {
-        if (const auto found = named_metal(name)) return *found;
-        fail(where ? where->where : p.where(), p.what() + ": unknown named spectrum " + quoted(name));
-    };
-    if (eta_is_default) m->eta = constant_texture(context, named_metal("metal-Cu")->eta);
-    if (k_is_default) m->k = constant_texture(context, named_metal("metal-Cu")->k);
-    if (!eta_metal.empty()) m->eta = constant_texture(context, metal(eta, eta_metal).eta);
-    if (!k_metal.empty()) m->k = constant_texture(context, metal(k, k_metal).k);
-    if (eta && k && eta_metal.empty() && k_metal.empty()) {
+    // A metal's eta and k are reduced together, see spectra.h.
+    const std::optional<ConductorRgb> eta_metal = metal_of(eta, "-eta"), k_metal = metal_of(k, "-k");
+    if (eta_metal) m->eta = constant_texture(context, eta_metal->eta);
+    if (k_metal) m->k = constant_texture(context, k_metal->k);
+    if (eta && k && !eta_metal && !k_metal) {
         const ConductorRgb both =
             conductor_rgb(*spectrum_parameter(context, p, eta_name), *spectrum_parameter(context, p, k_name));
         m->eta = constant_texture(context, both.eta);
@@ -88,7 +82,10 @@ void read_conductor(Context* context, const ParameterList& p, const std::string&
     }
     if (m->eta == kNone) m->eta = spectrum_texture_parameter(context, p, eta_name, TextureUse::kUnbounded);
     if (m->k == kNone) m->k = spectrum_texture_parameter(context, p, k_name, TextureUse::kUnbounded);
-    if (m->eta == kNone || m->k == kNone) p.finish();  // A parameter of the wrong type.
+    // pbrt's default is copper for either. One of the wrong type is finish()'s to report, or no more than an Attribute's default
+    // that suits another kind of material.
+    if (m->eta == kNone) m->eta = constant_texture(context, named_metal("metal-Cu")->eta);
+    if (m->k == kNone) m->k = constant_texture(context, named_metal("metal-Cu")->k);
 }
 
 void read_layers(Context* context, const ParameterList& p, Material* m) {

@@ -15,7 +15,21 @@ constexpr int kMaxNesting = 31;
 /// Nodes that one look-up may visit: textures that use each other twice on every level double it each time.
 constexpr double kMaxVisits = 4096;
 
-/// Reads a spectrum given by name, file or values; fails if there is none.
+/// The text of the file that a spectrum parameter names; `what` names the directive.
+std::string read_spectrum_file(Context* context, const Parameter& p, const std::string& what) {
+    const std::string& name = p.strings[0];
+    const std::string given = what + ": " + quoted("spectrum " + p.name) + " is " + quoted(name);
+    if (is_named_spectrum(name))
+        fail(p.where, given + ", a spectrum that is known by name but not supported here; give its values or a file");
+    const Result<std::string> path = normalise_reference(name);
+    if (!path.ok()) fail(p.where, given + ": " + path.status().message());
+    Result<std::string> text = context->files->read(*path);
+    if (text.ok()) return std::move(text).value();
+    if (text.status().code() != StatusCode::kNotFound) fail(p.where, given + ": " + text.status().message());
+    fail(p.where, given + ", which is neither a spectrum known by name nor a file below the scene's directory; correct it");
+}
+
+/// Reads a spectrum given by file or values; fails if there is none.
 Spectrum read_spectrum(Context* context, const Parameter& p, const std::string& what) {
     if (!p.numbers.empty() && p.strings.empty()) {
         if (auto spectrum = spectrum_from_pairs(p.numbers)) return *spectrum;
@@ -24,7 +38,7 @@ Spectrum read_spectrum(Context* context, const Parameter& p, const std::string& 
     }
     if (p.strings.size() != 1 || !p.numbers.empty())
         fail(p.where, what + ": the spectrum " + quoted(p.name) + " needs one name, one file or pairs of numbers");
-    const std::string text = context->read_file(p.where, p.strings[0]);
+    const std::string text = read_spectrum_file(context, p, what);
     if (auto spectrum = parse_spectrum_text(text)) return *spectrum;
     fail(p.where,
          what + ": " + quoted(p.strings[0]) + " is not a spectrum file (pairs of increasing wavelength and value)");

@@ -303,6 +303,20 @@ TEST(ImportSpectra, InScenes) {
     EXPECT_NEAR(value(d, material_of(d).k).r, 3, 1e-3);
     expect_warning("LightSource \"point\" \"blackbody I\" 500", "gamut");
     expect_error("LightSource \"point\" \"spectrum I\" \"stdillum-Z\"", {"stdillum-Z"});
+    struct Case {
+        std::string directive, parameter, name;
+    };
+    for (const Case& c : {Case{"Material \"dielectric\"", "eta", "glass-XYZ"}, Case{"LightSource \"point\"", "I", "stdillum-F13"},
+                          Case{"Material \"diffuse\"", "reflectance", "foo"}, Case{"Material \"conductor\"", "eta", "metal-Xx-eta"},
+                          Case{"Material \"conductor\"", "k", "metal-Xx-k"}, Case{"AreaLightSource \"diffuse\"", "L", "foo"},
+                          Case{"Texture \"t\" \"spectrum\" \"constant\"", "value", "foo"}})
+        expect_error(c.directive + "\n\"spectrum " + c.parameter + "\" \"" + c.name + "\"" + kShape,
+                     {"scene.pbrt:4: ", ("\"spectrum " + c.parameter + "\" is \"" + c.name + "\"").c_str(),
+                      "neither a spectrum known by name nor a file"});
+    // Known, but not as this.
+    for (const std::string name : {"glass-BK7", "stdillum-A", "metal-Ag-k", "metal-Ag-eta"})
+        expect_error("Material \"diffuse\" \"spectrum reflectance\" \"" + name + "\"", {name.c_str(), "known by name but not"});
+    expect_error("Material \"diffuse\" \"spectrum reflectance\" \"../r.spd\"", {"spectrum reflectance", "leaves"});
     expect_error("LightSource \"point\" \"blackbody I\" -3", {"kelvin"});
     expect_error("Material \"diffuse\" \"spectrum reflectance\" [400 1 300 1]", {"increasing"});
     expect_error("Material \"diffuse\" \"spectrum reflectance\" \"r.spd\"", {"not a spectrum"}, {{"r.spd", "400 one"}});
