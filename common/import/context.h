@@ -66,6 +66,11 @@ struct TextureCost {
     double visits = 1;  ///< Nodes looked at.
 };
 
+/// Bounds of a texture's first channel, which float textures consist of; it need not reach them.
+struct TextureRange {
+    double least = 0, most = 0;
+};
+
 /// What the numbers of a texture are decides what they may be and how a spectrum is reduced (spectra.h). A spectrum texture may
 /// be used both as a reflectance and as an index of refraction; then it is two.
 enum class TextureUse { kFloat, kReflectance, kUnbounded };
@@ -92,6 +97,8 @@ struct Context {
     std::map<std::string, int32_t> image_index;  ///< By file, encoding and channel choice.
     std::map<std::tuple<float, float, float, bool>, int32_t> emission_index;
     std::vector<TextureCost> texture_costs;     ///< One per scene texture.
+    std::vector<TextureRange> texture_ranges;   ///< The same.
+    std::map<int32_t, TextureRange> image_ranges;  ///< Of the one-channel images of textures, by their index.
     std::map<MaterialId, int> mix_levels;       ///< Of mix materials; others have none.
     int texture_depth = 0, material_depth = 0;  ///< Of the definitions being resolved.
 

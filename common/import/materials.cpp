@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "common/import/context.h"
 #include "common/import/spectra.h"
@@ -18,23 +19,35 @@ TextureId spectrum_or(Context* context, const ParameterList& p, std::string_view
     return id == kNone ? constant_texture(context, Rgb(fallback)) : id;
 }
 
-void check_roughness(Context* context, const ParameterList& p, TextureId id, std::string_view name) {
-    const TextureNode& node = context->scene.textures[size_t(id)];
-    if (node.kind == TextureKind::kConstant && (node.value.r < 0 || node.value.r > 1))
-        fail(p.where(), p.what() + ": " + std::string(name) + " must lie in [0, 1]");
+/// Parameter `name`, whether or not it is remapped to an alpha; kNone if absent. A number outside of [0, 1] is an error. What a
+/// texture makes of its pixels may be: above 1 it scatters as in pbrt-v4, but no coat lets through less light for it (its tables
+/// end at 1); below 0, where pbrt computes with what is no number, it is smooth.
+TextureId roughness_parameter(Context* context, const ParameterList& p, const std::string& name) {
+    const TextureId id = float_texture_parameter(context, p, name);
+    if (id == kNone) return kNone;
+    const TextureRange range = context->texture_ranges[size_t(id)];
+    if (range.least >= 0 && range.most <= 1) return id;
+    const Location& where = p.find_any(name)->where;
+    char text[80];
+    if (range.least == range.most) {
+        std::snprintf(text, sizeof text, " must lie in [0, 1], not be %g", range.least);
+        fail(where, p.what() + ": " + name + text);
+    }
+    std::snprintf(text, sizeof text, " may reach from %g to %g", range.least, range.most);
+    context->diagnostics.warn(where, p.what() + ": " + name + text +
+                                         ", beyond [0, 1]: below 0 it counts as 0, above 1 a coat lets light through as at 1");
+    return id;
 }
 
 /// `prefix`roughness, `prefix`uroughness and `prefix`vroughness.
 void read_roughness(Context* context, const ParameterList& p, const std::string& prefix, float fallback, TextureId* u,
                     TextureId* v) {
-    TextureId both = float_texture_parameter(context, p, prefix + "roughness");
+    TextureId both = roughness_parameter(context, p, prefix + "roughness");
     if (both == kNone) both = constant_texture(context, Rgb(fallback));
-    *u = float_texture_parameter(context, p, prefix + "uroughness");
-    *v = float_texture_parameter(context, p, prefix + "vroughness");
+    *u = roughness_parameter(context, p, prefix + "uroughness");
+    *v = roughness_parameter(context, p, prefix + "vroughness");
     if (*u == kNone) *u = both;
     if (*v == kNone) *v = both;
-    check_roughness(context, p, *u, prefix + "roughness");
-    check_roughness(context, p, *v, prefix + "roughness");
 }
 
 /// An index of refraction as float, named glass, or spectrum; positive.

@@ -155,6 +155,52 @@ TextureId make_texture(Context* context, const Definition& definition, TextureUs
          parameters.what() + " is not supported; use constant, scale, mix, checkerboard or imagemap");
 }
 
+TextureRange hull(const TextureRange& a, const TextureRange& b) {
+    return {std::fmin(a.least, b.least), std::fmax(a.most, b.most)};
+}
+
+TextureRange product(const TextureRange& a, const TextureRange& b) {
+    const double corners[] = {a.least * b.least, a.least * b.most, a.most * b.least, a.most * b.most};
+    TextureRange out{corners[0], corners[0]};
+    for (const double corner : corners) out = hull(out, {corner, corner});
+    return out;
+}
+
+/// Of the pixels of a one-channel image.
+TextureRange range_of(const Image& image) {
+    if (image.floats.empty()) return {0, 1};
+    const auto [least, most] = std::minmax_element(image.floats.begin(), image.floats.end());
+    return {double(*least), double(*most)};
+}
+
+/// Of a node whose operands have been added.
+TextureRange range_of(Context* context, const TextureNode& node) {
+    const auto of = [&](TextureId id) { return context->texture_ranges[size_t(id)]; };
+    switch (node.kind) {
+        case TextureKind::kConstant: return {double(node.value.r), double(node.value.r)};
+        case TextureKind::kCheckerboard: return hull(of(node.a), of(node.b));
+        case TextureKind::kScale: return product(of(node.a), of(node.b));
+        case TextureKind::kMix: {
+            const TextureRange t = of(node.amount);
+            if (t.least >= 0 && t.most <= 1) return hull(of(node.a), of(node.b));
+            const TextureRange a = product(of(node.a), {1 - t.most, 1 - t.least}), b = product(of(node.b), t);
+            return {a.least + b.least, a.most + b.most};
+        }
+        case TextureKind::kImage: {
+            const Image& image = context->scene.images[size_t(node.image)];
+            if (image.channels != 1) return {};  // Of colours, which nothing asks about.
+            const auto [it, inserted] = context->image_ranges.try_emplace(node.image);
+            if (inserted) it->second = range_of(image);
+            TextureRange range = it->second;
+            if (node.wrap == WrapMode::kBlack) range = hull(range, {0, 0});
+            range = product(range, {double(node.scale), double(node.scale)});
+            if (node.invert) range = {1 - range.most, 1 - range.least};
+            return {std::fmax(range.least, 0.0), std::fmax(range.most, 0.0)};
+        }
+    }
+    return {};
+}
+
 /// Marks a texture that is being resolved, so that a cycle is found.
 constexpr TextureId kInProgress = -2;
 
@@ -199,6 +245,7 @@ TextureId add_node(Context* context, const TextureNode& node) {
         cost.levels = std::max(cost.levels, below.levels + 1);
         cost.visits += below.visits;
     }
+    context->texture_ranges.push_back(range_of(context, node));
     context->scene.textures.push_back(node);
     context->texture_costs.push_back(cost);
     return TextureId(context->scene.textures.size()) - 1;

@@ -117,6 +117,51 @@ TEST(ImportMaterial, WhatIsNotModelledIsNamed) {
                 1e-4);
 }
 
+TEST(ImportMaterial, RoughnessLiesBetweenZeroAndOne) {
+    for (const std::string remap : {"", " \"bool remaproughness\" false"})
+        for (const std::string name : {"roughness", "uroughness", "vroughness"}) {
+            const std::string material = "Material \"conductor\"" + remap + "\n", value = "\"float " + name + "\" ";
+            const std::string texture = "Texture \"t\" \"float\" ", use = material + "\"texture " + name + "\" \"t\"";
+            for (const std::string wrong : {"-0.1", "1.5"}) {
+                expect_error(material + value + wrong, {"scene.pbrt:4", (": " + name + " must").c_str(), "[0, 1]", wrong.c_str()});
+                expect_error(texture + "\"constant\" \"float value\" " + wrong + " " + use, {name.c_str(), "[0, 1]", wrong.c_str()});
+                const std::string range = wrong == "1.5" ? "from 0 to 1.5" : "from -0.1 to 0";
+                const std::string squares = "\"checkerboard\" \"float tex1\" 0 \"float tex2\" " + wrong + "\n";
+                expect_warning(texture + squares + use, (name + " may reach " + range).c_str());
+            }
+            EXPECT_TRUE(import_world(material + value + "0" + kShape + material + value + "1" + kShape, {}, true).ok());
+        }
+    for (const std::string name : {"interface.uroughness", "conductor.roughness"})
+        expect_error("Material \"coatedconductor\" \"float " + name + "\" 2", {name.c_str(), "[0, 1]"});
+}
+
+/// What a texture may reach follows from what it is made of.
+TEST(ImportMaterial, RoughnessOfTexturesIsBounded) {
+    const testing::FileMap files{{"g.tga", tga(2, 1, "abcxyz")}, {"bright.exr", exr(Rgb(4), {0.64f, 0.33f, 0.3f, 0.6f, 0.15f, 0.06f,
+                                                                                             0.3127f, 0.329f})}};
+    const std::string use = " Material \"dielectric\" \"texture roughness\" \"t\"";
+    const auto image = [](const std::string& name, const std::string& file, const std::string& options) {
+        return "Texture \"" + name + "\" \"float\" \"imagemap\" \"string filename\" \"" + file + "\" " + options + " ";
+    };
+    for (const std::string& fine :
+         {image("t", "g.tga", ""), image("t", "g.tga", "\"bool invert\" true"), image("t", "bright.exr", "\"float scale\" 0.25"),
+          image("i", "g.tga", "") + "Texture \"t\" \"float\" \"mix\" \"float tex1\" 0 \"float tex2\" 1 \"texture amount\" \"i\"",
+          image("i", "bright.exr", "") + "Texture \"t\" \"float\" \"scale\" \"texture tex\" \"i\" \"float scale\" 0.25"})
+        EXPECT_TRUE(import_world(fine + use, files, true).ok()) << import_world(fine + use, files, true).status().message();
+    expect_error(image("t", "bright.exr", "") + use, {"roughness must lie in [0, 1], not be 4"}, files);
+    expect_warning(image("t", "bright.exr", "\"string wrap\" \"black\"") + use, "may reach from 0 to 4", files);
+    expect_warning(image("i", "bright.exr", "") + image("j", "g.tga", "\"string wrap\" \"black\"") +
+                       "Texture \"t\" \"float\" \"mix\" \"texture tex1\" \"j\" \"float tex2\" 1 \"texture amount\" \"i\"" + use,
+                   "to 4, beyond [0, 1]", files);
+    // Products beyond double precision are no numbers that would pass for good ones.
+    std::string huge = "Texture \"t0\" \"float\" \"checkerboard\" \"float tex1\" 1e38 \"float tex2\" -1e38 ";
+    for (int i = 1; i < 10; ++i)
+        huge += "Texture \"t" + std::to_string(i) + "\" \"float\" \"scale\" \"texture tex\" \"t" + std::to_string(i - 1) +
+                "\" \"texture scale\" \"t" + std::to_string(i - 1) + "\" ";
+    huge += "Texture \"t\" \"float\" \"scale\" \"texture tex\" \"t9\" \"float scale\" 0";
+    expect_warning(huge + use, "beyond [0, 1]");
+}
+
 TEST(ImportLight, AreaLights) {
     SceneDescription d =
         world("AreaLightSource \"diffuse\" \"rgb L\" [1 2 3] \"float scale\" 2 \"bool twosided\" true" + kShape);
