@@ -55,6 +55,7 @@ struct PendingShape {
     int32_t object = kNone;  ///< Index into SceneDescription::objects, or kNone.
     MaterialReference material;
     std::shared_ptr<const AreaLightDefinition> area_light;  ///< Null if the shape does not emit.
+    bool is_scaled_quadric = false;  ///< A sphere or disk that its transformation makes larger or smaller.
     float alpha = 1;
     std::string alpha_texture;  ///< Empty if the shape has none.
     Location where;
@@ -136,7 +137,8 @@ void add_light(Context* context, const std::string& kind, const ParameterList& p
 /// Whether no coordinate is beyond kMaxCoordinate (or not a number).
 bool within_bounds(const Vec3& position);
 
-/// Radiance of an area light on a surface of `area` (its "power" parameter is per primitive, as in pbrt).
+/// Radiance of an area light on a surface of `area`, in world space: its "power" is what each primitive emits, however that is
+/// scaled. (pbrt-v4 divides by the area that a sphere or disk has before its transformation.)
 AreaEmission area_emission(Context* context, const AreaLightDefinition& definition, double area);
 bool area_light_uses_power(const AreaLightDefinition& definition);
 

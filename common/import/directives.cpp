@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "common/import/parser.h"
+#include "common/import/tessellate.h"
 
 namespace lightloom::import {
 namespace {
@@ -12,6 +14,12 @@ std::string read_name(Tokenizer* tokens, const Location& where, const std::strin
     const Token token = tokens->next();
     if (token.kind != TokenKind::kString) fail(where, word + " needs a quoted name");
     return std::string(token.text);
+}
+
+/// Whether lengths change, by as much as pbrt-v4 warns of.
+bool has_scale(const Mat4& m) {
+    const std::optional<double> scale = similarity_scale(m);
+    return !scale || !(std::fabs(*scale * *scale - 1) <= 1e-3);
 }
 
 /// An Option's value: a word, a string or a number.
@@ -171,6 +179,7 @@ void Parser::shape(Tokenizer* tokens, const Location& where) {
                                   {static_transform(where, list.what()), state_.reverse_orientation, pending.area_light != nullptr},
                                   &pending.faces);
     if (!pending.area_light) pending.faces = {};
+    pending.is_scaled_quadric = (kind == "sphere" || kind == "disk") && has_scale(state_.ctm[0]);
     list.finish();
     context_->shapes.push_back(std::move(pending));
 }

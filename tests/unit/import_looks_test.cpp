@@ -243,6 +243,30 @@ TEST(ImportLight, PowerIsThatOfTheWholeShape) {
     EXPECT_NE(two.warnings.at(1).find("each of the 2 faces"), std::string::npos) << two.warnings.at(1);
 }
 
+/// pbrt-v4 divides the power by the area before the transformation, and warns of its scale.
+TEST(ImportLight, PowerIsThatOfTheShapeAsItIsScaled) {
+    const std::string light = "AreaLightSource \"diffuse\" \"float power\" 10 ";
+    const auto radiance = [&](const std::string& text) { return double(world(text).emissions.at(0).radiance.g); };
+    EXPECT_NEAR(radiance(light + "Scale 3 3 3" + kShape) * 9, radiance(light + kShape), 1e-5);
+    EXPECT_NEAR(radiance(light + "Scale 3 3 3 Shape \"disk\"") * 9, radiance(light + "Shape \"disk\""), 1e-5);
+    expect_warning(light + "Scale 3 3 3" + kShape, "as it is scaled");
+    EXPECT_EQ(world(light + "Scale 3 3 3 Shape \"disk\"").warnings.size(), 2u);
+    EXPECT_EQ(world(light + "Shape \"disk\"").warnings.size(), 1u);
+    EXPECT_TRUE(world(light + "Rotate 30 1 2 3 Translate 1 2 3 Scale -1 1 1" + kShape).warnings.empty());
+    EXPECT_TRUE(world("AreaLightSource \"diffuse\" Scale 3 3 3" + kShape).warnings.empty()) << "no power";
+    EXPECT_TRUE(world(light + "Scale 3 3 3 Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0]").warnings.empty());
+}
+
+TEST(ImportLight, KnowsItsLine) {
+    const SceneDescription d = world("\nLightSource \"point\"\nLightSource \"spot\"\nLightSource \"distant\"\n"
+                                     "LightSource\n\"infinite\"\n\nLightSource \"infinite\"");
+    EXPECT_EQ(d.point_lights.at(0).source, "scene.pbrt:4");
+    EXPECT_EQ(d.spot_lights.at(0).source, "scene.pbrt:5");
+    EXPECT_EQ(d.distant_lights.at(0).source, "scene.pbrt:6");
+    EXPECT_EQ(d.infinite_lights.at(0).source, "scene.pbrt:7");
+    EXPECT_EQ(d.infinite_lights.at(1).source, "scene.pbrt:10");
+}
+
 TEST(ImportLight, PositionsAreBounded) {
     for (const std::string kind : {"point", "spot"}) {
         const std::string light = "LightSource \"" + kind + "\" ";
