@@ -202,9 +202,16 @@ void Parser::object_instance(Tokenizer* tokens, const Location& where) {
     if (current_object_ != kNone)
         fail(where,
              "ObjectInstance inside ObjectBegin: nested instances are not supported; place the inner object outside");
-    const auto it = objects_.find(name);
-    if (it == objects_.end()) fail(where, "no object is named " + quoted(name) + "; define it with ObjectBegin first");
-    context_->scene.instances.push_back({it->second, static_transform(where, "the instance"), where.text()});
+    instances_.push_back({name, static_transform(where, "the instance"), where});
+}
+
+void Parser::place_instances() {
+    for (const PendingInstance& i : instances_) {
+        const auto it = objects_.find(i.object);
+        if (it == objects_.end())
+            fail(i.where, "ObjectInstance: no object is named " + quoted(i.object) + "; define it with ObjectBegin");
+        context_->scene.instances.push_back({it->second, i.object_to_world, i.where.text()});
+    }
 }
 
 }  // namespace lightloom::import

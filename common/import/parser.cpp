@@ -1,7 +1,7 @@
 #include "common/import/parser.h"
 
-#include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace lightloom::import {
 namespace {
@@ -62,6 +62,9 @@ Vec3 vec3(const std::vector<double>& v, size_t first) {
     return {float(v[first]), float(v[first + 1]), float(v[first + 2])};
 }
 
+/// What a scope's directives begin with.
+std::string scope_name(char kind) { return kind == 'a' ? "Attribute" : kind == 't' ? "Transform" : "Object"; }
+
 }  // namespace
 
 Parser::Parser(Context* context) : context_(context) {
@@ -71,10 +74,12 @@ Parser::Parser(Context* context) : context_(context) {
 void Parser::parse_main(const std::string& name) {
     const Location where{context_->intern_file_name(name), 0};
     parse_file(name, where);
-    if (!scopes_.empty())
-        fail(scopes_.back().where,
-             "this scope is never closed; add the missing AttributeEnd, TransformEnd or ObjectEnd");
+    if (!scopes_.empty()) {
+        const std::string name_of_scope = scope_name(scopes_.back().kind);
+        fail(scopes_.back().where, "this " + name_of_scope + "Begin is never closed; add the missing " + name_of_scope + "End");
+    }
     if (!in_world_) fail(where, "the file has no WorldBegin; a scene needs one before its shapes and lights");
+    place_instances();
 }
 
 void Parser::parse_file(const std::string& name, const Location& from) {
@@ -191,7 +196,7 @@ bool Parser::scope(Tokenizer* tokens, const std::string& word, const Location& w
         close_scope('o', word, where);
         current_object_ = kNone;
     } else if (word == "WorldBegin") {
-        require_world(where, word, false);
+        if (in_world_) fail(where, "a second WorldBegin; remove it");
         in_world_ = true;
         state_.ctm[0] = state_.ctm[1] = Mat4();
         state_.active[0] = state_.active[1] = true;
@@ -221,9 +226,13 @@ void Parser::open_scope(char kind, const Location& where) {
 }
 
 void Parser::close_scope(char kind, const std::string& word, const Location& where) {
-    if (scopes_.empty() || scopes_.back().kind != kind)
-        fail(where, word + " does not match " +
-                        (scopes_.empty() ? "any open scope" : "the scope opened at " + scopes_.back().where.text()));
+    if (scopes_.size() <= outer_scopes_)
+        fail(where, word + " does not match any open scope" + (outer_scopes_ > 0 ? " of the imported file" : "") + "; remove it");
+    if (scopes_.back().kind != kind) {
+        const std::string open = scope_name(scopes_.back().kind);
+        fail(where, word + " does not match the " + open + "Begin at " + scopes_.back().where.text() + "; close that with " +
+                        open + "End first");
+    }
     state_ = std::move(scopes_.back().state);
     scopes_.pop_back();
 }
@@ -249,10 +258,11 @@ void Parser::import(Tokenizer* tokens, const Location& where) {
     // Unlike Include, what the file does to the graphics state ends with it.
     const GraphicsState state = state_;
     const auto coordinate_systems = coordinate_systems_;
-    const size_t depth = scopes_.size();
+    const size_t outer = std::exchange(outer_scopes_, scopes_.size());
     include(tokens, where);
-    if (scopes_.size() != depth)
-        fail(where, "the imported file leaves a scope open or closes one that it did not open");
+    if (scopes_.size() != outer_scopes_)
+        fail(where, "the imported file leaves the scope open that begins at " + scopes_.back().where.text());
+    outer_scopes_ = outer;
     state_ = state;
     coordinate_systems_ = coordinate_systems;
 }

@@ -106,7 +106,14 @@ TEST(ImportState, ObjectsAreInstanced) {
     expect_near(d.objects[0].meshes[0].positions[0], {1, 0, 0});
     EXPECT_EQ(d.objects[0].spheres.size(), 1u);
     expect_near(d.instances[1].object_to_world.point({0, 0, 0}), {0, 5, 0});
-    expect_error("ObjectInstance \"x\"", {"\"x\""});
+    expect_error("\nObjectInstance \"x\"\nObjectBegin \"y\" ObjectEnd", {"scene.pbrt:4", "\"x\"", "ObjectBegin"});
+    // As in pbrt, the object may come later.
+    const SceneDescription early = world("Translate 0 5 0 ObjectInstance \"p\" ObjectInstance \"o\" Identity ObjectBegin \"o\" " +
+                                         std::string(kTriangle) + "ObjectEnd ObjectBegin \"p\" Shape \"sphere\" ObjectEnd");
+    ASSERT_EQ(early.instances.size(), 2u);
+    EXPECT_EQ(early.instances[0].object, 1);
+    EXPECT_EQ(early.instances[1].object, 0);
+    expect_near(early.instances[1].object_to_world.point({0, 0, 0}), {0, 5, 0});
     expect_error("ObjectBegin \"x\" ObjectBegin \"y\"", {"inside"});
     expect_error("ObjectBegin \"x\" ObjectEnd ObjectBegin \"x\"", {"twice"});
     expect_error("ObjectBegin \"x\" ObjectInstance \"x\"", {"nested"});
@@ -118,6 +125,15 @@ TEST(ImportState, ScopesMustMatch) {
     expect_error("AttributeBegin", {"scene.pbrt:3", "never closed"});
     expect_error("AttributeEnd", {"AttributeEnd"});
     expect_error("AttributeBegin ObjectEnd", {"does not match"});
+    for (const std::string begun : {"Attribute", "Transform", "Object"}) {
+        const std::string begin = begun + "Begin" + (begun == "Object" ? " \"o\"" : "");
+        expect_error("\n" + begin, {"scene.pbrt:4", ("this " + begun + "Begin is never closed").c_str(), (begun + "End").c_str()});
+        for (const std::string ended : {"Attribute", "Transform", "Object"})
+            if (ended != begun)
+                expect_error(begin + "\n\n" + ended + "End", {("scene.pbrt:5: " + ended + "End does not match").c_str(),
+                                                              (begun + "Begin at scene.pbrt:3").c_str(), (begun + "End").c_str()});
+    }
+    expect_error("\nWorldBegin", {"scene.pbrt:4", "second WorldBegin"});
     std::string deep;
     for (int i = 0; i < 2000; ++i) deep += "AttributeBegin ";
     expect_error(deep, {"nested deeper"});
@@ -129,6 +145,11 @@ TEST(ImportFiles, IncludeKeepsTheStateAndImportDoesNot) {
     expect_near(first_corner(include, 1), {1, 0, 0});
     EXPECT_EQ(include.meshes[0].attributes.source, "sub/more.pbrt:2");
     expect_near(first_corner(world(std::string("Import \"sub/more.pbrt\" ") + kTriangle, files), 1), {0, 0, 0});
+    // An imported file has scopes of its own.
+    expect_error("AttributeBegin Import \"a.pbrt\" AttributeEnd", {"a.pbrt:1", "AttributeEnd", "imported file"},
+                 {{"a.pbrt", "AttributeEnd AttributeBegin"}});
+    expect_error("Import \"a.pbrt\"", {"scene.pbrt:3", "open", "a.pbrt:2"}, {{"a.pbrt", "\nTransformBegin"}});
+    EXPECT_TRUE(import_world("AttributeBegin Import \"a.pbrt\" AttributeEnd", {{"a.pbrt", "AttributeBegin AttributeEnd"}}).ok());
     const auto scene = import_world("Include \"./sub//../sub/more.pbrt\"", files);
     ASSERT_TRUE(scene.ok()) << scene.status().message();
     EXPECT_EQ(scene->files, (std::vector<std::string>{"scene.pbrt", "sub/more.pbrt"}));
