@@ -10,6 +10,9 @@
 namespace lightloom::import {
 namespace {
 
+constexpr std::string_view kAreaLightParameters[] = {
+    "rgb L", "blackbody L", "spectrum L", "float scale", "float power", "bool twosided", "string filename"};
+
 std::string read_name(Tokenizer* tokens, const Location& where, const std::string& word) {
     const Token token = tokens->next();
     if (token.kind != TokenKind::kString) fail(where, word + " needs a quoted name");
@@ -115,8 +118,10 @@ bool Parser::world_item(Tokenizer* tokens, const std::string& word, const Locati
         const std::string kind = read_name(tokens, where, word);
         if (kind != "diffuse")
             fail(where, "AreaLightSource " + quoted(kind) + " is not supported; the only kind is \"diffuse\"");
-        state_.area_light =
-            std::make_shared<AreaLightDefinition>(AreaLightDefinition{parameters(tokens, where, word, kind, "light")});
+        ParameterList list = parameters(tokens, where, word, kind, "light");
+        // Now, not when a shape emits: none might.
+        list.check(kAreaLightParameters);
+        state_.area_light = std::make_shared<AreaLightDefinition>(AreaLightDefinition{std::move(list)});
     } else if (word == "ObjectInstance") {
         object_instance(tokens, where);
     } else if (word == "MakeNamedMedium") {

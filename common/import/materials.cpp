@@ -119,8 +119,9 @@ void read_layers(Context* context, const ParameterList& p, Material* m) {
     else
         p.ignore(d, "maxdepth", "the layers here are joined analytically, without a random walk");
     p.ignore(d, "nsamples", "the layers here are joined analytically, without a random walk");
-    for (const std::string_view name : {"albedo", "g"}) {
-        const Parameter* medium = p.find_any(name);
+    for (const std::string_view declaration : {"rgb albedo", "spectrum albedo", "texture albedo", "float g", "texture g"}) {
+        const size_t space = declaration.find(' ');
+        const Parameter* medium = p.find(declaration.substr(0, space), declaration.substr(space + 1));
         const auto is_zero = [](double v) { return v == 0; };
         // A texture or a named spectrum has no numbers.
         if (medium && (medium->numbers.empty() || medium->type == "spectrum" ||
@@ -153,7 +154,7 @@ void read_mix(Context* context, const ParameterList& p, Material* m) {
 MaterialId make_material(Context* context, const std::string& name, const Definition& definition) {
     const ParameterList& p = definition.parameters;
     const std::string& kind = definition.kind;
-    p.accept("type");
+    p.accept("string", "type");
     p.refuse("normalmap", "normal maps change the picture; remove the parameter to render without");
     p.refuse("displacement", "bump maps change the picture; remove the parameter to render without");
     Material m;

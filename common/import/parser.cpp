@@ -6,21 +6,34 @@
 namespace lightloom::import {
 namespace {
 
-// Every name that some kind of shape, light, material or texture asks for: an Attribute directive may set no other.
-constexpr std::string_view kShapeNames[] = {
-    "alpha", "radius", "zmin", "zmax", "phimax", "innerradius", "height", "P", "N", "S", "uv", "indices", "faceIndices",
-    "filename", "displacement", "edgelength", "emissionfilename"};
-constexpr std::string_view kLightNames[] = {
-    "I", "L", "scale", "power", "illuminance", "from", "to", "coneangle", "conedeltaangle", "filename", "portal",
-    "twosided"};
-constexpr std::string_view kMaterialNames[] = {
-    "type", "normalmap", "displacement", "reflectance", "transmittance", "scale", "eta", "k", "interface.eta",
-    "conductor.eta", "conductor.k", "roughness", "uroughness", "vroughness", "interface.roughness",
-    "interface.uroughness", "interface.vroughness", "conductor.roughness", "conductor.uroughness",
-    "conductor.vroughness", "remaproughness", "thickness", "maxdepth", "nsamples", "g", "albedo", "materials", "amount"};
-constexpr std::string_view kTextureNames[] = {
-    "value", "tex", "tex1", "tex2", "scale", "amount", "dimension", "mapping", "uscale", "vscale", "udelta", "vdelta",
-    "filename", "filter", "maxanisotropy", "wrap", "encoding", "invert"};
+// What some kind of shape, light, material or texture asks for: an Attribute directive may set nothing else.
+constexpr std::string_view kShapeParameters[] = {
+    "float alpha", "texture alpha", "float radius", "float zmin", "float zmax", "float phimax", "float innerradius",
+    "float height", "point3 P", "normal N", "vector3 S", "point2 uv", "integer indices", "integer faceIndices",
+    "string filename", "float edgelength", "float displacement", "texture displacement", "string emissionfilename"};
+constexpr std::string_view kLightParameters[] = {
+    "rgb I", "blackbody I", "spectrum I", "rgb L", "blackbody L", "spectrum L", "float scale", "float power",
+    "float illuminance", "point3 from", "point3 to", "float coneangle", "float conedeltaangle", "string filename",
+    "point3 portal", "bool twosided"};
+constexpr std::string_view kMaterialParameters[] = {
+    "string type", "string normalmap", "float displacement", "texture displacement", "rgb reflectance",
+    "spectrum reflectance", "texture reflectance", "rgb transmittance", "spectrum transmittance", "texture transmittance",
+    "float scale", "float eta", "rgb eta", "spectrum eta", "texture eta", "rgb k", "spectrum k", "texture k",
+    "float interface.eta", "spectrum interface.eta", "rgb conductor.eta", "spectrum conductor.eta",
+    "texture conductor.eta", "rgb conductor.k", "spectrum conductor.k", "texture conductor.k", "float roughness",
+    "texture roughness", "float uroughness", "texture uroughness", "float vroughness", "texture vroughness",
+    "float interface.roughness", "texture interface.roughness", "float interface.uroughness",
+    "texture interface.uroughness", "float interface.vroughness", "texture interface.vroughness",
+    "float conductor.roughness", "texture conductor.roughness", "float conductor.uroughness",
+    "texture conductor.uroughness", "float conductor.vroughness", "texture conductor.vroughness", "bool remaproughness",
+    "float thickness", "integer maxdepth", "integer nsamples", "float g", "texture g", "rgb albedo", "spectrum albedo",
+    "texture albedo", "string materials", "float amount", "texture amount"};
+constexpr std::string_view kTextureParameters[] = {
+    "float value", "rgb value", "spectrum value", "texture value", "float tex", "rgb tex", "spectrum tex", "texture tex",
+    "float tex1", "rgb tex1", "spectrum tex1", "texture tex1", "float tex2", "rgb tex2", "spectrum tex2", "texture tex2",
+    "float scale", "texture scale", "float amount", "texture amount", "integer dimension", "string mapping",
+    "float uscale", "float vscale", "float udelta", "float vdelta", "string filename", "string filter",
+    "float maxanisotropy", "string wrap", "string encoding", "bool invert"};
 
 std::string read_string(Tokenizer* tokens, const Location& where, const std::string& word) {
     const Token token = tokens->next();
@@ -273,11 +286,11 @@ void Parser::attribute(Tokenizer* tokens, const Location& where) {
         fail(where, "Attribute " + quoted(target) + ": the target must be shape, light, material, medium or texture");
     const std::string what = "Attribute " + quoted(target);
     const ParameterList list = ParameterList::parse(tokens, where, what);
-    // No directive reads the parameters of a medium.
-    if (target == "shape") list.check_names(kShapeNames);
-    if (target == "light") list.check_names(kLightNames);
-    if (target == "material") list.check_names(kMaterialNames);
-    if (target == "texture") list.check_names(kTextureNames);
+    if (target == "shape") list.check(kShapeParameters);
+    if (target == "light") list.check(kLightParameters);
+    if (target == "material") list.check(kMaterialParameters);
+    if (target == "texture") list.check(kTextureParameters);
+    if (target == "medium") list.ignore_all(&context_->diagnostics, "participating media are not supported, and none is used");
     state_.attributes.try_emplace(target, ParameterList(where, what)).first->second.override_with(list);
 }
 

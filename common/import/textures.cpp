@@ -102,7 +102,7 @@ TextureId image_texture(Context* context, const ParameterList& parameters, Textu
     if (filter != "point" && filter != "bilinear")
         context->diagnostics.warn(parameters.where(), parameters.what() + ": the filter " + quoted(filter) +
                                                           " becomes bilinear; samples average the rest");
-    parameters.accept("maxanisotropy");  // Belongs to the EWA filter only.
+    parameters.accept("float", "maxanisotropy");  // Belongs to the EWA filter only.
     const std::string reference = parameters.one_string("filename", "");
     if (reference.empty()) fail(parameters.where(), parameters.what() + " has no \"string filename\"");
     ImageRequest request;

@@ -94,6 +94,9 @@ TEST(ImportMaterial, WhatIsNotModelledIsNamed) {
     expect_error("Material \"conductor\" \"rgb reflectance\" [1 1 1] \"rgb eta\" [1 1 1]", {"not both"});
     expect_error("Material \"conductor\" \"spectrum eta\" \"metal-Xx-eta\"", {"metal-Xx"});
     expect_error("Material \"dielectric\" \"float roughness\" 2", {"[0, 1]"});
+    expect_error("Material \"conductor\" \"float eta\" 2" + kShape, {"float eta", "wrong type", "spectrum eta"});
+    expect_error("Material \"diffuse\" \"float type\" 2", {"float type", "wrong type"});
+    expect_error("Material \"coateddiffuse\" \"integer g\" 0", {"integer g", "wrong type"});
     expect_error("Material \"dielectric\" \"float eta\" 0", {"index"});
     for (const std::string kind : {"coateddiffuse", "coatedconductor"}) {
         const std::string coat = "Material \"" + kind + "\" ";
@@ -187,6 +190,9 @@ TEST(ImportLight, AreaLights) {
     EXPECT_EQ(d.emissions.size(), 2u);
     expect_error("AreaLightSource \"diffuse\" \"string filename\" \"a.png\"" + kShape, {"images on area lights"});
     expect_error("AreaLightSource \"diffuse\" \"float strength\" 2" + kShape, {"strength"});
+    // Also where no shape emits with it.
+    expect_error("AreaLightSource \"diffuse\"\n\"float strength\" 2", {"scene.pbrt:4", "unknown parameter", "strength"});
+    expect_error("AreaLightSource \"diffuse\" \"integer scale\" 2", {"wrong type", "float scale"});
     expect_error("AreaLightSource \"sphere\"", {"diffuse"});
     expect_error("AreaLightSource \"diffuse\" Shape \"sphere\" \"float alpha\" 0", {"alpha 0"});
     expect_error("AreaLightSource \"diffuse\" Shape \"sphere\" \"float alpha\" 0.5", {"emitting shape with an alpha"});
