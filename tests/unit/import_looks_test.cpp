@@ -127,7 +127,8 @@ TEST(ImportMaterial, RoughnessLiesBetweenZeroAndOne) {
             const std::string texture = "Texture \"t\" \"float\" ", use = material + "\"texture " + name + "\" \"t\"";
             for (const std::string wrong : {"-0.1", "1.5"}) {
                 expect_error(material + value + wrong, {"scene.pbrt:4", (": " + name + " must").c_str(), "[0, 1]", wrong.c_str()});
-                expect_error(texture + "\"constant\" \"float value\" " + wrong + " " + use, {name.c_str(), "[0, 1]", wrong.c_str()});
+                expect_error(texture + "\"constant\" \"float value\" " + wrong + " " + use,
+                             {name.c_str(), "[0, 1]", wrong.c_str()});
                 const std::string range = wrong == "1.5" ? "from 0 to 1.5" : "from -0.1 to 0";
                 const std::string squares = "\"checkerboard\" \"float tex1\" 0 \"float tex2\" " + wrong + "\n";
                 expect_warning(texture + squares + use, (name + " may reach " + range).c_str());
