@@ -14,6 +14,7 @@
 #include "client/job_options.h"
 #include "client/output_files.h"
 #include "common/film/atomic_file.h"
+#include "common/import/diagnostics.h"
 #include "common/import/import.h"
 #include "common/scene/scene.h"
 
@@ -83,6 +84,7 @@ nlohmann::json describe(const SceneDescription& d, const SceneSummary& s, const 
         {"geometry", s.geometry_bytes}, {"acceleration", s.acceleration_bytes}, {"images", s.image_bytes}};
     out["seconds"] = {{"import", import_seconds}, {"build", s.build_seconds}};
     out["files"] = files;
+    out["replaced"] = {{"integrator", d.integrator}, {"film_filename", d.film.file_name}};
     out["ignored"] = d.warnings;
     return out;
 }
@@ -112,6 +114,9 @@ void print(const SceneDescription& d, const SceneSummary& s, const std::string& 
                 megabytes(s.geometry_bytes).c_str(), megabytes(s.acceleration_bytes).c_str(),
                 megabytes(s.image_bytes).c_str());
     std::printf("  time       %.3f s to read, %.3f s to build\n", import_seconds, s.build_seconds);
+    if (!d.integrator.empty()) std::printf("  replaced   Integrator %s, by --algorithm\n", import::quoted(d.integrator).c_str());
+    if (!d.film.file_name.empty())
+        std::printf("  replaced   Film's \"string filename\" %s, by -o\n", import::quoted(d.film.file_name).c_str());
     std::printf("  ignored    %s\n", d.warnings.empty() ? "nothing" : "");
     for (const std::string& warning : d.warnings) std::printf("    %s\n", warning.c_str());
 }
@@ -151,7 +156,9 @@ int run(const Options& options) {
     if (!options.json.empty()) {
         nlohmann::json out = describe(description, summary, imported->files, seconds);
         if (tables) out["tables"] = describe(*tables);
-        if (const Status s = write_file_atomically(options.json, out.dump(2) + "\n"); !s.ok()) return report_error(s);
+        // A scene's names may be anything, JSON's strings only UTF-8.
+        const std::string text = out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+        if (const Status s = write_file_atomically(options.json, text + "\n"); !s.ok()) return report_error(s);
     }
     return kSuccess;
 }

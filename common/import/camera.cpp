@@ -51,6 +51,34 @@ void check_camera(const ParameterList& p, const PerspectiveCamera& camera) {
                                        "times or narrower than 1e-9 times its distance; correct them");
 }
 
+/// "pixelbounds" or "cropwindow", whether there is one. pbrt-v4 turns inverted ranges round and cuts what lies outside; those
+/// are mistakes all the same.
+bool read_crop(const ParameterList& p, FilmDescription* film) {
+    const Parameter *bounds = p.find("integer", "pixelbounds"), *window = p.find("float", "cropwindow");
+    if (!bounds && !window) return false;
+    if (bounds && window) fail(bounds->where, p.what() + ": give either pixelbounds or cropwindow, not both");
+    const Parameter& crop = bounds ? *bounds : *window;
+    const auto refuse = [&](const std::string& why) { fail(crop.where, p.what() + ": " + crop.name + " " + why); };
+    if (crop.numbers.size() != 4) refuse("needs four numbers: x0 x1 y0 y1");
+    for (size_t i = 0; i < 4; ++i) {
+        const int size = i < 2 ? film->width : film->height;
+        const std::string side = i < 2 ? "wide" : "high";
+        const double given = crop.numbers[i];
+        if (window && !(given >= 0 && given <= 1)) refuse("must lie in [0, 1], as parts of the width and height");
+        if (bounds && !(given >= 0 && given <= size))
+            refuse("lie outside of the image, which is " + std::to_string(size) + " pixels " + side);
+        // pbrt rounds both ends of a crop window up.
+        film->crop[i] = int(bounds ? given : std::ceil(double(float(size) * float(given))));
+    }
+    for (size_t i = 0; i < 4; i += 2) {
+        const std::string axis = i == 0 ? "x" : "y";
+        if (crop.numbers[i] > crop.numbers[i + 1])
+            refuse("has " + axis + "0 above " + axis + "1; its order is x0 x1 y0 y1");
+        if (film->crop[i] == film->crop[i + 1]) refuse("is empty: no pixel lies between " + axis + "0 and " + axis + "1");
+    }
+    return true;
+}
+
 }  // namespace
 
 void set_camera(Context* context, const std::string& kind, const ParameterList& p, const Mat4& camera_to_world) {
@@ -65,7 +93,7 @@ void set_camera(Context* context, const std::string& kind, const ParameterList& 
     if (!(camera.lens_radius >= 0) || !(camera.focal_distance > 0))
         fail(p.where(), p.what() + ": lensradius must not be negative and focaldistance must be positive");
     camera.frame_aspect_ratio = p.one_float("frameaspectratio", 0);
-    if (p.find_any("frameaspectratio") && !(camera.frame_aspect_ratio > 0))
+    if (p.find("float", "frameaspectratio") && !(camera.frame_aspect_ratio > 0))
         fail(p.where(), p.what() + ": frameaspectratio must be positive");
     if (const std::vector<double>* window = p.numbers("float", "screenwindow", 4)) {
         if (window->size() != 4) fail(p.where(), p.what() + ": screenwindow needs four numbers");
@@ -92,25 +120,9 @@ void set_film(Context* context, const std::string& kind, const ParameterList& p)
     if (film.width < 1 || film.height < 1 || film.width > kMaxSide || film.height > kMaxSide)
         fail(p.where(), p.what() + ": the resolution must lie between 1 and 65536 pixels a side");
     film.file_name = p.one_string("filename", "");
-    const std::vector<double>* bounds = p.numbers("integer", "pixelbounds", 4);
-    const std::vector<double>* window = p.numbers("float", "cropwindow", 4);
-    if (bounds && window) fail(p.where(), p.what() + ": give either pixelbounds or cropwindow, not both");
-    if ((bounds && bounds->size() != 4) || (window && window->size() != 4))
-        fail(p.where(), p.what() + ": a crop needs four numbers");
-    for (int i = 0; i < 4 && (bounds || window); ++i) {
-        const int size = i < 2 ? film.width : film.height;
-        if (window && !((*window)[size_t(i)] >= 0 && (*window)[size_t(i)] <= 1))
-            fail(p.where(), p.what() + ": cropwindow must lie in [0, 1]");
-        // pbrt rounds both ends of a crop window up.
-        const double pixel =
-            bounds ? (*bounds)[size_t(i)] : std::ceil(double(float(size) * float((*window)[size_t(i)])));
-        if (pixel < 0 || pixel > size) fail(p.where(), p.what() + ": pixelbounds lie outside of the image");
-        film.crop[i] = int(pixel);
-    }
-    if ((bounds || window) && (film.crop[0] >= film.crop[1] || film.crop[2] >= film.crop[3]))
-        fail(p.where(), p.what() + ": the crop is empty");
-    const int64_t pixels = bounds || window ? int64_t(film.crop[1] - film.crop[0]) * (film.crop[3] - film.crop[2])
-                                            : int64_t(film.width) * film.height;
+    const bool cropped = read_crop(p, &film);
+    const int64_t pixels =
+        cropped ? int64_t(film.crop[1] - film.crop[0]) * (film.crop[3] - film.crop[2]) : int64_t(film.width) * film.height;
     if (pixels > kMaxFilmPixels)
         fail(p.where(), p.what() + ": the picture has " + std::to_string(pixels) + " pixels; the limit is " +
                             std::to_string(kMaxFilmPixels) + ", so lower the resolution or give a cropwindow");
@@ -139,7 +151,11 @@ void set_pixel_filter(Context* context, const std::string& kind, const Parameter
                 p.where(), p.what() + ": a radius other than 0.5 is ignored; the picture is a little sharper");
         return;
     }
-    for (const std::string_view name : {"xradius", "yradius", "sigma", "B", "C", "tau"}) p.accept(name);
+    for (const std::string_view name : {"xradius", "yradius"}) p.accept("float", name);
+    if (kind == "gaussian") p.accept("float", "sigma");
+    if (kind == "sinc") p.accept("float", "tau");
+    if (kind == "mitchell")
+        for (const std::string_view name : {"B", "C"}) p.accept("float", name);
     context->diagnostics.warn(p.where(),
                               p.what() + " is replaced by a box of radius 0.5; the picture is a little sharper");
 }
@@ -149,13 +165,16 @@ void set_sampler(Context* context, const std::string& kind, const ParameterList&
                                                      "stratified", "independent", "pmj02bn"};
     if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end())
         fail(p.where(), p.what() + " is unknown; use \"halton\"");
-    int64_t samples = p.one_int("pixelsamples", 16);
+    int64_t samples = 0;
     if (kind == "stratified") {
-        samples = int64_t(p.one_int("xsamples", 4)) * p.one_int("ysamples", 4);
-        p.accept("jitter");
+        const int x = p.one_int("xsamples", 4), y = p.one_int("ysamples", 4);
+        if (x > 0 && y > 0) samples = int64_t(x) * y;
+        p.accept("bool", "jitter");
+    } else {
+        samples = p.one_int("pixelsamples", 16);
     }
     if (samples < 1 || samples > (int64_t(1) << 30))
-        fail(p.where(), p.what() + ": the number of samples must be positive");
+        fail(p.where(), p.what() + ": the number of samples must be positive and at most 2^30");
     p.ignore(&context->diagnostics, "seed", "the command line's --seed selects the random numbers");
     p.ignore(&context->diagnostics, "randomization", "the renderer has its own random numbers");
     context->scene.samples_per_pixel = int(samples);
@@ -164,8 +183,11 @@ void set_sampler(Context* context, const std::string& kind, const ParameterList&
 void set_integrator(Context* context, const std::string& kind, const ParameterList& p) {
     constexpr std::array<std::string_view, 9> kKinds{"path",      "volpath",    "bdpt",          "mlt",       "sppm",
                                                      "lightpath", "simplepath", "simplevolpath", "randomwalk"};
-    if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end())
+    if (kind == "ambientocclusion" || kind == "function")
         fail(p.where(), p.what() + " is not supported: it does not compute light transport; use \"path\"");
+    if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end())
+        fail(p.where(), p.what() + " is unknown; correct its name or use \"path\"");
+    context->scene.integrator = kind;
     const int depth = p.one_int("maxdepth", 5);
     if (depth < 0) fail(p.where(), p.what() + ": maxdepth must not be negative");
     if (depth > kMaxDepth)

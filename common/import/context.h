@@ -55,6 +55,7 @@ struct PendingShape {
     int32_t object = kNone;  ///< Index into SceneDescription::objects, or kNone.
     MaterialReference material;
     std::shared_ptr<const AreaLightDefinition> area_light;  ///< Null if the shape does not emit.
+    bool is_scaled_quadric = false;  ///< A sphere or disk that its transformation makes larger or smaller.
     float alpha = 1;
     std::string alpha_texture;  ///< Empty if the shape has none.
     Location where;
@@ -64,6 +65,11 @@ struct PendingShape {
 struct TextureCost {
     int levels = 1;     ///< Of recursion.
     double visits = 1;  ///< Nodes looked at.
+};
+
+/// Bounds of a texture's first channel, which float textures consist of; it need not reach them.
+struct TextureRange {
+    double least = 0, most = 0;
 };
 
 /// What the numbers of a texture are decides what they may be and how a spectrum is reduced (spectra.h). A spectrum texture may
@@ -92,6 +98,8 @@ struct Context {
     std::map<std::string, int32_t> image_index;  ///< By file, encoding and channel choice.
     std::map<std::tuple<float, float, float, bool>, int32_t> emission_index;
     std::vector<TextureCost> texture_costs;     ///< One per scene texture.
+    std::vector<TextureRange> texture_ranges;   ///< The same.
+    std::map<int32_t, TextureRange> image_ranges;  ///< Of the one-channel images of textures, by their index.
     std::map<MaterialId, int> mix_levels;       ///< Of mix materials; others have none.
     int texture_depth = 0, material_depth = 0;  ///< Of the definitions being resolved.
 
@@ -129,7 +137,8 @@ void add_light(Context* context, const std::string& kind, const ParameterList& p
 /// Whether no coordinate is beyond kMaxCoordinate (or not a number).
 bool within_bounds(const Vec3& position);
 
-/// Radiance of an area light on a surface of `area` (its "power" parameter is per primitive, as in pbrt).
+/// Radiance of an area light on a surface of `area`, in world space: its "power" is what each primitive emits, however that is
+/// scaled. (pbrt-v4 divides by the area that a sphere or disk has before its transformation.)
 AreaEmission area_emission(Context* context, const AreaLightDefinition& definition, double area);
 bool area_light_uses_power(const AreaLightDefinition& definition);
 

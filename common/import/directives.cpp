@@ -2,16 +2,27 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "common/import/parser.h"
+#include "common/import/tessellate.h"
 
 namespace lightloom::import {
 namespace {
+
+constexpr std::string_view kAreaLightParameters[] = {
+    "rgb L", "blackbody L", "spectrum L", "float scale", "float power", "bool twosided", "string filename"};
 
 std::string read_name(Tokenizer* tokens, const Location& where, const std::string& word) {
     const Token token = tokens->next();
     if (token.kind != TokenKind::kString) fail(where, word + " needs a quoted name");
     return std::string(token.text);
+}
+
+/// Whether lengths change, by as much as pbrt-v4 warns of.
+bool has_scale(const Mat4& m) {
+    const std::optional<double> scale = similarity_scale(m);
+    return !scale || !(std::fabs(*scale * *scale - 1) <= 1e-3);
 }
 
 /// An Option's value: a word, a string or a number.
@@ -107,8 +118,10 @@ bool Parser::world_item(Tokenizer* tokens, const std::string& word, const Locati
         const std::string kind = read_name(tokens, where, word);
         if (kind != "diffuse")
             fail(where, "AreaLightSource " + quoted(kind) + " is not supported; the only kind is \"diffuse\"");
-        state_.area_light =
-            std::make_shared<AreaLightDefinition>(AreaLightDefinition{parameters(tokens, where, word, kind, "light")});
+        ParameterList list = parameters(tokens, where, word, kind, "light");
+        // Now, not when a shape emits: none might.
+        list.check(kAreaLightParameters);
+        state_.area_light = std::make_shared<AreaLightDefinition>(AreaLightDefinition{std::move(list)});
     } else if (word == "ObjectInstance") {
         object_instance(tokens, where);
     } else if (word == "MakeNamedMedium") {
@@ -171,6 +184,7 @@ void Parser::shape(Tokenizer* tokens, const Location& where) {
                                   {static_transform(where, list.what()), state_.reverse_orientation, pending.area_light != nullptr},
                                   &pending.faces);
     if (!pending.area_light) pending.faces = {};
+    pending.is_scaled_quadric = (kind == "sphere" || kind == "disk") && has_scale(state_.ctm[0]);
     list.finish();
     context_->shapes.push_back(std::move(pending));
 }
@@ -193,9 +207,16 @@ void Parser::object_instance(Tokenizer* tokens, const Location& where) {
     if (current_object_ != kNone)
         fail(where,
              "ObjectInstance inside ObjectBegin: nested instances are not supported; place the inner object outside");
-    const auto it = objects_.find(name);
-    if (it == objects_.end()) fail(where, "no object is named " + quoted(name) + "; define it with ObjectBegin first");
-    context_->scene.instances.push_back({it->second, static_transform(where, "the instance"), where.text()});
+    instances_.push_back({name, static_transform(where, "the instance"), where});
+}
+
+void Parser::place_instances() {
+    for (const PendingInstance& i : instances_) {
+        const auto it = objects_.find(i.object);
+        if (it == objects_.end())
+            fail(i.where, "ObjectInstance: no object is named " + quoted(i.object) + "; define it with ObjectBegin");
+        context_->scene.instances.push_back({it->second, i.object_to_world, i.where.text()});
+    }
 }
 
 }  // namespace lightloom::import

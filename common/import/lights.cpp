@@ -87,7 +87,7 @@ void point_light(Context* context, const ParameterList& p, const Mat4& m) {
     if (const double power = magnitude(p, "power"); power > 0) scale *= power / (4 * kPiD);
     const Vec3 from = p.one_point3("from").value_or(Vec3{0, 0, 0});
     context->scene.point_lights.push_back(
-        {light_position(p, m, from), checked(p, light_colour(context, p, "I"), scale)});
+        {light_position(p, m, from), checked(p, light_colour(context, p, "I"), scale), p.where().text()});
 }
 
 void spot_light(Context* context, const ParameterList& p, const Mat4& m) {
@@ -116,6 +116,7 @@ void spot_light(Context* context, const ParameterList& p, const Mat4& m) {
     light.intensity = checked(p, light_colour(context, p, "I"), scale);
     light.total_height = float(total_height);
     light.falloff_height = float(falloff_height);
+    light.source = p.where().text();
     context->scene.spot_lights.push_back(light);
 }
 
@@ -124,7 +125,7 @@ void distant_light(Context* context, const ParameterList& p, const Mat4& m) {
     if (const double illuminance = magnitude(p, "illuminance"); illuminance > 0) scale *= illuminance;
     const Vec3 from = p.one_point3("from").value_or(Vec3{0, 0, 0}), to = p.one_point3("to").value_or(Vec3{0, 0, 1});
     context->scene.distant_lights.push_back(
-        {unit_vector(p, m, from, to), checked(p, light_colour(context, p, "L"), scale)});
+        {unit_vector(p, m, from, to), checked(p, light_colour(context, p, "L"), scale), p.where().text()});
 }
 
 /// What "illuminance" normalises: the light's own xy plane lit by the upper half of the map. pbrt-v4 counts every pixel
@@ -159,6 +160,7 @@ void infinite_light(Context* context, const ParameterList& p, const Mat4& m) {
     p.refuse("portal", "portals restrict the light to an opening; remove the parameter, the light is the same without");
     InfiniteLight light;
     light.light_to_world = m;
+    light.source = p.where().text();
     if (!similarity_scale(m))
         fail(p.where(), p.what() + ": its transformation must be a rotation, reflection or uniform scale");
     double scale = light_scale(p);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "common/import/context.h"
 #include "common/import/spectra.h"
@@ -18,23 +19,35 @@ TextureId spectrum_or(Context* context, const ParameterList& p, std::string_view
     return id == kNone ? constant_texture(context, Rgb(fallback)) : id;
 }
 
-void check_roughness(Context* context, const ParameterList& p, TextureId id, std::string_view name) {
-    const TextureNode& node = context->scene.textures[size_t(id)];
-    if (node.kind == TextureKind::kConstant && (node.value.r < 0 || node.value.r > 1))
-        fail(p.where(), p.what() + ": " + std::string(name) + " must lie in [0, 1]");
+/// Parameter `name`, whether or not it is remapped to an alpha; kNone if absent. A number outside of [0, 1] is an error. What a
+/// texture makes of its pixels may be: above 1 it scatters as in pbrt-v4, but no coat lets through less light for it (its tables
+/// end at 1); below 0, where pbrt computes with what is no number, it is smooth.
+TextureId roughness_parameter(Context* context, const ParameterList& p, const std::string& name) {
+    const TextureId id = float_texture_parameter(context, p, name);
+    if (id == kNone) return kNone;
+    const TextureRange range = context->texture_ranges[size_t(id)];
+    if (range.least >= 0 && range.most <= 1) return id;
+    const Location& where = p.find_any(name)->where;
+    char text[80];
+    if (range.least == range.most) {
+        std::snprintf(text, sizeof text, " must lie in [0, 1], not be %g", range.least);
+        fail(where, p.what() + ": " + name + text);
+    }
+    std::snprintf(text, sizeof text, " may reach from %g to %g", range.least, range.most);
+    context->diagnostics.warn(where, p.what() + ": " + name + text +
+                                         ", beyond [0, 1]: below 0 it counts as 0, above 1 a coat lets light through as at 1");
+    return id;
 }
 
 /// `prefix`roughness, `prefix`uroughness and `prefix`vroughness.
 void read_roughness(Context* context, const ParameterList& p, const std::string& prefix, float fallback, TextureId* u,
                     TextureId* v) {
-    TextureId both = float_texture_parameter(context, p, prefix + "roughness");
+    TextureId both = roughness_parameter(context, p, prefix + "roughness");
     if (both == kNone) both = constant_texture(context, Rgb(fallback));
-    *u = float_texture_parameter(context, p, prefix + "uroughness");
-    *v = float_texture_parameter(context, p, prefix + "vroughness");
+    *u = roughness_parameter(context, p, prefix + "uroughness");
+    *v = roughness_parameter(context, p, prefix + "vroughness");
     if (*u == kNone) *u = both;
     if (*v == kNone) *v = both;
-    check_roughness(context, p, *u, prefix + "roughness");
-    check_roughness(context, p, *v, prefix + "roughness");
 }
 
 /// An index of refraction as float, named glass, or spectrum; positive.
@@ -52,11 +65,10 @@ float read_index(Context* context, const ParameterList& p, std::string_view name
     return index;
 }
 
-/// "metal-Cu-eta" split into metal and property; empty if it is not of this form.
-std::string metal_of(const Parameter* p, std::string_view suffix) {
-    if (!p || p->strings.size() != 1 || !has_suffix(p->strings[0], suffix) || p->strings[0].rfind("metal-", 0) != 0)
-        return {};
-    return p->strings[0].substr(0, p->strings[0].size() - suffix.size());
+/// The metal that "metal-Cu-eta" names together with its property; nothing for any other spectrum.
+std::optional<ConductorRgb> metal_of(const Parameter* p, std::string_view property) {
+    if (!p || p->strings.size() != 1 || !has_suffix(p->strings[0], property)) return std::nullopt;
+    return named_metal(p->strings[0].substr(0, p->strings[0].size() - property.size()));
 }
 
 /// The reflectance or eta and k of a conductor; `prefix` is "" or "conductor.".
@@ -64,23 +76,18 @@ void read_conductor(Context* context, const ParameterList& p, const std::string&
     m->reflectance = spectrum_texture_parameter(context, p, "reflectance", TextureUse::kReflectance);
     const std::string eta_name = prefix + "eta", k_name = prefix + "k";
     if (m->reflectance != kNone) {
-        if (p.find_any(eta_name) || p.find_any(k_name))
-            fail(p.where(), p.what() + ": give either reflectance or " + eta_name + " and " + k_name + ", not both");
+        for (const std::string_view name : {eta_name, k_name})
+            for (const std::string_view type : {"rgb", "spectrum", "texture"})
+                if (p.find(type, name))
+                    fail(p.where(), p.what() + ": give either reflectance or " + eta_name + " and " + k_name + ", not both");
         return;
     }
     const Parameter *eta = p.find("spectrum", eta_name), *k = p.find("spectrum", k_name);
-    const std::string eta_metal = eta ? metal_of(eta, "-eta") : "", k_metal = k ? metal_of(k, "-k") : "";
-    // A metal's eta and k are reduced together, see spectra.h. pbrt's default is copper for either.
-    const bool eta_is_default = !p.find_any(eta_name), k_is_default = !p.find_any(k_name);
-    const auto metal = [&](const Parameter* where, const std::string& name) {
-        if (const auto found = named_metal(name)) return *found;
-        fail(where ? where->where : p.where(), p.what() + ": unknown named spectrum " + quoted(name));
-    };
-    if (eta_is_default) m->eta = constant_texture(context, named_metal("metal-Cu")->eta);
-    if (k_is_default) m->k = constant_texture(context, named_metal("metal-Cu")->k);
-    if (!eta_metal.empty()) m->eta = constant_texture(context, metal(eta, eta_metal).eta);
-    if (!k_metal.empty()) m->k = constant_texture(context, metal(k, k_metal).k);
-    if (eta && k && eta_metal.empty() && k_metal.empty()) {
+    // A metal's eta and k are reduced together, see spectra.h.
+    const std::optional<ConductorRgb> eta_metal = metal_of(eta, "-eta"), k_metal = metal_of(k, "-k");
+    if (eta_metal) m->eta = constant_texture(context, eta_metal->eta);
+    if (k_metal) m->k = constant_texture(context, k_metal->k);
+    if (eta && k && !eta_metal && !k_metal) {
         const ConductorRgb both =
             conductor_rgb(*spectrum_parameter(context, p, eta_name), *spectrum_parameter(context, p, k_name));
         m->eta = constant_texture(context, both.eta);
@@ -88,7 +95,10 @@ void read_conductor(Context* context, const ParameterList& p, const std::string&
     }
     if (m->eta == kNone) m->eta = spectrum_texture_parameter(context, p, eta_name, TextureUse::kUnbounded);
     if (m->k == kNone) m->k = spectrum_texture_parameter(context, p, k_name, TextureUse::kUnbounded);
-    if (m->eta == kNone || m->k == kNone) p.finish();  // A parameter of the wrong type.
+    // pbrt's default is copper for either. One of the wrong type is finish()'s to report, or no more than an Attribute's default
+    // that suits another kind of material.
+    if (m->eta == kNone) m->eta = constant_texture(context, named_metal("metal-Cu")->eta);
+    if (m->k == kNone) m->k = constant_texture(context, named_metal("metal-Cu")->k);
 }
 
 void read_layers(Context* context, const ParameterList& p, Material* m) {
@@ -109,8 +119,9 @@ void read_layers(Context* context, const ParameterList& p, Material* m) {
     else
         p.ignore(d, "maxdepth", "the layers here are joined analytically, without a random walk");
     p.ignore(d, "nsamples", "the layers here are joined analytically, without a random walk");
-    for (const std::string_view name : {"albedo", "g"}) {
-        const Parameter* medium = p.find_any(name);
+    for (const std::string_view declaration : {"rgb albedo", "spectrum albedo", "texture albedo", "float g", "texture g"}) {
+        const size_t space = declaration.find(' ');
+        const Parameter* medium = p.find(declaration.substr(0, space), declaration.substr(space + 1));
         const auto is_zero = [](double v) { return v == 0; };
         // A texture or a named spectrum has no numbers.
         if (medium && (medium->numbers.empty() || medium->type == "spectrum" ||
@@ -143,7 +154,7 @@ void read_mix(Context* context, const ParameterList& p, Material* m) {
 MaterialId make_material(Context* context, const std::string& name, const Definition& definition) {
     const ParameterList& p = definition.parameters;
     const std::string& kind = definition.kind;
-    p.accept("type");
+    p.accept("string", "type");
     p.refuse("normalmap", "normal maps change the picture; remove the parameter to render without");
     p.refuse("displacement", "bump maps change the picture; remove the parameter to render without");
     Material m;

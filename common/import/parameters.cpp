@@ -201,29 +201,36 @@ void ParameterList::ignore(Diagnostics* diagnostics, std::string_view name, cons
         diagnostics->warn(p->where, what_ + ": " + title(*p) + " is ignored: " + reason);
 }
 
+void ParameterList::ignore_all(Diagnostics* diagnostics, const std::string& reason) const {
+    for (const Parameter& p : parameters_) ignore(diagnostics, p.name, reason);
+}
+
 void ParameterList::refuse(std::string_view name, const std::string& reason) const {
     if (const Parameter* p = find_any(name)) fail(p->where, what_ + ": " + title(*p) + " is not supported: " + reason);
 }
 
 void ParameterList::finish() const {
-    for (const Parameter& p : parameters_) {
-        if (p.used || p.from_attribute) continue;
-        for (const std::string& asked : asked_) {
-            const size_t space = asked.find(' ');
-            if (asked.substr(space + 1) == p.name)
-                fail(p.where, what_ + ": " + title(p) + " has the wrong type; write " + quoted(asked));
-        }
-        fail_unknown(p);
-    }
-}
-
-void ParameterList::check_names(std::span<const std::string_view> names) const {
     for (const Parameter& p : parameters_)
-        if (std::find(names.begin(), names.end(), p.name) == names.end()) fail_unknown(p);
+        if (!p.used && !p.from_attribute) fail_unknown(p, {asked_.begin(), asked_.end()});
 }
 
-void ParameterList::fail_unknown(const Parameter& p) const {
-    fail(p.where, what_ + ": unknown parameter " + title(p) + "; remove it or correct its name");
+void ParameterList::check(std::span<const std::string_view> known) const {
+    for (const Parameter& p : parameters_)
+        if (!p.from_attribute && std::find(known.begin(), known.end(), p.type + " " + p.name) == known.end())
+            fail_unknown(p, {known.begin(), known.end()});
+}
+
+void ParameterList::fail_unknown(const Parameter& p, const std::vector<std::string_view>& known) const {
+    std::vector<std::string> right;
+    for (const std::string_view k : known) {
+        if (k.substr(k.find(' ') + 1) != p.name) continue;
+        std::string declaration = quoted(std::string(k));
+        if (std::find(right.begin(), right.end(), declaration) == right.end()) right.push_back(std::move(declaration));
+    }
+    if (right.empty()) fail(p.where, what_ + ": unknown parameter " + title(p) + "; remove it or correct its name");
+    std::string list = right[0];
+    for (size_t i = 1; i < right.size(); ++i) list += " or " + right[i];
+    fail(p.where, what_ + ": " + title(p) + " has the wrong type; write " + list);
 }
 
 void ParameterList::add_defaults(const ParameterList& defaults) {

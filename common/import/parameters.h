@@ -53,16 +53,18 @@ class ParameterList {
 
     /// Names a parameter that may be ignored: a warning with the reason if it is present.
     void ignore(Diagnostics* diagnostics, std::string_view name, const std::string& reason) const;
+    /// The same for every parameter of the list.
+    void ignore_all(Diagnostics* diagnostics, const std::string& reason) const;
     /// An error with the reason if the parameter is present.
     void refuse(std::string_view name, const std::string& reason) const;
     /// Accepts a parameter that cannot change anything here.
-    void accept(std::string_view name) const { find_any(name); }
+    void accept(std::string_view type, std::string_view name) const { find(type, name); }
 
     /// Fails if a parameter was not used: it is unknown or of the wrong type.
     void finish() const;
-    /// Fails if a parameter has a name that is not in `names`: finish() does not judge what comes from an Attribute
-    /// directive, because a default need not suit every kind of shape, light ...
-    void check_names(std::span<const std::string_view> names) const;
+    /// Fails if a parameter that the list itself sets is not among the `known` ones, each a "type name": finish() does not judge
+    /// what comes from an Attribute directive, because a default need not suit every kind of shape, light ...
+    void check(std::span<const std::string_view> known) const;
     /// Adds the defaults of Attribute directives that this list does not set itself.
     void add_defaults(const ParameterList& defaults);
     /// For the Attribute directive: later values replace earlier ones.
@@ -70,7 +72,8 @@ class ParameterList {
 
   private:
     const Parameter& expect_one(const Parameter& p, size_t count) const;
-    [[noreturn]] void fail_unknown(const Parameter& p) const;
+    /// For one that is not among the `known` ones, by its type or its very name.
+    [[noreturn]] void fail_unknown(const Parameter& p, const std::vector<std::string_view>& known) const;
 
     Location where_;
     std::string what_;

@@ -1,26 +1,39 @@
 #include "common/import/parser.h"
 
-#include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace lightloom::import {
 namespace {
 
-// Every name that some kind of shape, light, material or texture asks for: an Attribute directive may set no other.
-constexpr std::string_view kShapeNames[] = {
-    "alpha", "radius", "zmin", "zmax", "phimax", "innerradius", "height", "P", "N", "S", "uv", "indices", "faceIndices",
-    "filename", "displacement", "edgelength", "emissionfilename"};
-constexpr std::string_view kLightNames[] = {
-    "I", "L", "scale", "power", "illuminance", "from", "to", "coneangle", "conedeltaangle", "filename", "portal",
-    "twosided"};
-constexpr std::string_view kMaterialNames[] = {
-    "type", "normalmap", "displacement", "reflectance", "transmittance", "scale", "eta", "k", "interface.eta",
-    "conductor.eta", "conductor.k", "roughness", "uroughness", "vroughness", "interface.roughness",
-    "interface.uroughness", "interface.vroughness", "conductor.roughness", "conductor.uroughness",
-    "conductor.vroughness", "remaproughness", "thickness", "maxdepth", "nsamples", "g", "albedo", "materials", "amount"};
-constexpr std::string_view kTextureNames[] = {
-    "value", "tex", "tex1", "tex2", "scale", "amount", "dimension", "mapping", "uscale", "vscale", "udelta", "vdelta",
-    "filename", "filter", "maxanisotropy", "wrap", "encoding", "invert"};
+// What some kind of shape, light, material or texture asks for: an Attribute directive may set nothing else.
+constexpr std::string_view kShapeParameters[] = {
+    "float alpha", "texture alpha", "float radius", "float zmin", "float zmax", "float phimax", "float innerradius",
+    "float height", "point3 P", "normal N", "vector3 S", "point2 uv", "integer indices", "integer faceIndices",
+    "string filename", "float edgelength", "float displacement", "texture displacement", "string emissionfilename"};
+constexpr std::string_view kLightParameters[] = {
+    "rgb I", "blackbody I", "spectrum I", "rgb L", "blackbody L", "spectrum L", "float scale", "float power",
+    "float illuminance", "point3 from", "point3 to", "float coneangle", "float conedeltaangle", "string filename",
+    "point3 portal", "bool twosided"};
+constexpr std::string_view kMaterialParameters[] = {
+    "string type", "string normalmap", "float displacement", "texture displacement", "rgb reflectance",
+    "spectrum reflectance", "texture reflectance", "rgb transmittance", "spectrum transmittance", "texture transmittance",
+    "float scale", "float eta", "rgb eta", "spectrum eta", "texture eta", "rgb k", "spectrum k", "texture k",
+    "float interface.eta", "spectrum interface.eta", "rgb conductor.eta", "spectrum conductor.eta",
+    "texture conductor.eta", "rgb conductor.k", "spectrum conductor.k", "texture conductor.k", "float roughness",
+    "texture roughness", "float uroughness", "texture uroughness", "float vroughness", "texture vroughness",
+    "float interface.roughness", "texture interface.roughness", "float interface.uroughness",
+    "texture interface.uroughness", "float interface.vroughness", "texture interface.vroughness",
+    "float conductor.roughness", "texture conductor.roughness", "float conductor.uroughness",
+    "texture conductor.uroughness", "float conductor.vroughness", "texture conductor.vroughness", "bool remaproughness",
+    "float thickness", "integer maxdepth", "integer nsamples", "float g", "texture g", "rgb albedo", "spectrum albedo",
+    "texture albedo", "string materials", "float amount", "texture amount"};
+constexpr std::string_view kTextureParameters[] = {
+    "float value", "rgb value", "spectrum value", "texture value", "float tex", "rgb tex", "spectrum tex", "texture tex",
+    "float tex1", "rgb tex1", "spectrum tex1", "texture tex1", "float tex2", "rgb tex2", "spectrum tex2", "texture tex2",
+    "float scale", "texture scale", "float amount", "texture amount", "integer dimension", "string mapping",
+    "float uscale", "float vscale", "float udelta", "float vdelta", "string filename", "string filter",
+    "float maxanisotropy", "string wrap", "string encoding", "bool invert"};
 
 std::string read_string(Tokenizer* tokens, const Location& where, const std::string& word) {
     const Token token = tokens->next();
@@ -62,6 +75,9 @@ Vec3 vec3(const std::vector<double>& v, size_t first) {
     return {float(v[first]), float(v[first + 1]), float(v[first + 2])};
 }
 
+/// What a scope's directives begin with.
+std::string scope_name(char kind) { return kind == 'a' ? "Attribute" : kind == 't' ? "Transform" : "Object"; }
+
 }  // namespace
 
 Parser::Parser(Context* context) : context_(context) {
@@ -71,10 +87,12 @@ Parser::Parser(Context* context) : context_(context) {
 void Parser::parse_main(const std::string& name) {
     const Location where{context_->intern_file_name(name), 0};
     parse_file(name, where);
-    if (!scopes_.empty())
-        fail(scopes_.back().where,
-             "this scope is never closed; add the missing AttributeEnd, TransformEnd or ObjectEnd");
+    if (!scopes_.empty()) {
+        const std::string name_of_scope = scope_name(scopes_.back().kind);
+        fail(scopes_.back().where, "this " + name_of_scope + "Begin is never closed; add the missing " + name_of_scope + "End");
+    }
     if (!in_world_) fail(where, "the file has no WorldBegin; a scene needs one before its shapes and lights");
+    place_instances();
 }
 
 void Parser::parse_file(const std::string& name, const Location& from) {
@@ -191,7 +209,7 @@ bool Parser::scope(Tokenizer* tokens, const std::string& word, const Location& w
         close_scope('o', word, where);
         current_object_ = kNone;
     } else if (word == "WorldBegin") {
-        require_world(where, word, false);
+        if (in_world_) fail(where, "a second WorldBegin; remove it");
         in_world_ = true;
         state_.ctm[0] = state_.ctm[1] = Mat4();
         state_.active[0] = state_.active[1] = true;
@@ -221,9 +239,13 @@ void Parser::open_scope(char kind, const Location& where) {
 }
 
 void Parser::close_scope(char kind, const std::string& word, const Location& where) {
-    if (scopes_.empty() || scopes_.back().kind != kind)
-        fail(where, word + " does not match " +
-                        (scopes_.empty() ? "any open scope" : "the scope opened at " + scopes_.back().where.text()));
+    if (scopes_.size() <= outer_scopes_)
+        fail(where, word + " does not match any open scope" + (outer_scopes_ > 0 ? " of the imported file" : "") + "; remove it");
+    if (scopes_.back().kind != kind) {
+        const std::string open = scope_name(scopes_.back().kind);
+        fail(where, word + " does not match the " + open + "Begin at " + scopes_.back().where.text() + "; close that with " +
+                        open + "End first");
+    }
     state_ = std::move(scopes_.back().state);
     scopes_.pop_back();
 }
@@ -249,10 +271,11 @@ void Parser::import(Tokenizer* tokens, const Location& where) {
     // Unlike Include, what the file does to the graphics state ends with it.
     const GraphicsState state = state_;
     const auto coordinate_systems = coordinate_systems_;
-    const size_t depth = scopes_.size();
+    const size_t outer = std::exchange(outer_scopes_, scopes_.size());
     include(tokens, where);
-    if (scopes_.size() != depth)
-        fail(where, "the imported file leaves a scope open or closes one that it did not open");
+    if (scopes_.size() != outer_scopes_)
+        fail(where, "the imported file leaves the scope open that begins at " + scopes_.back().where.text());
+    outer_scopes_ = outer;
     state_ = state;
     coordinate_systems_ = coordinate_systems;
 }
@@ -263,11 +286,11 @@ void Parser::attribute(Tokenizer* tokens, const Location& where) {
         fail(where, "Attribute " + quoted(target) + ": the target must be shape, light, material, medium or texture");
     const std::string what = "Attribute " + quoted(target);
     const ParameterList list = ParameterList::parse(tokens, where, what);
-    // No directive reads the parameters of a medium.
-    if (target == "shape") list.check_names(kShapeNames);
-    if (target == "light") list.check_names(kLightNames);
-    if (target == "material") list.check_names(kMaterialNames);
-    if (target == "texture") list.check_names(kTextureNames);
+    if (target == "shape") list.check(kShapeParameters);
+    if (target == "light") list.check(kLightParameters);
+    if (target == "material") list.check(kMaterialParameters);
+    if (target == "texture") list.check(kTextureParameters);
+    if (target == "medium") list.ignore_all(&context_->diagnostics, "participating media are not supported, and none is used");
     state_.attributes.try_emplace(target, ParameterList(where, what)).first->second.override_with(list);
 }
 

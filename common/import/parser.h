@@ -38,6 +38,13 @@ class Parser {
         Location where;
     };
 
+    /// Its object may be defined further down.
+    struct PendingInstance {
+        std::string object;
+        Mat4 object_to_world;
+        Location where;
+    };
+
     void parse_file(const std::string& name, const Location& from);
     void directive(Tokenizer* tokens, const Token& token);
     bool transformation(Tokenizer* tokens, const std::string& word, const Location& where);
@@ -54,6 +61,7 @@ class Parser {
     void close_scope(char kind, const std::string& word, const Location& where);
     void object_begin(Tokenizer* tokens, const Location& where);
     void object_instance(Tokenizer* tokens, const Location& where);
+    void place_instances();
     void texture(Tokenizer* tokens, const Location& where);
     void shape(Tokenizer* tokens, const Location& where);
     void medium_interface(Tokenizer* tokens, const Location& where);
@@ -70,8 +78,10 @@ class Parser {
     Context* context_;
     GraphicsState state_;
     std::vector<Scope> scopes_;
+    size_t outer_scopes_ = 0;  ///< Those of them that the file being imported may not close.
     std::map<std::string, std::array<Mat4, 2>> coordinate_systems_;
     std::map<std::string, int32_t> objects_;
+    std::vector<PendingInstance> instances_;
     std::map<std::string, bool> media_;
     int32_t current_object_ = kNone;
     int include_depth_ = 0, include_count_ = 0;

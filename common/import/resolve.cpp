@@ -49,7 +49,7 @@ TriangleMesh subset(const TriangleMesh& mesh, const std::vector<size_t>& triangl
 
 /// As in pbrt, every triangle, disk, sphere and patch (also a PLY quadrilateral) is a light of its own with the given
 /// power, which the triangles that stand for it share by area; those of equal radiance stay together.
-void add_powered_mesh(Context* context, TriangleMesh mesh, const PendingShape& shape) {
+void add_powered_mesh(Context* context, TriangleMesh&& mesh, const PendingShape& shape) {
     const size_t triangles_in_all = mesh.indices.size() / 3;
     const auto face_of = [&](size_t triangle) { return shape.faces.empty() ? triangle : shape.faces[triangle]; };
     const size_t count = triangles_in_all == 0 ? 0 : face_of(triangles_in_all - 1) + 1;
@@ -63,8 +63,10 @@ void add_powered_mesh(Context* context, TriangleMesh mesh, const PendingShape& s
                                                    (shape.faces.empty() ? " triangles" : " faces") +
                                                    " of this light emits the given power");
     for (const auto& [area, triangles] : by_area) {
-        TriangleMesh part = subset(mesh, triangles);
-        part.attributes.emission = add_emission(context, area_emission(context, *shape.area_light, double(area)));
+        const int32_t emission = add_emission(context, area_emission(context, *shape.area_light, double(area)));
+        const bool whole = triangles.size() == triangles_in_all;
+        TriangleMesh part = whole ? std::move(mesh) : subset(mesh, triangles);
+        part.attributes.emission = emission;
         context->scene.meshes.push_back(std::move(part));
     }
 }
@@ -95,6 +97,9 @@ void add_shape(Context* context, PendingShape shape) {
             fail(shape.where, "an emitting shape with an alpha is not supported: the light sampled on it would be that of "
                               "the uncut shape; cut the geometry instead");
         const bool powered = area_light_uses_power(*shape.area_light);
+        if (powered && shape.is_scaled_quadric)
+            context->diagnostics.warn(shape.where, "the light emits its power from the sphere or disk as it is scaled; pbrt-v4 "
+                                                   "takes the area before the transformation, and warns of the scale");
         if (powered && mesh) return add_powered_mesh(context, std::move(*mesh), shape);
         const double area = sphere ? 4 * kPiD * double(sphere->radius) * sphere->radius : 0;
         const AreaEmission emission = area_emission(context, *shape.area_light, area);

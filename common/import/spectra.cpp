@@ -223,6 +223,13 @@ std::optional<float> named_glass(const std::string& name) {
     return std::nullopt;
 }
 
+bool is_named_spectrum(const std::string& name) {
+    bool clipped = false;
+    for (const std::string_view suffix : {"-eta", "-k"})
+        if (has_suffix(name, suffix) && named_metal(name.substr(0, name.size() - suffix.size()))) return true;
+    return named_glass(name) || named_illuminant_rgb(name, &clipped);
+}
+
 std::optional<Spectrum> spectrum_from_pairs(const std::vector<double>& values) {
     if (values.empty() || values.size() % 2 != 0) return std::nullopt;
     Spectrum spectrum;

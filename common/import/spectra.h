@@ -57,6 +57,8 @@ ConductorRgb conductor_rgb(const Spectrum& eta, const Spectrum& k);
 std::optional<ConductorRgb> named_metal(const std::string& name);
 /// n_d of "glass-BK7" and its kin; nothing for an unknown name.
 std::optional<float> named_glass(const std::string& name);
+/// Whether a parameter of some kind may have this name as its spectrum: any of the above, a metal's with "-eta" or "-k".
+bool is_named_spectrum(const std::string& name);
 
 /// A spectrum file: pairs of wavelength and value, '#' comments. Nothing if the text is not that.
 std::optional<Spectrum> parse_spectrum_text(const std::string& text);

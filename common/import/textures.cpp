@@ -15,7 +15,21 @@ constexpr int kMaxNesting = 31;
 /// Nodes that one look-up may visit: textures that use each other twice on every level double it each time.
 constexpr double kMaxVisits = 4096;
 
-/// Reads a spectrum given by name, file or values; fails if there is none.
+/// The text of the file that a spectrum parameter names; `what` names the directive.
+std::string read_spectrum_file(Context* context, const Parameter& p, const std::string& what) {
+    const std::string& name = p.strings[0];
+    const std::string given = what + ": " + quoted("spectrum " + p.name) + " is " + quoted(name);
+    if (is_named_spectrum(name))
+        fail(p.where, given + ", a spectrum that is known by name but not supported here; give its values or a file");
+    const Result<std::string> path = normalise_reference(name);
+    if (!path.ok()) fail(p.where, given + ": " + path.status().message());
+    Result<std::string> text = context->files->read(*path);
+    if (text.ok()) return std::move(text).value();
+    if (text.status().code() != StatusCode::kNotFound) fail(p.where, given + ": " + text.status().message());
+    fail(p.where, given + ", which is neither a spectrum known by name nor a file below the scene's directory; correct it");
+}
+
+/// Reads a spectrum given by file or values; fails if there is none.
 Spectrum read_spectrum(Context* context, const Parameter& p, const std::string& what) {
     if (!p.numbers.empty() && p.strings.empty()) {
         if (auto spectrum = spectrum_from_pairs(p.numbers)) return *spectrum;
@@ -24,7 +38,7 @@ Spectrum read_spectrum(Context* context, const Parameter& p, const std::string& 
     }
     if (p.strings.size() != 1 || !p.numbers.empty())
         fail(p.where, what + ": the spectrum " + quoted(p.name) + " needs one name, one file or pairs of numbers");
-    const std::string text = context->read_file(p.where, p.strings[0]);
+    const std::string text = read_spectrum_file(context, p, what);
     if (auto spectrum = parse_spectrum_text(text)) return *spectrum;
     fail(p.where,
          what + ": " + quoted(p.strings[0]) + " is not a spectrum file (pairs of increasing wavelength and value)");
@@ -88,7 +102,7 @@ TextureId image_texture(Context* context, const ParameterList& parameters, Textu
     if (filter != "point" && filter != "bilinear")
         context->diagnostics.warn(parameters.where(), parameters.what() + ": the filter " + quoted(filter) +
                                                           " becomes bilinear; samples average the rest");
-    parameters.accept("maxanisotropy");  // Belongs to the EWA filter only.
+    parameters.accept("float", "maxanisotropy");  // Belongs to the EWA filter only.
     const std::string reference = parameters.one_string("filename", "");
     if (reference.empty()) fail(parameters.where(), parameters.what() + " has no \"string filename\"");
     ImageRequest request;
@@ -141,6 +155,52 @@ TextureId make_texture(Context* context, const Definition& definition, TextureUs
          parameters.what() + " is not supported; use constant, scale, mix, checkerboard or imagemap");
 }
 
+TextureRange hull(const TextureRange& a, const TextureRange& b) {
+    return {std::fmin(a.least, b.least), std::fmax(a.most, b.most)};
+}
+
+TextureRange product(const TextureRange& a, const TextureRange& b) {
+    const double corners[] = {a.least * b.least, a.least * b.most, a.most * b.least, a.most * b.most};
+    TextureRange out{corners[0], corners[0]};
+    for (const double corner : corners) out = hull(out, {corner, corner});
+    return out;
+}
+
+/// Of the pixels of a one-channel image.
+TextureRange range_of(const Image& image) {
+    if (image.floats.empty()) return {0, 1};
+    const auto [least, most] = std::minmax_element(image.floats.begin(), image.floats.end());
+    return {double(*least), double(*most)};
+}
+
+/// Of a node whose operands have been added.
+TextureRange range_of(Context* context, const TextureNode& node) {
+    const auto of = [&](TextureId id) { return context->texture_ranges[size_t(id)]; };
+    switch (node.kind) {
+        case TextureKind::kConstant: return {double(node.value.r), double(node.value.r)};
+        case TextureKind::kCheckerboard: return hull(of(node.a), of(node.b));
+        case TextureKind::kScale: return product(of(node.a), of(node.b));
+        case TextureKind::kMix: {
+            const TextureRange t = of(node.amount);
+            if (t.least >= 0 && t.most <= 1) return hull(of(node.a), of(node.b));
+            const TextureRange a = product(of(node.a), {1 - t.most, 1 - t.least}), b = product(of(node.b), t);
+            return {a.least + b.least, a.most + b.most};
+        }
+        case TextureKind::kImage: {
+            const Image& image = context->scene.images[size_t(node.image)];
+            if (image.channels != 1) return {};  // Of colours, which nothing asks about.
+            const auto [it, inserted] = context->image_ranges.try_emplace(node.image);
+            if (inserted) it->second = range_of(image);
+            TextureRange range = it->second;
+            if (node.wrap == WrapMode::kBlack) range = hull(range, {0, 0});
+            range = product(range, {double(node.scale), double(node.scale)});
+            if (node.invert) range = {1 - range.most, 1 - range.least};
+            return {std::fmax(range.least, 0.0), std::fmax(range.most, 0.0)};
+        }
+    }
+    return {};
+}
+
 /// Marks a texture that is being resolved, so that a cycle is found.
 constexpr TextureId kInProgress = -2;
 
@@ -185,6 +245,7 @@ TextureId add_node(Context* context, const TextureNode& node) {
         cost.levels = std::max(cost.levels, below.levels + 1);
         cost.visits += below.visits;
     }
+    context->texture_ranges.push_back(range_of(context, node));
     context->scene.textures.push_back(node);
     context->texture_costs.push_back(cost);
     return TextureId(context->scene.textures.size()) - 1;

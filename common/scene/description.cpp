@@ -9,6 +9,8 @@ namespace {
 
 std::string at(const ShapeAttributes& a) { return a.source.empty() ? std::string("shape") : a.source; }
 
+std::string at(const InfiniteLight& l) { return l.source.empty() ? std::string("infinite light") : l.source; }
+
 bool rgb_ok(const Rgb& c) { return is_finite(c) && c.r >= 0 && c.g >= 0 && c.b >= 0; }
 
 struct Checker {
@@ -94,10 +96,10 @@ Status validate(const SceneDescription& description) {
     for (const AreaEmission& e : description.emissions)
         if (!rgb_ok(e.radiance)) return invalid_argument("an area light's radiance is negative or not finite");
     for (const InfiniteLight& l : description.infinite_lights) {
-        if (!rgb_ok(l.radiance)) return invalid_argument("an infinite light's radiance is negative or not finite");
-        if (!inverse(l.light_to_world)) return invalid_argument("an infinite light's transformation is singular");
+        if (!rgb_ok(l.radiance)) return invalid_argument(at(l) + ": the light's radiance is negative or not finite");
+        if (!inverse(l.light_to_world)) return invalid_argument(at(l) + ": the light's transformation is singular");
         if (l.image != kNone && (size_t(l.image) >= description.images.size() || description.images[size_t(l.image)].empty()))
-            return invalid_argument("an infinite light's image is missing or empty");
+            return invalid_argument(at(l) + ": the light's image is missing or empty");
     }
     return {};
 }

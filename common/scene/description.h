@@ -112,7 +112,8 @@ struct Instance {
 
 struct PointLight {
     Vec3 position;
-    Rgb intensity;  ///< W / sr.
+    Rgb intensity;            ///< W / sr.
+    std::string source = {};  ///< "file:line" of the light; empty if none is known.
 };
 
 struct SpotLight {
@@ -122,17 +123,20 @@ struct SpotLight {
     // 1 - cosine of an angle, which has the digits that the cosine of a narrow cone has lost.
     float total_height = 0;    ///< Of the angle beyond which the light is dark.
     float falloff_height = 0;  ///< Of the angle within which it has full intensity; smoothstep between.
+    std::string source = {};
 };
 
 struct DistantLight {
     Vec3 direction;  ///< Unit vector in which the light travels.
     Rgb irradiance;  ///< On a surface facing it, W / m^2.
+    std::string source = {};
 };
 
 struct InfiniteLight {
     Mat4 light_to_world;   ///< Rotation (and reflection) part is used.
     Rgb radiance{1.0f};    ///< Multiplies the image, or is the constant radiance when there is none.
     int32_t image = kNone; ///< Equal-area octahedral square map, index into images.
+    std::string source = {};
 };
 
 struct PerspectiveCamera {
@@ -151,7 +155,7 @@ struct FilmDescription {
     /// Crop window in pixels, half open: x0, x1, y0, y1; all -1 means the whole frame.
     int crop[4] = {-1, -1, -1, -1};
     float exposure_scale = 1;          ///< iso * exposure time / 100: multiplies the image.
-    std::string file_name;
+    std::string file_name;             ///< As in the scene file; where pictures go is the command line's to say.
 };
 
 struct SceneDescription {
@@ -171,6 +175,7 @@ struct SceneDescription {
     FilmDescription film;
     int max_depth = 5;                  ///< Bounces, as in pbrt: paths have up to max_depth + 1 edges.
     int samples_per_pixel = 16;         ///< What the file asks for; the command line may override.
+    std::string integrator;             ///< As in the scene file, empty if it has none; the command line's --algorithm replaces it.
     std::vector<std::string> warnings;  ///< Named warnings: "file:line: what was ignored and why that matters".
 };
 

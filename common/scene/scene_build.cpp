@@ -26,8 +26,8 @@ void drop_degenerate_triangles(TriangleMesh* mesh) {
 }  // namespace
 
 void Scene::collect_emitters(std::vector<Emitter>* emitters) {
-    const auto new_light = [&](const std::string& source) {
-        light_sources_.push_back(source);
+    const auto new_light = [&](const std::string& source, const char* fallback = "") {
+        light_sources_.push_back(source.empty() ? fallback : source);
         return int32_t(light_sources_.size()) - 1;
     };
     for (const TriangleMesh& mesh : description_.meshes) {
@@ -83,7 +83,7 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
         e.kind = EmitterKind::kPoint;
         e.position = l.position;
         e.radiance = l.intensity;
-        e.light = new_light("point light");
+        e.light = new_light(l.source, "point light");
         emitters->push_back(e);
     }
     for (const SpotLight& l : description_.spot_lights) {
@@ -94,7 +94,7 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
         e.radiance = l.intensity;
         e.total_height = l.total_height;
         e.falloff_height = l.falloff_height;
-        e.light = new_light("spot light");
+        e.light = new_light(l.source, "spot light");
         emitters->push_back(e);
     }
     for (const DistantLight& l : description_.distant_lights) {
@@ -102,13 +102,17 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
         e.kind = EmitterKind::kDistant;
         e.normal = l.direction;
         e.radiance = l.irradiance;
-        e.light = new_light("distant light");
+        e.light = new_light(l.source, "distant light");
         emitters->push_back(e);
     }
     if (!description_.infinite_lights.empty()) {
         Emitter e;
         e.kind = EmitterKind::kEnvironment;
-        e.light = new_light("infinite light");
+        std::string source = description_.infinite_lights[0].source;
+        // They are one emitter, which is sampled by what all of them add up to.
+        const size_t others = description_.infinite_lights.size() - 1;
+        if (others > 0 && !source.empty()) source += " (and " + std::to_string(others) + " more)";
+        e.light = new_light(source, "infinite light");
         emitters->push_back(e);
     }
 }

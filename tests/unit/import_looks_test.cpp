@@ -94,6 +94,9 @@ TEST(ImportMaterial, WhatIsNotModelledIsNamed) {
     expect_error("Material \"conductor\" \"rgb reflectance\" [1 1 1] \"rgb eta\" [1 1 1]", {"not both"});
     expect_error("Material \"conductor\" \"spectrum eta\" \"metal-Xx-eta\"", {"metal-Xx"});
     expect_error("Material \"dielectric\" \"float roughness\" 2", {"[0, 1]"});
+    expect_error("Material \"conductor\" \"float eta\" 2" + kShape, {"float eta", "wrong type", "spectrum eta"});
+    expect_error("Material \"diffuse\" \"float type\" 2", {"float type", "wrong type"});
+    expect_error("Material \"coateddiffuse\" \"integer g\" 0", {"integer g", "wrong type"});
     expect_error("Material \"dielectric\" \"float eta\" 0", {"index"});
     for (const std::string kind : {"coateddiffuse", "coatedconductor"}) {
         const std::string coat = "Material \"" + kind + "\" ";
@@ -115,6 +118,52 @@ TEST(ImportMaterial, WhatIsNotModelledIsNamed) {
     expect_warning("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"" + kShape, "dispersion");
     EXPECT_NEAR(material_of(world("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"" + kShape)).ior, 1.5168,
                 1e-4);
+}
+
+TEST(ImportMaterial, RoughnessLiesBetweenZeroAndOne) {
+    for (const std::string remap : {"", " \"bool remaproughness\" false"})
+        for (const std::string name : {"roughness", "uroughness", "vroughness"}) {
+            const std::string material = "Material \"conductor\"" + remap + "\n", value = "\"float " + name + "\" ";
+            const std::string texture = "Texture \"t\" \"float\" ", use = material + "\"texture " + name + "\" \"t\"";
+            for (const std::string wrong : {"-0.1", "1.5"}) {
+                expect_error(material + value + wrong, {"scene.pbrt:4", (": " + name + " must").c_str(), "[0, 1]", wrong.c_str()});
+                expect_error(texture + "\"constant\" \"float value\" " + wrong + " " + use,
+                             {name.c_str(), "[0, 1]", wrong.c_str()});
+                const std::string range = wrong == "1.5" ? "from 0 to 1.5" : "from -0.1 to 0";
+                const std::string squares = "\"checkerboard\" \"float tex1\" 0 \"float tex2\" " + wrong + "\n";
+                expect_warning(texture + squares + use, (name + " may reach " + range).c_str());
+            }
+            EXPECT_TRUE(import_world(material + value + "0" + kShape + material + value + "1" + kShape, {}, true).ok());
+        }
+    for (const std::string name : {"interface.uroughness", "conductor.roughness"})
+        expect_error("Material \"coatedconductor\" \"float " + name + "\" 2", {name.c_str(), "[0, 1]"});
+}
+
+/// What a texture may reach follows from what it is made of.
+TEST(ImportMaterial, RoughnessOfTexturesIsBounded) {
+    const testing::FileMap files{{"g.tga", tga(2, 1, "abcxyz")}, {"bright.exr", exr(Rgb(4), {0.64f, 0.33f, 0.3f, 0.6f, 0.15f, 0.06f,
+                                                                                             0.3127f, 0.329f})}};
+    const std::string use = " Material \"dielectric\" \"texture roughness\" \"t\"";
+    const auto image = [](const std::string& name, const std::string& file, const std::string& options) {
+        return "Texture \"" + name + "\" \"float\" \"imagemap\" \"string filename\" \"" + file + "\" " + options + " ";
+    };
+    for (const std::string& fine :
+         {image("t", "g.tga", ""), image("t", "g.tga", "\"bool invert\" true"), image("t", "bright.exr", "\"float scale\" 0.25"),
+          image("i", "g.tga", "") + "Texture \"t\" \"float\" \"mix\" \"float tex1\" 0 \"float tex2\" 1 \"texture amount\" \"i\"",
+          image("i", "bright.exr", "") + "Texture \"t\" \"float\" \"scale\" \"texture tex\" \"i\" \"float scale\" 0.25"})
+        EXPECT_TRUE(import_world(fine + use, files, true).ok()) << import_world(fine + use, files, true).status().message();
+    expect_error(image("t", "bright.exr", "") + use, {"roughness must lie in [0, 1], not be 4"}, files);
+    expect_warning(image("t", "bright.exr", "\"string wrap\" \"black\"") + use, "may reach from 0 to 4", files);
+    expect_warning(image("i", "bright.exr", "") + image("j", "g.tga", "\"string wrap\" \"black\"") +
+                       "Texture \"t\" \"float\" \"mix\" \"texture tex1\" \"j\" \"float tex2\" 1 \"texture amount\" \"i\"" + use,
+                   "to 4, beyond [0, 1]", files);
+    // Products beyond double precision are no numbers that would pass for good ones.
+    std::string huge = "Texture \"t0\" \"float\" \"checkerboard\" \"float tex1\" 1e38 \"float tex2\" -1e38 ";
+    for (int i = 1; i < 10; ++i)
+        huge += "Texture \"t" + std::to_string(i) + "\" \"float\" \"scale\" \"texture tex\" \"t" + std::to_string(i - 1) +
+                "\" \"texture scale\" \"t" + std::to_string(i - 1) + "\" ";
+    huge += "Texture \"t\" \"float\" \"scale\" \"texture tex\" \"t9\" \"float scale\" 0";
+    expect_warning(huge + use, "beyond [0, 1]");
 }
 
 TEST(ImportLight, AreaLights) {
@@ -142,6 +191,9 @@ TEST(ImportLight, AreaLights) {
     EXPECT_EQ(d.emissions.size(), 2u);
     expect_error("AreaLightSource \"diffuse\" \"string filename\" \"a.png\"" + kShape, {"images on area lights"});
     expect_error("AreaLightSource \"diffuse\" \"float strength\" 2" + kShape, {"strength"});
+    // Also where no shape emits with it.
+    expect_error("AreaLightSource \"diffuse\"\n\"float strength\" 2", {"scene.pbrt:4", "unknown parameter", "strength"});
+    expect_error("AreaLightSource \"diffuse\" \"integer scale\" 2", {"wrong type", "float scale"});
     expect_error("AreaLightSource \"sphere\"", {"diffuse"});
     expect_error("AreaLightSource \"diffuse\" Shape \"sphere\" \"float alpha\" 0", {"alpha 0"});
     expect_error("AreaLightSource \"diffuse\" Shape \"sphere\" \"float alpha\" 0.5", {"emitting shape with an alpha"});
@@ -196,6 +248,30 @@ TEST(ImportLight, PowerIsThatOfTheWholeShape) {
     EXPECT_NEAR(power_of(d, &even), 5, 1e-4);
     const SceneDescription two = world(light + square + " 9 9 0 9 9 5] \"integer indices\" [0 1 2 3 1 3 4 5]");
     EXPECT_NE(two.warnings.at(1).find("each of the 2 faces"), std::string::npos) << two.warnings.at(1);
+}
+
+/// pbrt-v4 divides the power by the area before the transformation, and warns of its scale.
+TEST(ImportLight, PowerIsThatOfTheShapeAsItIsScaled) {
+    const std::string light = "AreaLightSource \"diffuse\" \"float power\" 10 ";
+    const auto radiance = [&](const std::string& text) { return double(world(text).emissions.at(0).radiance.g); };
+    EXPECT_NEAR(radiance(light + "Scale 3 3 3" + kShape) * 9, radiance(light + kShape), 1e-5);
+    EXPECT_NEAR(radiance(light + "Scale 3 3 3 Shape \"disk\"") * 9, radiance(light + "Shape \"disk\""), 1e-5);
+    expect_warning(light + "Scale 3 3 3" + kShape, "as it is scaled");
+    EXPECT_EQ(world(light + "Scale 3 3 3 Shape \"disk\"").warnings.size(), 2u);
+    EXPECT_EQ(world(light + "Shape \"disk\"").warnings.size(), 1u);
+    EXPECT_TRUE(world(light + "Rotate 30 1 2 3 Translate 1 2 3 Scale -1 1 1" + kShape).warnings.empty());
+    EXPECT_TRUE(world("AreaLightSource \"diffuse\" Scale 3 3 3" + kShape).warnings.empty()) << "no power";
+    EXPECT_TRUE(world(light + "Scale 3 3 3 Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0]").warnings.empty());
+}
+
+TEST(ImportLight, KnowsItsLine) {
+    const SceneDescription d = world("\nLightSource \"point\"\nLightSource \"spot\"\nLightSource \"distant\"\n"
+                                     "LightSource\n\"infinite\"\n\nLightSource \"infinite\"");
+    EXPECT_EQ(d.point_lights.at(0).source, "scene.pbrt:4");
+    EXPECT_EQ(d.spot_lights.at(0).source, "scene.pbrt:5");
+    EXPECT_EQ(d.distant_lights.at(0).source, "scene.pbrt:6");
+    EXPECT_EQ(d.infinite_lights.at(0).source, "scene.pbrt:7");
+    EXPECT_EQ(d.infinite_lights.at(1).source, "scene.pbrt:10");
 }
 
 TEST(ImportLight, PositionsAreBounded) {
@@ -303,6 +379,20 @@ TEST(ImportSpectra, InScenes) {
     EXPECT_NEAR(value(d, material_of(d).k).r, 3, 1e-3);
     expect_warning("LightSource \"point\" \"blackbody I\" 500", "gamut");
     expect_error("LightSource \"point\" \"spectrum I\" \"stdillum-Z\"", {"stdillum-Z"});
+    struct Case {
+        std::string directive, parameter, name;
+    };
+    for (const Case& c : {Case{"Material \"dielectric\"", "eta", "glass-XYZ"}, Case{"LightSource \"point\"", "I", "stdillum-F13"},
+                          Case{"Material \"diffuse\"", "reflectance", "foo"}, Case{"Material \"conductor\"", "eta", "metal-Xx-eta"},
+                          Case{"Material \"conductor\"", "k", "metal-Xx-k"}, Case{"AreaLightSource \"diffuse\"", "L", "foo"},
+                          Case{"Texture \"t\" \"spectrum\" \"constant\"", "value", "foo"}})
+        expect_error(c.directive + "\n\"spectrum " + c.parameter + "\" \"" + c.name + "\"" + kShape,
+                     {"scene.pbrt:4: ", ("\"spectrum " + c.parameter + "\" is \"" + c.name + "\"").c_str(),
+                      "neither a spectrum known by name nor a file"});
+    // Known, but not as this.
+    for (const std::string name : {"glass-BK7", "stdillum-A", "metal-Ag-k", "metal-Ag-eta"})
+        expect_error("Material \"diffuse\" \"spectrum reflectance\" \"" + name + "\"", {name.c_str(), "known by name but not"});
+    expect_error("Material \"diffuse\" \"spectrum reflectance\" \"../r.spd\"", {"spectrum reflectance", "leaves"});
     expect_error("LightSource \"point\" \"blackbody I\" -3", {"kelvin"});
     expect_error("Material \"diffuse\" \"spectrum reflectance\" [400 1 300 1]", {"increasing"});
     expect_error("Material \"diffuse\" \"spectrum reflectance\" \"r.spd\"", {"not a spectrum"}, {{"r.spd", "400 one"}});

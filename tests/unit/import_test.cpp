@@ -2,6 +2,7 @@
 
 #include "common/film/partial_exr.h"
 #include "common/import/context.h"
+#include "common/import/spectra.h"
 #include "common/path/path_view.h"
 #include "import_testing.h"
 
@@ -96,6 +97,28 @@ TEST(ImportState, AttributesAreDefaultsThatAShapeMayOverride) {
     EXPECT_TRUE(import_world("Attribute \"light\" \"float coneangle\" 20 LightSource \"point\"", {}, true).ok());
 }
 
+/// A default of the wrong type would be found by no directive, and so be as silent as a misspelt one.
+TEST(ImportState, AttributesHaveTheTypesThatDirectivesAskFor) {
+    struct Case {
+        const char *target, *given, *right;
+    };
+    for (const Case& c : {Case{"shape", "\"integer radius\" 5", "write \"float radius\""},
+                          Case{"shape", "\"string alpha\" \"a\"", "write \"float alpha\" or \"texture alpha\""},
+                          Case{"light", "\"float I\" 2", "write \"rgb I\" or \"blackbody I\" or \"spectrum I\""},
+                          Case{"material", "\"integer roughness\" 1", "write \"float roughness\" or \"texture roughness\""},
+                          Case{"texture", "\"string invert\" \"true\"", "write \"bool invert\""}})
+        expect_error("\nAttribute \"" + std::string(c.target) + "\"\n" + c.given + "\nShape \"sphere\"",
+                     {"scene.pbrt:5: Attribute", "has the wrong type", c.right});
+    expect_error("Attribute \"shape\" \"float radius\" 1 \"integer radius\" 2", {"scene.pbrt:3", "\"radius\"", "twice"});
+    // pbrt's spellings of a type are one type; another directive's type is a default that this one does not have.
+    EXPECT_TRUE(import_world("Attribute \"shape\" \"vector S\" [1 0 0] \"normal3 N\" [0 0 1] Shape \"sphere\"", {}, true).ok());
+    const SceneDescription d = world("Attribute \"material\" \"float eta\" 1.3 Material \"conductor\" Shape \"sphere\" "
+                                     "Material \"dielectric\" Shape \"sphere\"");
+    const Material& metal = d.materials.at(size_t(d.spheres[0].attributes.material));
+    EXPECT_EQ(d.textures.at(size_t(metal.eta)).value, import::named_metal("metal-Cu")->eta);
+    EXPECT_EQ(d.materials.at(size_t(d.spheres[1].attributes.material)).ior, 1.3f);
+}
+
 TEST(ImportState, ObjectsAreInstanced) {
     const SceneDescription d =
         world(std::string("ObjectBegin \"o\" Translate 1 0 0 ") + kTriangle +
@@ -106,7 +129,14 @@ TEST(ImportState, ObjectsAreInstanced) {
     expect_near(d.objects[0].meshes[0].positions[0], {1, 0, 0});
     EXPECT_EQ(d.objects[0].spheres.size(), 1u);
     expect_near(d.instances[1].object_to_world.point({0, 0, 0}), {0, 5, 0});
-    expect_error("ObjectInstance \"x\"", {"\"x\""});
+    expect_error("\nObjectInstance \"x\"\nObjectBegin \"y\" ObjectEnd", {"scene.pbrt:4", "\"x\"", "ObjectBegin"});
+    // As in pbrt, the object may come later.
+    const SceneDescription early = world("Translate 0 5 0 ObjectInstance \"p\" ObjectInstance \"o\" Identity ObjectBegin \"o\" " +
+                                         std::string(kTriangle) + "ObjectEnd ObjectBegin \"p\" Shape \"sphere\" ObjectEnd");
+    ASSERT_EQ(early.instances.size(), 2u);
+    EXPECT_EQ(early.instances[0].object, 1);
+    EXPECT_EQ(early.instances[1].object, 0);
+    expect_near(early.instances[1].object_to_world.point({0, 0, 0}), {0, 5, 0});
     expect_error("ObjectBegin \"x\" ObjectBegin \"y\"", {"inside"});
     expect_error("ObjectBegin \"x\" ObjectEnd ObjectBegin \"x\"", {"twice"});
     expect_error("ObjectBegin \"x\" ObjectInstance \"x\"", {"nested"});
@@ -118,6 +148,15 @@ TEST(ImportState, ScopesMustMatch) {
     expect_error("AttributeBegin", {"scene.pbrt:3", "never closed"});
     expect_error("AttributeEnd", {"AttributeEnd"});
     expect_error("AttributeBegin ObjectEnd", {"does not match"});
+    for (const std::string begun : {"Attribute", "Transform", "Object"}) {
+        const std::string begin = begun + "Begin" + (begun == "Object" ? " \"o\"" : "");
+        expect_error("\n" + begin, {"scene.pbrt:4", ("this " + begun + "Begin is never closed").c_str(), (begun + "End").c_str()});
+        for (const std::string ended : {"Attribute", "Transform", "Object"})
+            if (ended != begun)
+                expect_error(begin + "\n\n" + ended + "End", {("scene.pbrt:5: " + ended + "End does not match").c_str(),
+                                                              (begun + "Begin at scene.pbrt:3").c_str(), (begun + "End").c_str()});
+    }
+    expect_error("\nWorldBegin", {"scene.pbrt:4", "second WorldBegin"});
     std::string deep;
     for (int i = 0; i < 2000; ++i) deep += "AttributeBegin ";
     expect_error(deep, {"nested deeper"});
@@ -129,6 +168,11 @@ TEST(ImportFiles, IncludeKeepsTheStateAndImportDoesNot) {
     expect_near(first_corner(include, 1), {1, 0, 0});
     EXPECT_EQ(include.meshes[0].attributes.source, "sub/more.pbrt:2");
     expect_near(first_corner(world(std::string("Import \"sub/more.pbrt\" ") + kTriangle, files), 1), {0, 0, 0});
+    // An imported file has scopes of its own.
+    expect_error("AttributeBegin Import \"a.pbrt\" AttributeEnd", {"a.pbrt:1", "AttributeEnd", "imported file"},
+                 {{"a.pbrt", "AttributeEnd AttributeBegin"}});
+    expect_error("Import \"a.pbrt\"", {"scene.pbrt:3", "open", "a.pbrt:2"}, {{"a.pbrt", "\nTransformBegin"}});
+    EXPECT_TRUE(import_world("AttributeBegin Import \"a.pbrt\" AttributeEnd", {{"a.pbrt", "AttributeBegin AttributeEnd"}}).ok());
     const auto scene = import_world("Include \"./sub//../sub/more.pbrt\"", files);
     ASSERT_TRUE(scene.ok()) << scene.status().message();
     EXPECT_EQ(scene->files, (std::vector<std::string>{"scene.pbrt", "sub/more.pbrt"}));
@@ -174,6 +218,9 @@ TEST(ImportSyntax, Errors) {
     expect_error("Shape \"sphere\" \"integer radius\" 1", {"wrong type", "float radius"});
     expect_error("Shape \"sphere\" \"float radios\" 1", {"unknown parameter", "radios"});
     expect_error("Shape \"sphere\" \"float radius\" 1 \"float radius\" 2", {"twice"});
+    expect_error("Shape \"sphere\" \"float radius\" 1\n\"integer radius\" 2", {"scene.pbrt:4", "\"radius\"", "twice", "sphere"});
+    expect_error("Material \"diffuse\" \"integer reflectance\" 1",
+                 {"write \"texture reflectance\" or \"rgb reflectance\" or \"spectrum reflectance\""});
     expect_error("Shape \"sphere\" \"number radius\" 1", {"number"});
     expect_error("Shape \"sphere\" \"radius\" 1", {"float radius"});
     expect_error("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1]", {"multiple of 3"});
@@ -215,6 +262,17 @@ TEST(ImportOptions, CameraFilmAndDepth) {
     EXPECT_FLOAT_EQ(d.film.exposure_scale, 2);
     EXPECT_EQ(d.samples_per_pixel, 6);
     EXPECT_EQ(d.max_depth, 9);
+}
+
+/// The command line says which algorithm renders and where the picture goes; the description keeps what the file says, to show it.
+TEST(ImportOptions, IntegratorAndFileNameAreKeptForShow) {
+    for (const std::string name : {"path", "volpath", "bdpt", "sppm"}) {
+        const auto scene = import_text("PixelFilter \"box\" Integrator \"" + name +
+                                       "\" Film \"rgb\" \"string filename\" \"foo.exr\" WorldBegin", {}, true);
+        ASSERT_TRUE(scene.ok()) << scene.status().message();
+        EXPECT_EQ(scene->description.integrator, name);
+        EXPECT_EQ(scene->description.film.file_name, "foo.exr");
+    }
 }
 
 TEST(ImportOptions, LimitsAreThoseOfTheRenderer) {
@@ -312,7 +370,25 @@ TEST(ImportOptions, UnsupportedOnesAreNamed) {
     refused("Film \"rgb\" \"integer xresolution\" 2000000000", "resolution");
     refused("Film \"rgb\" \"string sensor\" \"canon_eos_5d\"", "sensor");
     refused("Film \"rgb\" \"float cropwindow\" [0.5 0.5 0 1]", "empty");
+    for (const std::string wrong : {"[0.7 0.3 0 1]", "[0 1 0.7 0.3]"})
+        refused("\n\nFilm \"rgb\"\n\"float cropwindow\" " + wrong, "scene.pbrt:4: Film \"rgb\": cropwindow has");
+    refused("Film \"rgb\" \"float cropwindow\" [0 1 0.7 0.3]", "y0 above y1");
+    refused("Film \"rgb\" \"float cropwindow\" [0.50001 0.50002 0 1]", "no pixel lies between x0 and x1");
+    for (const std::string wrong : {"[0 1.2 0 1]", "[-0.1 1 0 1]", "[0 1 0 1e30]"})
+        refused("Film \"rgb\" \"float cropwindow\" " + wrong, "cropwindow must lie in [0, 1]");
+    refused("Film \"rgb\" \"float cropwindow\" [0 1 0 1 0 1 0 1]", "four numbers");
+    refused("Film \"rgb\" \"integer pixelbounds\" [0 1281 0 10]", "outside of the image, which is 1280 pixels wide");
+    refused("Film \"rgb\" \"integer pixelbounds\" [0 10 -1 10]", "outside of the image, which is 720 pixels high");
+    refused("Film \"rgb\" \"integer pixelbounds\" [0 10 20 10]", "pixelbounds has y0 above y1");
+    refused("Film \"rgb\" \"integer pixelbounds\" [10 10 0 10]", "empty");
+    refused("Film \"rgb\" \"integer pixelbounds\" [0 9 0 9] \"float cropwindow\" [0 1 0 1]", "not both");
     refused("Integrator \"ambientocclusion\"", "ambientocclusion");
+    refused("\nIntegrator \"volpaht\"", "scene.pbrt:2: Integrator \"volpaht\" is unknown");
+    refused("PixelFilter \"gaussian\" \"integer sigma\" 1", "write \"float sigma\"");
+    refused("PixelFilter \"triangle\" \"float sigma\" 1", "unknown parameter");
+    refused("Sampler \"stratified\" \"integer pixelsamples\" 4", "unknown parameter");
+    refused("Sampler \"stratified\" \"integer xsamples\" -2 \"integer ysamples\" -2", "positive");
+    refused("Camera \"perspective\" \"integer frameaspectratio\" 2", "write \"float frameaspectratio\"");
     refused("Integrator \"path\" \"integer depth\" 3", "depth");
     refused("ColorSpace \"rec2020\"", "srgb");
     refused("Option \"bool forcediffuse\" true", "forcediffuse");
@@ -330,6 +406,8 @@ TEST(ImportOptions, UnsupportedOnesAreNamed) {
 TEST(ImportState, Media) {
     EXPECT_TRUE(world("MediumInterface \"\" \"\"").warnings.empty());
     expect_warning("MakeNamedMedium \"fog\" \"string type\" \"homogeneous\"", "fog");
+    expect_warning("Attribute \"medium\"\n\"float nonsense\" 1",
+                   "scene.pbrt:4: Attribute \"medium\": \"float nonsense\" is ignored");
     expect_error("MakeNamedMedium \"fog\" \"string type\" \"homogeneous\" MediumInterface \"fog\"", {"media"});
 }
 

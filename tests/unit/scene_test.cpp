@@ -86,5 +86,21 @@ TEST(LargeScenes, ShapesWhoseAreaOverflowsAreNamed) {
     EXPECT_EQ(scene->summary().triangle_count, 2u);
 }
 
+TEST(Summary, LightsSayWhereTheyAre) {
+    SceneBuilder b;
+    b.quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, b.diffuse(Rgb(0.5f)));
+    SceneDescription& d = b.description();
+    d.point_lights = {{{0, 0, 1}, Rgb(1.0f), "scene.pbrt:4"}, {{0, 0, 2}, Rgb(1.0f)}};
+    d.spot_lights.push_back({{0, 0, 1}, {}, Rgb(1.0f), 0.3f, 0.1f, "scene.pbrt:5"});
+    d.distant_lights.push_back({{0, 0, -1}, Rgb(1.0f), "scene.pbrt:6"});
+    d.infinite_lights.push_back({.source = "scene.pbrt:7"});
+    d.infinite_lights.push_back({.source = "scene.pbrt:8"});
+    std::vector<std::string> where;
+    const auto scene = b.build();
+    for (const SceneSummary::Light& light : scene->summary().lights) where.push_back(light.where);
+    EXPECT_EQ(where, (std::vector<std::string>{"scene.pbrt:4", "point light", "scene.pbrt:5", "scene.pbrt:6",
+                                               "scene.pbrt:7 (and 1 more)"}));
+}
+
 }  // namespace
 }  // namespace lightloom
