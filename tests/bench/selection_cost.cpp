@@ -15,6 +15,7 @@
 #include "common/import/import.h"
 #include "common/transport/spcbpt.h"
 #include "common/transport/training.h"
+#include "common/work/job.h"
 
 using namespace lightloom;
 
@@ -107,18 +108,21 @@ int main(int argc, char** argv) {
     auto tables = make_tables(*scene, settings, {}, &report);
     if (!tables.ok()) return fail(tables.status());
 
-    const Rect crop = scene->frame().crop;
-    const double frame_paths = parameters->light_paths * double(crop.area());
+    const double frame_paths = parameters->light_paths * double(scene->frame().crop.area());
     const auto plain = make_spcbpt(*parameters, std::make_shared<const PreparedTables>(*std::move(tables)), frame_paths);
     const CachedAlgorithm<TimedConnections> algorithm{{{plain.method}}, plain.heuristic, plain.minimum_paths};
     const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
-    const uint64_t light_paths = std::max<uint64_t>(1, uint64_t(frame_paths * iterations + 0.5));
     const Overhead empty = overhead();
+    // The units of a job: caches as large as there.
+    const Plan plan(scene->frame(), parameters->light_paths);
     const uint64_t begin = __rdtsc();
-    const auto part =
-        render_unit(algorithm, *scene, settings, parameters->roulette, UnitWork{0, iterations, 0, crop, 0, light_paths}, {});
+    for (const Group& group : plan.groups_for(iterations)) {
+        for (const WorkUnit& unit : plan.units(group)) {
+            const auto part = render_unit(algorithm, *scene, settings, parameters->roulette, unit_work(unit), {});
+            if (!part.ok()) return fail(part.status());
+        }
+    }
     double whole = double(__rdtsc() - begin);
-    if (!part.ok()) return fail(part.status());
     for (const Clock& clock : clocks) whole -= double(clock.calls) * empty.whole;
     std::printf("%-26s %12s %14s %8s\n", "", "calls", "cycles a call", "share");
     double sum = 0;
