@@ -77,12 +77,12 @@ class Coordinator::Tracing final : public TracingPort {
             job_.table_key = table_key(coordinator_.options_.identity, set.spec);
             facts = job_.facts;
         }
-        // A smaller set makes other tables, which nobody has looked for yet.
-        if (smaller && coordinator_.adopt_cached_tables(job_, set.spec, facts)) return false;
+        // A smaller set makes other tables, which nobody has looked for yet; those of the whole set may be there by now.
+        if (coordinator_.adopt_cached_tables(job_, set.spec, facts)) return false;
         const std::lock_guard lock(coordinator_.mutex_);
         if (!alive()) return over();
         job_.spec = set.spec;
-        if (coordinator_.wait_for_maker(job_)) return false;
+        if (job_.may_wait && coordinator_.wait_for_maker(job_)) return false;
         job_.training_begin = coordinator_.options_.clock();
         coordinator_.open_first_round(job_);
         return true;

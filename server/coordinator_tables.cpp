@@ -56,6 +56,7 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
     job.facts = std::move(facts);
     // What another job makes at leisure may take far longer than this one's limit allows: it probes first, see settle().
     const bool probes = open_size && samples > kMinTrainingSamples;
+    job.may_wait = may_wait;
     if (may_wait && !probes && wait_for_maker(job)) return {};
     job.makes_tables = true;
     if (probes) {

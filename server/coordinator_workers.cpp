@@ -131,7 +131,7 @@ Status Coordinator::release_unit(const std::string& worker_id, const UnitReferen
     if (why.ok() || blameless) {
         units->release(unit.key, worker->index);
     } else {
-        workers_.unit_failed(*worker, options_.clock());
+        if (why.code() != StatusCode::kInvalidArgument) workers_.unit_failed(*worker, options_.clock());  // otherwise it is the job
         const UnitTable::Failures failures = units->fail(unit.key, worker->index);
         unit_failed(*job, unit.key, failures, {why.code(), worker->id + ": " + why.message()});
     }
@@ -243,10 +243,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
         if (refusal.unit == unit.key) own = refusal.why;
         unit_failed(*job, refusal.unit, job->units->reopen(refusal.unit), refusal.why);
     }
-    if (!own.ok()) {
-        workers_.unit_failed(workers_.at(index), options_.clock());
-        return SubmitAck{SubmitOutcome::kRejected, own.message()};
-    }
+    if (!own.ok()) return SubmitAck{SubmitOutcome::kRejected, own.message()};
     if (job->state != JobState::kRunning) return SubmitAck{SubmitOutcome::kStale, "the job failed meanwhile: " + job->message};
     if (unit.light_path_count > 0 && splats_per_path > job->splats_per_path.value_or(-1)) {
         job->splats_per_path = splats_per_path;

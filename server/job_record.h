@@ -55,6 +55,7 @@ struct JobRecord {
     bool capped_by_time_limit = false;
     Digest table_key;                   ///< Of the tables that the job needs; set before `makes_tables` or `maker`.
     bool makes_tables = false;          ///< It probes, traces and learns itself.
+    bool may_wait = true;               ///< For another job's tables: not again for those that were taken over and were damaged.
     std::shared_ptr<JobRecord> maker;   ///< Makes the same tables; this job waits for them.
     TimePoint training_begin;           ///< The first training unit was leased; unset before.
     TimePoint round_begin;              ///< The same of the open round.

@@ -2,8 +2,9 @@
 
 #include <unistd.h>
 
+#include <condition_variable>
 #include <memory>
-#include <semaphore>
+#include <mutex>
 
 #include "common/scene/scene.h"
 #include "common/transport/catalog.h"
@@ -12,18 +13,26 @@
 namespace lightloom {
 namespace {
 
-/// Each takes a processor and may take gigabytes, and hundreds of jobs may be submitted at once.
-constexpr ptrdiff_t kScenesAtATime = 2;
-
-class Turn {
+/// Lets a few scenes be read at a time: each takes a processor and may take gigabytes, and hundreds of jobs may be submitted at once.
+class Turns {
   public:
-    explicit Turn(std::counting_semaphore<kScenesAtATime>& turns) : turns_(turns) { turns_.acquire(); }
-    ~Turn() { turns_.release(); }
-    Turn(const Turn&) = delete;
-    Turn& operator=(const Turn&) = delete;
+    /// False if it was asked to stop before it was its turn.
+    bool take(std::stop_token stop) {
+        std::unique_lock lock(mutex_);
+        if (!given_back_.wait(lock, stop, [&] { return free_ > 0; })) return false;
+        --free_;
+        return true;
+    }
+    void give_back() {
+        const std::lock_guard lock(mutex_);
+        ++free_;
+        given_back_.notify_one();
+    }
 
   private:
-    std::counting_semaphore<kScenesAtATime>& turns_;
+    std::mutex mutex_;
+    std::condition_variable_any given_back_;
+    int free_ = 2;
 };
 
 Result<ImportedScene> read_scene(const AssetStore& assets, const Digest& root, const std::filesystem::path& scratch) {
@@ -57,21 +66,21 @@ Result<SceneFacts> scene_facts(const SceneDescription& description, const JobSpe
 }
 
 SceneReader make_scene_reader(std::filesystem::path scratch) {
-    auto turns = std::make_shared<std::counting_semaphore<kScenesAtATime>>(kScenesAtATime);
+    const auto turns = std::make_shared<Turns>();
     return [scratch = std::move(scratch), turns](const AssetStore& assets, const JobSpec& spec,
                                                  std::stop_token stop) -> Result<SceneFacts> {
-        const Turn turn(*turns);
-        if (stop.stop_requested()) return Status(StatusCode::kCancelled, "the job ended before its scene was read");
+        if (!turns->take(stop)) return Status(StatusCode::kCancelled, "the job ended before its scene was read");
+        const std::shared_ptr<void> turn(nullptr, [&](void*) { turns->give_back(); });
         const auto scene = read_scene(assets, spec.scene_root, scratch);
         if (!scene.ok()) return scene.status();
         auto facts = scene_facts(scene->description, spec);
         if (!facts.ok()) return facts;
         const auto algorithm = find_algorithm(spec.algorithm);
         if (!algorithm.ok() || !(*algorithm)->needs_tables) return facts;
-        // Read a second time when it is needed, while workers trace: of the jobs that wait for their turn none holds a scene.
-        facts->build_scene = [&assets, scratch, turns, root = spec.scene_root, width = spec.width,
+        // Read a second time when it is needed, while workers trace: of the jobs that wait for their turn none holds a scene. That
+        // is at once, whatever else is being read: this job is the one that workers wait for.
+        facts->build_scene = [&assets, scratch, root = spec.scene_root, width = spec.width,
                               height = spec.height]() -> Result<std::shared_ptr<const Scene>> {
-            const Turn turn_again(*turns);
             auto again = read_scene(assets, root, scratch);
             if (!again.ok()) return again.status();
             auto built = Scene::build(std::move(again->description), {.width = width, .height = height});

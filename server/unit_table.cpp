@@ -69,8 +69,8 @@ std::optional<WorkUnit> UnitTable::lease(uint32_t worker, TimePoint expiry, cons
     if (closed_) return std::nullopt;
     // A shuffled table first opens several groups, so that whole groups change places too.
     (void)has_more_than(shuffle_ ? 8 : 0);
-    const auto end = [&] { return pending_.lower_bound({group_limit_, 0}); };
-    const ptrdiff_t count = std::distance(pending_.begin(), end());
+    const auto end = pending_.lower_bound({group_limit_, 0});
+    const ptrdiff_t count = std::distance(pending_.begin(), end);
     if (count == 0) return std::nullopt;
     auto chosen = pending_.begin();
     if (shuffle_) {
@@ -80,9 +80,7 @@ std::optional<WorkUnit> UnitTable::lease(uint32_t worker, TimePoint expiry, cons
     // One broken worker must not take the same unit again and again while others could render it.
     const auto fresh = [&](const UnitKey& key) { return !entry(key)->failed_on.contains(worker); };
     if (!fresh(*chosen)) {
-        auto other = std::find_if(pending_.begin(), end(), fresh);
-        while (other == end() && open_group()) other = std::find_if(pending_.begin(), end(), fresh);
-        if (other != end()) {
+        if (const auto other = std::find_if(pending_.begin(), end, fresh); other != end) {
             chosen = other;
         } else if (anyone_else && anyone_else(entry(*chosen)->failed_on)) {
             return std::nullopt;

@@ -39,7 +39,7 @@ WorkerRegistry::Crew WorkerRegistry::crew(TimePoint now) const {
 
 bool WorkerRegistry::anyone_else(const std::set<uint32_t>& workers, TimePoint now) const {
     return std::any_of(workers_.begin(), workers_.end(),
-                       [&](const auto& w) { return !lost(*w, now) && !workers.contains(w->index); });
+                       [&](const auto& w) { return !lost(*w, now) && now >= w->rests_until && !workers.contains(w->index); });
 }
 
 void WorkerRegistry::unit_failed(WorkerRecord& worker, TimePoint now) {

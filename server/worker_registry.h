@@ -34,7 +34,7 @@ struct WorkerRecord {
     uint32_t waiting = 0;             ///< Of its calls for units, those that wait now.
     uint64_t merged = 0;              ///< Units of images.
     int failures_in_a_row = 0;
-    TimePoint rests_until;            ///< Gets no unit before that while others are there.
+    TimePoint rests_until;            ///< Gets no unit before that while others are there that do not rest.
     std::set<UnitReference> held;
 
     /// A worker may hold one unit beside the one that it renders, so that it does not idle between two.
@@ -59,10 +59,11 @@ class WorkerRegistry {
         uint32_t most_threads = 0;  ///< That one of them has.
     };
     Crew crew(TimePoint now) const;
-    /// Whether one of them is not among these (indices).
+    /// Whether one of them is not among these (indices) and does not rest.
     bool anyone_else(const std::set<uint32_t>& workers, TimePoint now) const;
     /// A worker could not render a unit. From the second time in a row it rests, every time longer, up to a minute: its disk may be
-    /// full, and it would give every unit back at once.
+    /// full, and it would give every unit back at once. When all of them rest, none does: then it is
+    /// the job, which is to fail soon.
     void unit_failed(WorkerRecord& worker, TimePoint now);
     void unit_succeeded(WorkerRecord& worker) { worker.failures_in_a_row = 0; }
     bool rests(const WorkerRecord& worker, TimePoint now) const;

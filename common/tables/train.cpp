@@ -217,10 +217,8 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
     if (stop.stop_requested()) return cancelled;
     report->classifier_seconds = watch.lap();
     if (uint64_t(tables.light_count) * tables.eye_count > kMaxGammaCells)
-        return invalid_argument(
-            "Gamma would have " + std::to_string(tables.light_count) + " x " + std::to_string(tables.eye_count) +
-            " entries and goes to every worker; ask for fewer light-subspaces or eye-subspaces (at most " +
-            std::to_string(kMaxGammaCells) + " entries)");
+        return internal_error("Gamma has " + std::to_string(tables.light_count) + " x " + std::to_string(tables.eye_count) +
+                              " entries, more than subspaces were asked for");
     passed(kEnergyBegins);
     measure_energy(data, emitters, options, stop, &tables);
     report->energy_seconds = watch.lap();

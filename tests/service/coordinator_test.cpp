@@ -232,6 +232,27 @@ TEST(Coordinator, ABrokenWorkerFailsNoJobWhileAnotherWorks) {
     EXPECT_LE(attempts, 5) << "in " << 0.1 * rounds << " s: after 1, 2, 4, ... s of rest";
 }
 
+TEST(Coordinator, AJobThatFailsOnAllOfTwoWorkersFailsSoonAndTheNextIsRendered) {
+    FakeService service({640, 360, {0, 0, 640, 360}});
+    const std::string bad = service.submit(service.spec(200)), good = service.submit(service.spec(1));
+    const std::string workers[] = {service.add_worker(), service.add_worker()};
+    for (int round = 0; round < 100 && service.coordinator->get_job(good)->state == JobState::kRunning; ++round) {
+        service.now_ms += 100;
+        for (const std::string& worker : workers) {
+            for (const UnitLease& lease : service.lease(worker)) {
+                if (lease.job_id == good) {
+                    EXPECT_EQ(service.deliver(worker, lease).outcome, SubmitOutcome::kAccepted);
+                } else {
+                    ASSERT_TRUE(
+                        service.coordinator->release_unit(worker, lease.reference(), internal_error("a file is missing")).ok());
+                }
+            }
+        }
+    }
+    EXPECT_EQ(service.coordinator->get_job(bad)->state, JobState::kFailed);
+    EXPECT_EQ(service.wait_end(good).state, JobState::kSucceeded) << "within 10 s";
+}
+
 TEST(Coordinator, AWorkerAloneGetsItsFailedUnitsAgain) {
     FakeService service;
     const std::string id = service.submit(service.spec(3));
