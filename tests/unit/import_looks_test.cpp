@@ -155,7 +155,9 @@ TEST(ImportMaterial, RoughnessOfTexturesIsBounded) {
           image("i", "bright.exr", "") + "Texture \"t\" \"float\" \"scale\" \"texture tex\" \"i\" \"float scale\" 0.25"})
         EXPECT_TRUE(import_world(fine + use, files, true).ok()) << import_world(fine + use, files, true).status().message();
     expect_warning(image("t", "grey.png", linear + "\"float scale\" 3") + use, "to 1.2, beyond [0, 1]", files);
-    expect_error(image("t", "bright.exr", "") + use, {"roughness must lie in [0, 1], not be 4"}, files);
+    // One value, but none that the file gives.
+    expect_warning(image("t", "bright.exr", "") + use, "roughness is 4, beyond [0, 1]", files);
+    expect_warning("Texture \"t\" \"float\" \"scale\" \"float tex\" 4 \"float scale\" 0.5" + use, "roughness is 2, beyond [0, 1]");
     expect_warning(image("t", "bright.exr", "\"string wrap\" \"black\"") + use, "may reach from 0 to 4", files);
     expect_warning(image("i", "bright.exr", "") + image("j", "g.tga", "\"string wrap\" \"black\"") +
                        "Texture \"t\" \"float\" \"mix\" \"texture tex1\" \"j\" \"float tex2\" 1 \"texture amount\" \"i\"" + use,
