@@ -19,9 +19,9 @@ TextureId spectrum_or(Context* context, const ParameterList& p, std::string_view
     return id == kNone ? constant_texture(context, Rgb(fallback)) : id;
 }
 
-/// Parameter `name`, whether or not it is remapped to an alpha; kNone if absent. A number outside of [0, 1] is an error. What a
-/// texture makes of its pixels may be: above 1 it scatters as in pbrt-v4, but no coat lets through less light for it (its tables
-/// end at 1); below 0, where pbrt computes with what is no number, it is smooth.
+/// Parameter `name`, whether or not it is remapped to an alpha; kNone if absent. A number outside of [0, 1] that the file gives is
+/// an error. What a texture makes of numbers or pixels may be: above 1 it scatters as in pbrt-v4, but no coat lets through less
+/// light for it (its tables end at 1); below 0, where pbrt computes with what is no number, it is smooth.
 TextureId roughness_parameter(Context* context, const ParameterList& p, const std::string& name) {
     const TextureId id = float_texture_parameter(context, p, name);
     if (id == kNone) return kNone;
@@ -29,11 +29,14 @@ TextureId roughness_parameter(Context* context, const ParameterList& p, const st
     if (range.least >= 0 && range.most <= 1) return id;
     const Location& where = p.find_any(name)->where;
     char text[80];
-    if (range.least == range.most) {
+    if (context->scene.textures[size_t(id)].kind == TextureKind::kConstant) {
         std::snprintf(text, sizeof text, " must lie in [0, 1], not be %g", range.least);
         fail(where, p.what() + ": " + name + text);
     }
-    std::snprintf(text, sizeof text, " may reach from %g to %g", range.least, range.most);
+    if (range.least == range.most)
+        std::snprintf(text, sizeof text, " is %g", range.least);
+    else
+        std::snprintf(text, sizeof text, " may reach from %g to %g", range.least, range.most);
     context->diagnostics.warn(where, p.what() + ": " + name + text +
                                          ", beyond [0, 1]: below 0 it counts as 0, above 1 a coat lets light through as at 1");
     return id;

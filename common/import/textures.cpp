@@ -166,7 +166,8 @@ TextureRange product(const TextureRange& a, const TextureRange& b) {
     return out;
 }
 
-/// Of the pixels of a one-channel image.
+/// Of the pixels of a one-channel image. Those of a float texture are floats even if the file has 8 bits (ImageChannels::kScalar);
+/// bytes are a grey picture's as a colour, which nothing asks about.
 TextureRange range_of(const Image& image) {
     if (image.floats.empty()) return {0, 1};
     const auto [least, most] = std::minmax_element(image.floats.begin(), image.floats.end());

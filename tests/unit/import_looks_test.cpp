@@ -141,18 +141,23 @@ TEST(ImportMaterial, RoughnessLiesBetweenZeroAndOne) {
 
 /// What a texture may reach follows from what it is made of.
 TEST(ImportMaterial, RoughnessOfTexturesIsBounded) {
-    const testing::FileMap files{{"g.tga", tga(2, 1, "abcxyz")}, {"bright.exr", exr(Rgb(4), {0.64f, 0.33f, 0.3f, 0.6f, 0.15f, 0.06f,
-                                                                                             0.3127f, 0.329f})}};
-    const std::string use = " Material \"dielectric\" \"texture roughness\" \"t\"";
+    const testing::FileMap files{{"g.tga", tga(2, 1, "abcxyz")},
+                                 {"grey.png", testing::png(2, 1, 0, std::string("\0\x10\x66", 3))},  // 0.4 at most
+                                 {"bright.exr", exr(Rgb(4), {0.64f, 0.33f, 0.3f, 0.6f, 0.15f, 0.06f, 0.3127f, 0.329f})}};
+    const std::string use = " Material \"dielectric\" \"texture roughness\" \"t\"", linear = "\"string encoding\" \"linear\" ";
     const auto image = [](const std::string& name, const std::string& file, const std::string& options) {
         return "Texture \"" + name + "\" \"float\" \"imagemap\" \"string filename\" \"" + file + "\" " + options + " ";
     };
     for (const std::string& fine :
-         {image("t", "g.tga", ""), image("t", "g.tga", "\"bool invert\" true"), image("t", "bright.exr", "\"float scale\" 0.25"),
+         {image("t", "g.tga", ""), image("t", "g.tga", "\"bool invert\" true"),
+          image("t", "grey.png", linear + "\"float scale\" 2"), image("t", "bright.exr", "\"float scale\" 0.25"),
           image("i", "g.tga", "") + "Texture \"t\" \"float\" \"mix\" \"float tex1\" 0 \"float tex2\" 1 \"texture amount\" \"i\"",
           image("i", "bright.exr", "") + "Texture \"t\" \"float\" \"scale\" \"texture tex\" \"i\" \"float scale\" 0.25"})
         EXPECT_TRUE(import_world(fine + use, files, true).ok()) << import_world(fine + use, files, true).status().message();
-    expect_error(image("t", "bright.exr", "") + use, {"roughness must lie in [0, 1], not be 4"}, files);
+    expect_warning(image("t", "grey.png", linear + "\"float scale\" 3") + use, "to 1.2, beyond [0, 1]", files);
+    // One value, but none that the file gives.
+    expect_warning(image("t", "bright.exr", "") + use, "roughness is 4, beyond [0, 1]", files);
+    expect_warning("Texture \"t\" \"float\" \"scale\" \"float tex\" 4 \"float scale\" 0.5" + use, "roughness is 2, beyond [0, 1]");
     expect_warning(image("t", "bright.exr", "\"string wrap\" \"black\"") + use, "may reach from 0 to 4", files);
     expect_warning(image("i", "bright.exr", "") + image("j", "g.tga", "\"string wrap\" \"black\"") +
                        "Texture \"t\" \"float\" \"mix\" \"texture tex1\" \"j\" \"float tex2\" 1 \"texture amount\" \"i\"" + use,
