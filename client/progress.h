@@ -1,6 +1,6 @@
 #pragma once
-// Progress of a job on standard error: one line that is redrawn on a terminal, plain lines otherwise: one per phase and tenth of the
-// image, and whatever else is new after some seconds without a word, such as that no worker is there.
+// Progress of a job on standard error: one line that is redrawn on a terminal, plain lines otherwise: one per phase and tenth of
+// the image, and whatever else is new after some seconds without a word, such as that no worker is there.
 
 #include <chrono>
 #include <condition_variable>

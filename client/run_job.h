@@ -21,8 +21,8 @@ struct ClientTimes {
 enum class AfterFetch { kImageStays, kImageGoes };
 /// What replaces the image's extension in the names of the other files that fetch() may write.
 std::vector<const char*> beside_image(const JobOptions& options, AfterFetch after);
-/// check_output_files() for the files that options ask for, with those of the scene as inputs, if there is one. `beside` replaces the
-/// image's extension in the names of those that come with it.
+/// check_output_files() for the files that options ask for, with those of the scene as inputs, if there is one. `beside` replaces
+/// the image's extension in the names of those that come with it.
 Status check_outputs(const JobOptions& options, const std::vector<const char*>& beside, const LocalScene* scene);
 /// Sends what the coordinator lacks of the scene's files.
 Status upload_scene(JobPort& port, const LocalScene& scene);

@@ -33,9 +33,9 @@ for preset in "${presets[@]}"; do
     cmake --preset "$preset" >/dev/null
     names=() controls=()
     if [ "$preset" = tsan ]; then
-        names=(coordinator bookkeeping learn_tables worker work)
+        names=(coordinator bookkeeping learn_tables worker scene_cache work)
         controls=(race_control)
-        if [ -z "$quick" ]; then names+=(client training broadcast guided process transport); fi
+        if [ -z "$quick" ]; then names+=(client job_port training broadcast guided process transport); fi
     elif [ -n "$quick" ]; then
         names=(core film image_io import import_shapes import_textures import_looks coordinator bookkeeping client worker)
     fi

@@ -25,8 +25,8 @@ class Reducer {
         Status why;
     };
     /// Takes the partial of `unit` in. Returns the units that were refused: this one, or others that had waited for it, whose
-    /// sums leave the range only now. An error is the end of all sums (a complete group does not fit them, or there is no memory for
-    /// them: kResourceExhausted); kCancelled after freeze().
+    /// sums leave the range only now. An error is the end of all sums (a complete group does not fit them, or there is no memory
+    /// for them: kResourceExhausted); kCancelled after freeze().
     Result<std::vector<Refusal>> add(const WorkUnit& unit, Partial partial);
     /// Nothing is merged any more.
     void freeze();

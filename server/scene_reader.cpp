@@ -13,7 +13,8 @@
 namespace lightloom {
 namespace {
 
-/// Lets a few scenes be read at a time: each takes a processor and may take gigabytes, and hundreds of jobs may be submitted at once.
+/// Lets a few scenes be read at a time: each takes a processor and may take gigabytes, and hundreds of jobs may be submitted at
+/// once.
 class Turns {
   public:
     /// False if it was asked to stop before it was its turn.

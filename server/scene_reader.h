@@ -12,7 +12,8 @@ namespace lightloom {
 Result<SceneFacts> scene_facts(const SceneDescription& description, const JobSpec& spec);
 
 /// A reader that lays the scene's files out below `scratch` and imports them, so that a scene with an error fails its job
-/// before any worker sees it; a few at a time. The facts keep nothing of the scene, but their build_scene() reads the asset store again.
+/// before any worker sees it; a few at a time. The facts keep nothing of the scene, but their build_scene() reads
+/// the asset store again.
 SceneReader make_scene_reader(std::filesystem::path scratch);
 
 }  // namespace lightloom

@@ -25,8 +25,8 @@ class UnitTable {
 
     /// Whether some other worker than these could render a unit.
     using AnyoneElse = std::function<bool(const std::set<uint32_t>& workers)>;
-    /// The next unit for `worker` (an index of the caller's choice), or nothing for now. A unit that failed on the worker comes back
-    /// to it only when nobody else is there to render it.
+    /// The next unit for `worker` (an index of the caller's choice), or nothing for now. A unit that failed on the worker comes
+    /// back to it only when nobody else is there to render it.
     std::optional<WorkUnit> lease(uint32_t worker, TimePoint expiry, const AnyoneElse& anyone_else = {});
     /// Whether more than `n` units could be leased now.
     bool has_more_than(size_t n);

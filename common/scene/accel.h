@@ -25,8 +25,8 @@ class Accel {
     /// Geometry index that the opacity callback gets for spheres.
     static constexpr uint32_t kSphereGeometry = 0xfffffff0u;
 
-    /// Opacity in [0, 1] of the cut-out surface at a hit: (object definition, -1 in the world; geometry, primitive, u, v). Called from
-    /// inside the traversal for shapes with an alpha only.
+    /// Opacity in [0, 1] of the cut-out surface at a hit: (object definition, -1 in the world; geometry, primitive, u, v). Called
+    /// from inside the traversal for shapes with an alpha only.
     using Opacity = float (*)(const void* user, int32_t object, uint32_t geometry, uint32_t primitive, float u, float v);
 
     ~Accel();

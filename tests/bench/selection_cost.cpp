@@ -1,5 +1,6 @@
-// What selection costs `spcbpt`: the share of the rendering time, of one thread, that goes into kappa (labels of light sub-paths, of
-// camera vertices, and of the prefixes and suffixes that weights ask for), into the index of the cache, and into two-stage sampling.
+// What selection costs `spcbpt`: the share of the rendering time, of one thread, that goes into kappa (labels of light sub-paths,
+// of camera vertices, and of the prefixes and suffixes that weights ask for), into the index of the cache, and into two-stage
+// sampling.
 //
 //   selection_cost SCENE [--iterations N] [--resolution WxH] [--set key=value ...]
 //
@@ -98,7 +99,8 @@ int main(int argc, char** argv) {
     if (!resolution.empty() && std::sscanf(resolution.c_str(), "%dx%d", &options.width, &options.height) != 2) return 2;
     RenderSettings settings{"spcbpt", {}, 1, imported->description.max_depth};
     for (const std::string& item : set)
-        if (const size_t eq = item.find('='); eq != std::string::npos) settings.parameters[item.substr(0, eq)] = item.substr(eq + 1);
+        if (const size_t eq = item.find('='); eq != std::string::npos)
+            settings.parameters[item.substr(0, eq)] = item.substr(eq + 1);
     auto built = Scene::build(std::move(imported->description), options);
     if (!built.ok()) return fail(built.status());
     const std::shared_ptr<const Scene> scene = std::move(built).value();

@@ -146,7 +146,8 @@ TEST(LearnTables, EveryErrorEndsIt) {
     const TableService service;
     for (const char* where : {"pilot ", "guide ", "set ", "probe ", "settle "}) {
         const bool probes = std::string_view(where) == "probe " || std::string_view(where) == "settle ";
-        FakeTracing tracing(probes ? limited_spec() : complete(service.guided_spec()), probes ? UnitKind::kProbe : UnitKind::kPilot);
+        FakeTracing tracing(probes ? limited_spec() : complete(service.guided_spec()),
+                            probes ? UnitKind::kProbe : UnitKind::kPilot);
         tracing.fails_at = where;
         const auto learned = learn(tracing);
         EXPECT_EQ(learned.status().code(), StatusCode::kDataLoss) << where;
