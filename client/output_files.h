@@ -11,7 +11,8 @@
 namespace lightloom::client {
 
 /// Whether all of `outputs` (names; empty ones are left out) can be written, tried with empty files beside them. kInvalidArgument
-/// for one that is a directory, a dangling link, another output or one of `inputs`, wherever links lead; devices and pipes are taken.
+/// for one that is a directory, a dangling link, another output or one of `inputs`, wherever links lead; devices and pipes are
+/// taken.
 Status check_output_files(std::span<const std::filesystem::path> inputs, std::span<const std::string> outputs);
 
 }  // namespace lightloom::client
