@@ -17,8 +17,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
-/// A coordinator that is restarted is back by then.
-constexpr auto kReconnect = std::chrono::seconds(5);
 constexpr auto kReconnectInterval = std::chrono::milliseconds(250);
 constexpr int kUploadAttempts = 5;
 /// Between looks at what another client is sending.
@@ -32,13 +30,15 @@ void set_deadline(grpc::ClientContext& context, double seconds) {
 
 std::string seconds_text(double seconds) { return std::to_string(std::lround(seconds)) + " s"; }
 
-/// Whether there is a connection before `end`. Looks once at least, after a moment, so that no server is called without a pause.
+/// Whether there is a connection before `end`, and still time for a call. Looks after a moment only, so that no server is called
+/// without a pause.
 bool connected_before(Clock::time_point end, grpc::Channel& channel, const std::stop_token& stop) {
     std::this_thread::sleep_for(kReconnectInterval);
-    do {
+    // A proxy in front of a coordinator that is gone stays connected.
+    while (Clock::now() < end && !stop.stop_requested()) {
         // Not GetState(): while nobody waits inside of gRPC, a connection makes a step every 5 s only.
         if (channel.WaitForConnected(std::chrono::system_clock::now() + kReconnectInterval)) return true;
-    } while (Clock::now() < end && !stop.stop_requested());
+    }
     return false;
 }
 
@@ -159,8 +159,9 @@ Result<JobInfo> GrpcJobPort::cancel_job(const std::string& job_id) {
 
 Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
                               std::stop_token stop) {
+    const auto patience = std::chrono::duration_cast<Clock::duration>(Seconds(options_.reconnect_seconds));
     uint64_t seen = 0;
-    Clock::time_point begin = Clock::now(), end = begin + kReconnect;
+    Clock::time_point begin = Clock::now(), end = begin + patience;
     for (;; begin = Clock::now()) {
         grpc::ClientContext context;
         const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
@@ -184,7 +185,7 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<voi
         const grpc::Status status = reader->Finish();
         const bool lost = status.error_code() == grpc::StatusCode::UNAVAILABLE;
         // A stream may have nothing to say for hours; one that ends as soon as it has begun does not begin the wait again.
-        if (heard || Clock::now() - begin > kReconnect) end = Clock::now() + kReconnect;
+        if (heard || Clock::now() - begin > patience) end = Clock::now() + patience;
         const bool again = lost && !stop.stop_requested() && connected_before(end, *channel_, stop);
         if (stop.stop_requested()) return {StatusCode::kCancelled, "interrupted"};
         if (!again) return wire::from_grpc(status);

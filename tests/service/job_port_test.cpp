@@ -132,5 +132,38 @@ TEST(Watch, GoesOnWhenTheCoordinatorIsBackInTime) {
     EXPECT_GT(changes, 1);
 }
 
+/// What stands before a coordinator that is gone.
+struct Proxy final : v1::JobService::Service {
+    grpc::Status WatchJob(grpc::ServerContext*, const v1::WatchJobRequest*, grpc::ServerWriter<v1::Job>*) override {
+        ++calls;
+        return {grpc::StatusCode::UNAVAILABLE, "no upstream"};
+    }
+    std::atomic<int> calls{0};
+};
+
+TEST(Watch, EndsWhenThereIsNothingButAConnection) {
+    Proxy proxy;
+    grpc::ServerBuilder builder;
+    int number = 0;
+    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &number);
+    builder.RegisterService(&proxy);
+    const auto server = builder.BuildAndStart();
+    GrpcJobPort jobs(channel_to(number), {.reconnect_seconds = 1});
+    std::stop_source stop;
+    std::atomic<bool> done{false};
+    Status ended;
+    std::jthread watch([&] {
+        ended = jobs.watch_job("job-1", [](const JobInfo&) {}, stop.get_token());
+        done = true;
+    });
+    testing::wait_until(20, [&] { return done.load(); });
+    stop.request_stop();
+    watch.join();
+    EXPECT_EQ(ended.code(), StatusCode::kUnavailable);
+    EXPECT_NE(ended.message().find("no upstream"), std::string::npos) << ended.message();
+    EXPECT_GT(proxy.calls, 1);
+    EXPECT_LT(proxy.calls, 6);  // with a pause of 0.25 s before each but the first
+}
+
 }  // namespace
 }  // namespace lightloom
