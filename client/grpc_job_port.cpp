@@ -75,7 +75,12 @@ class SilenceLimit {
     std::jthread thread_;  // last: ends before anything that it uses goes away
 };
 
-Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientContext& context, double silence_seconds) {
+/// For a call after an interruption, such as that for the image of a job that had just ended: only a later one could stop it.
+std::stop_token unless_requested(const std::stop_token& stop) { return stop.stop_requested() ? std::stop_token() : stop; }
+
+/// `stop` cancels the call.
+Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientContext& context, double silence_seconds,
+                            const std::stop_token& stop) {
     SilenceLimit silence(context, silence_seconds);
     std::string bytes;
     v1::Chunk chunk;
@@ -91,6 +96,7 @@ Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientC
     const grpc::Status status = reader.Finish();
     if (status.ok()) return bytes;
     constexpr const char* kLater = "; nothing is lost, `lightloom fetch` tries again";
+    if (stop.stop_requested()) return Status(StatusCode::kCancelled, std::string("interrupted") + kLater);
     if (silence.exceeded())
         return Status(StatusCode::kDeadlineExceeded,
                       "nothing more has come from the coordinator for " + seconds_text(silence_seconds) + kLater);
@@ -194,19 +200,23 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<voi
 
 Result<std::string> GrpcJobPort::image(const std::string& job_id, ImageKind kind) {
     grpc::ClientContext context;
+    const std::stop_token stop = unless_requested(options_.stop);
+    const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
     v1::GetImageRequest request;
     request.set_job_id(job_id);
     request.set_kind(kind == ImageKind::kFinal ? v1::IMAGE_KIND_FINAL : v1::IMAGE_KIND_PREVIEW);
     const auto reader = jobs_->GetImage(&context, request);
-    return collect(*reader, context, options_.silence_seconds);
+    return collect(*reader, context, options_.silence_seconds, stop);
 }
 
 Result<std::string> GrpcJobPort::manifest(const std::string& job_id) {
     grpc::ClientContext context;
+    const std::stop_token stop = unless_requested(options_.stop);
+    const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
     v1::GetManifestRequest request;
     request.set_job_id(job_id);
     const auto reader = jobs_->GetManifest(&context, request);
-    return collect(*reader, context, options_.silence_seconds);
+    return collect(*reader, context, options_.silence_seconds, stop);
 }
 
 Result<std::vector<Digest>> GrpcJobPort::find_missing(const std::vector<Digest>& digests) {

@@ -88,13 +88,38 @@ struct SlowImages final : v1::JobService::Service {
     std::atomic<bool> stalls{false};
 };
 
-TEST(Images, MayTakeAnyTimeAsLongAsSomethingComes) {
+struct Images : ::testing::Test {
+    Images() {
+        grpc::ServerBuilder builder;
+        builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &number);
+        builder.RegisterService(&images);
+        server = builder.BuildAndStart();
+    }
     SlowImages images;
-    grpc::ServerBuilder builder;
     int number = 0;
-    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &number);
-    builder.RegisterService(&images);
-    const auto server = builder.BuildAndStart();
+    std::unique_ptr<grpc::Server> server;
+};
+
+TEST_F(Images, CanBeInterruptedUnlessThatIsOver) {
+    std::stop_source stop;
+    GrpcJobPort jobs(channel_to(number), {.stop = stop.get_token(), .silence_seconds = 10});
+    images.chunks = 1;
+    images.stalls = true;
+    std::jthread thread([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(600));
+        stop.request_stop();
+    });
+    const auto begin = Clock::now();
+    const Status interrupted = jobs.image("job-1", ImageKind::kFinal).status();
+    EXPECT_EQ(interrupted.code(), StatusCode::kCancelled);
+    EXPECT_EQ(interrupted.message().rfind("interrupted; nothing is lost", 0), 0u) << interrupted.message();
+    EXPECT_LT(Clock::now() - begin, std::chrono::seconds(20));
+    images.stalls = false;
+    const auto image = jobs.image("job-1", ImageKind::kFinal);
+    EXPECT_TRUE(image.ok()) << image.status().message();
+}
+
+TEST_F(Images, MayTakeAnyTimeAsLongAsSomethingComes) {
     GrpcJobPort jobs(channel_to(number), {.silence_seconds = 2});
     const auto image = jobs.image("job-1", ImageKind::kFinal);
     ASSERT_TRUE(image.ok()) << image.status().message();
