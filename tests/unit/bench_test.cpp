@@ -272,8 +272,15 @@ TEST(BenchReference, IsRefusedWhereItCannotJudge) {
 TEST(BenchReference, IsWarnedOfWhereItMayMislead) {
     const BenchSubject subject{{8, 8, {0, 0, 8, 8}}, 5, "another", {{"bdpt", {}, "bdpt"}}, 12};
     // Standard deviation 0.1 of 1: MAPE 100 % * sqrt(2 / pi) * 0.1 / 1.01 = 7.9 %.
-    EXPECT_NEAR(noise_mape(grey(1, 0.01f)), 7.9, 0.01);
+    EXPECT_NEAR(noise_mape(grey(1, 0.01f)).value_or(0), 7.9, 0.01);
     EXPECT_EQ(check_reference("ref.exr", grey(1, 0.01f), subject)->size(), 3u);
+    ExrImage foreign = grey(1, 0);
+    EXPECT_EQ(noise_mape(foreign), 0);
+    foreign.layers.clear();
+    EXPECT_FALSE(noise_mape(foreign));
+    const auto unknown = check_reference("ref.exr", foreign, subject);
+    ASSERT_EQ(unknown->size(), 3u);
+    EXPECT_EQ(unknown->back(), "ref.exr has no variance layer, so its own noise is unknown");
 }
 
 }  // namespace
