@@ -1,13 +1,28 @@
 // What a benchmark concludes from its measurements, and how its file survives a kill.
 
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
 
 #include "client/bench_log.h"
 #include "client/bench_reference.h"
 #include "common/film/atomic_file.h"
+
+namespace {
+int flock_error = 0;  ///< What the file system answers to locks, if not 0.
+}  // namespace
+
+/// Instead of the C library's.
+extern "C" int flock(int file, int operation) noexcept {
+    if (flock_error == 0) return int(::syscall(SYS_flock, file, operation));
+    errno = flock_error;
+    return -1;
+}
 
 namespace lightloom::client {
 namespace {
@@ -210,6 +225,26 @@ TEST(BenchWriter, AFileHasOneWriterUnderAllOfItsNames) {
     for ([[maybe_unused]] const auto& item : std::filesystem::directory_iterator(directory)) ++files;
     EXPECT_EQ(files, 2u) << "nothing else is left there";
     std::filesystem::remove_all(directory);
+}
+
+TEST(BenchWriter, GoesOnUnlockedWhereThereAreNoLocks) {
+    const std::string path = (std::filesystem::temp_directory_path() / ("bench-unlocked-" + std::to_string(::getpid()))).string();
+    for (const int error : {ENOSYS, EOPNOTSUPP, ENOLCK, EIO}) {
+        flock_error = error;
+        ::testing::internal::CaptureStderr();
+        auto writer = BenchWriter::open(path, true);
+        EXPECT_EQ(writer.ok(), error != EIO);
+        if (writer.ok()) {
+            EXPECT_TRUE(writer->replace("").ok());
+            EXPECT_TRUE(writer->append({{"run", "x"}, {"done", true}}).ok());
+            EXPECT_EQ(parse_history(*writer->text(), path, {})->done.size(), 1u);
+        }
+        const std::string warning = ::testing::internal::GetCapturedStderr();
+        EXPECT_EQ(warning.find("cannot be locked") != std::string::npos, error != EIO) << warning;
+        EXPECT_EQ(std::count(warning.begin(), warning.end(), '\n'), error != EIO) << warning;
+    }
+    flock_error = 0;
+    std::filesystem::remove(path);
 }
 
 Json finished(const std::string& label, double preparation, const std::vector<CurvePoint>& curve) {
