@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <filesystem>
 #include <system_error>
 
@@ -25,6 +26,9 @@ bool begins_a_line(std::string_view text) {
 Status cannot_be_written(const std::string& path, int error) {
     return invalid_argument(path + ": cannot be written: " + std::generic_category().message(error));
 }
+
+/// Whether a failed lock says that the file system has none, as some network file systems.
+bool has_no_locks(int error) { return error == ENOSYS || error == EOPNOTSUPP || error == ENOLCK; }
 
 }  // namespace
 
@@ -121,8 +125,11 @@ Result<BenchWriter> BenchWriter::open(const std::string& path, bool resume) {
         if (::fstat(::fileno(file.get()), &ours) != 0) return cannot_be_written(path, errno);
         if (!S_ISREG(ours.st_mode)) return BenchWriter(path, std::move(file));  // a pipe or a device, which anybody may use
         if (::flock(::fileno(file.get()), LOCK_EX | LOCK_NB) != 0) {
-            if (errno != EWOULDBLOCK) return cannot_be_written(path, errno);
-            return failed_precondition(path + ": another bench is writing to it; wait for that one or give another name");
+            if (errno == EWOULDBLOCK)
+                return failed_precondition(path + ": another bench is writing to it; wait for that one or give another name");
+            if (!has_no_locks(errno)) return cannot_be_written(path, errno);
+            std::fprintf(stderr, "lightloom bench: warning: %s cannot be locked there; let no other bench write to it meanwhile\n",
+                         path.c_str());
         }
         // Who had it may have replaced it between our opening and our locking it.
         if (::stat(path.c_str(), &named) == 0 && named.st_ino == ours.st_ino && named.st_dev == ours.st_dev)
@@ -144,7 +151,8 @@ Status BenchWriter::replace(std::string_view content) {
     const std::string fresh = target + ".new-" + std::to_string(::getpid());
     Status status = write_file_atomically(fresh, content);
     File file(status.ok() ? std::fopen(fresh.c_str(), "a") : nullptr);
-    if (status.ok() && (!file || ::flock(::fileno(file.get()), LOCK_EX | LOCK_NB) != 0 ||
+    const auto locked = [&] { return ::flock(::fileno(file.get()), LOCK_EX | LOCK_NB) == 0 || has_no_locks(errno); };
+    if (status.ok() && (!file || !locked() ||
                         std::rename(fresh.c_str(), target.c_str()) != 0))
         status = cannot_be_written(path_, errno);
     if (!status.ok()) {

@@ -57,7 +57,8 @@ Result<BenchHistory> parse_history(std::string_view text, const std::string& fil
 /// The error of a benchmark that would begin a file which is there.
 Status exists_already(const std::string& path);
 
-/// The file of a benchmark. No other process can open it as such meanwhile; each line is whole before the next begins.
+/// The file of a benchmark. No other process can open it as such meanwhile, unless its file system has no locks, of which open()
+/// warns; each line is whole before the next begins.
 class BenchWriter {
   public:
     /// Makes the file; one that exists is refused unless `resume` is set, and always while another process has it open.
@@ -75,7 +76,7 @@ class BenchWriter {
     using File = std::unique_ptr<std::FILE, Close>;
     BenchWriter(std::string path, File file) : path_(std::move(path)), file_(std::move(file)) {}
     std::string path_;
-    File file_;  ///< Locked.
+    File file_;  ///< Locked where that is possible.
 };
 
 /// One row per algorithm, in the order of `algorithms`: medians over the seeds, and ratios to the first row.

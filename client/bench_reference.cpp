@@ -16,9 +16,9 @@ std::string percent(double value) {
 
 }  // namespace
 
-double noise_mape(const ExrImage& reference) {
+std::optional<double> noise_mape(const ExrImage& reference) {
     const ImageLayer* variance = reference.layer("variance");
-    if (!variance || variance->pixels.size() != reference.color.pixels.size()) return 0;
+    if (!variance || variance->pixels.size() != reference.color.pixels.size()) return std::nullopt;
     // The mean absolute value of a normal error is sqrt(2 / pi) standard deviations.
     const double factor = std::sqrt(2 / 3.14159265358979323846);
     double sum = 0;
@@ -52,8 +52,11 @@ Result<std::vector<std::string>> check_reference(const std::string& name, const 
         warnings.push_back(name + " was made by \"" + maker + "\", which is also tested: a bias that it has does not show");
         break;
     }
-    if (const double noise = noise_mape(reference); noise > subject.threshold / 4) {
-        warnings.push_back(name + " is noisy: it alone adds MAPE of about " + percent(noise) + " to a perfect image (threshold " +
+    const std::optional<double> noise = noise_mape(reference);
+    if (!noise) {
+        warnings.push_back(name + " has no variance layer, so its own noise is unknown");
+    } else if (*noise > subject.threshold / 4) {
+        warnings.push_back(name + " is noisy: it alone adds MAPE of about " + percent(*noise) + " to a perfect image (threshold " +
                            percent(subject.threshold) + ")");
     }
     return warnings;

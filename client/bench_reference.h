@@ -1,6 +1,7 @@
 #pragma once
 // Whether an image can serve as the reference of a benchmark.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,12 +21,12 @@ struct BenchSubject {
 
 /// Refuses a reference that the runs cannot converge to (other frame, other path lengths, not finite), and a threshold that
 /// a black image would meet, because then an algorithm that finds no light wins. Returns warnings about what may hide or
-/// distort an error: a tested algorithm made the reference, it is too noisy for the threshold, other scene files. `name` is for
-/// messages.
+/// distort an error: a tested algorithm made the reference, it is too noisy for the threshold or nobody knows how noisy, other
+/// scene files. `name` is for messages.
 Result<std::vector<std::string>> check_reference(const std::string& name, const ExrImage& reference, const BenchSubject& subject);
 
 /// MAPE in percent that a perfect image would show against a reference with this variance layer: what its own noise adds.
-/// 0 if it has none.
-double noise_mape(const ExrImage& reference);
+/// Nothing if it has none, as one of a single group of samples or of another renderer.
+std::optional<double> noise_mape(const ExrImage& reference);
 
 }  // namespace lightloom::client

@@ -17,8 +17,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
-/// A coordinator that is restarted is back by then.
-constexpr auto kReconnect = std::chrono::seconds(5);
 constexpr auto kReconnectInterval = std::chrono::milliseconds(250);
 constexpr int kUploadAttempts = 5;
 /// Between looks at what another client is sending.
@@ -32,13 +30,15 @@ void set_deadline(grpc::ClientContext& context, double seconds) {
 
 std::string seconds_text(double seconds) { return std::to_string(std::lround(seconds)) + " s"; }
 
-/// Whether there is a connection before `end`. Looks once at least, after a moment, so that no server is called without a pause.
+/// Whether there is a connection before `end`, and still time for a call. Looks after a moment only, so that no server is called
+/// without a pause.
 bool connected_before(Clock::time_point end, grpc::Channel& channel, const std::stop_token& stop) {
     std::this_thread::sleep_for(kReconnectInterval);
-    do {
+    // A proxy in front of a coordinator that is gone stays connected.
+    while (Clock::now() < end && !stop.stop_requested()) {
         // Not GetState(): while nobody waits inside of gRPC, a connection makes a step every 5 s only.
         if (channel.WaitForConnected(std::chrono::system_clock::now() + kReconnectInterval)) return true;
-    } while (Clock::now() < end && !stop.stop_requested());
+    }
     return false;
 }
 
@@ -75,7 +75,12 @@ class SilenceLimit {
     std::jthread thread_;  // last: ends before anything that it uses goes away
 };
 
-Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientContext& context, double silence_seconds) {
+/// For a call after an interruption, such as that for the image of a job that had just ended: only a later one could stop it.
+std::stop_token unless_requested(const std::stop_token& stop) { return stop.stop_requested() ? std::stop_token() : stop; }
+
+/// `stop` cancels the call.
+Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientContext& context, double silence_seconds,
+                            const std::stop_token& stop) {
     SilenceLimit silence(context, silence_seconds);
     std::string bytes;
     v1::Chunk chunk;
@@ -91,6 +96,7 @@ Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientC
     const grpc::Status status = reader.Finish();
     if (status.ok()) return bytes;
     constexpr const char* kLater = "; nothing is lost, `lightloom fetch` tries again";
+    if (stop.stop_requested()) return Status(StatusCode::kCancelled, std::string("interrupted") + kLater);
     if (silence.exceeded())
         return Status(StatusCode::kDeadlineExceeded,
                       "nothing more has come from the coordinator for " + seconds_text(silence_seconds) + kLater);
@@ -159,8 +165,9 @@ Result<JobInfo> GrpcJobPort::cancel_job(const std::string& job_id) {
 
 Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
                               std::stop_token stop) {
+    const auto patience = std::chrono::duration_cast<Clock::duration>(Seconds(options_.reconnect_seconds));
     uint64_t seen = 0;
-    Clock::time_point begin = Clock::now(), end = begin + kReconnect;
+    Clock::time_point begin = Clock::now(), end = begin + patience;
     for (;; begin = Clock::now()) {
         grpc::ClientContext context;
         const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
@@ -184,7 +191,7 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<voi
         const grpc::Status status = reader->Finish();
         const bool lost = status.error_code() == grpc::StatusCode::UNAVAILABLE;
         // A stream may have nothing to say for hours; one that ends as soon as it has begun does not begin the wait again.
-        if (heard || Clock::now() - begin > kReconnect) end = Clock::now() + kReconnect;
+        if (heard || Clock::now() - begin > patience) end = Clock::now() + patience;
         const bool again = lost && !stop.stop_requested() && connected_before(end, *channel_, stop);
         if (stop.stop_requested()) return {StatusCode::kCancelled, "interrupted"};
         if (!again) return wire::from_grpc(status);
@@ -193,19 +200,23 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<voi
 
 Result<std::string> GrpcJobPort::image(const std::string& job_id, ImageKind kind) {
     grpc::ClientContext context;
+    const std::stop_token stop = unless_requested(options_.stop);
+    const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
     v1::GetImageRequest request;
     request.set_job_id(job_id);
     request.set_kind(kind == ImageKind::kFinal ? v1::IMAGE_KIND_FINAL : v1::IMAGE_KIND_PREVIEW);
     const auto reader = jobs_->GetImage(&context, request);
-    return collect(*reader, context, options_.silence_seconds);
+    return collect(*reader, context, options_.silence_seconds, stop);
 }
 
 Result<std::string> GrpcJobPort::manifest(const std::string& job_id) {
     grpc::ClientContext context;
+    const std::stop_token stop = unless_requested(options_.stop);
+    const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
     v1::GetManifestRequest request;
     request.set_job_id(job_id);
     const auto reader = jobs_->GetManifest(&context, request);
-    return collect(*reader, context, options_.silence_seconds);
+    return collect(*reader, context, options_.silence_seconds, stop);
 }
 
 Result<std::vector<Digest>> GrpcJobPort::find_missing(const std::vector<Digest>& digests) {

@@ -12,9 +12,12 @@
 namespace lightloom {
 
 struct GrpcJobPortOptions {
-    std::stop_token stop;  ///< Of uploads: kCancelled soon after a request. What follows one, such as a cancellation, goes on.
+    /// Of uploads and of the files of a job: kCancelled soon after a request. Of the latter, one that begins after it goes on, as
+    /// does any other call that follows one, such as a cancellation.
+    std::stop_token stop;
     double silence_seconds = 120;        ///< In which nothing more of an image arrives.
     double upload_silence_seconds = 60;  ///< In which nothing more of a file arrives that another client is sending.
+    double reconnect_seconds = 5;        ///< In which a coordinator that is restarted is back.
 };
 
 class GrpcJobPort final : public JobPort {

@@ -108,8 +108,8 @@ void AssetStore::trim(uint64_t max_bytes, const Digest& newest) const {
     const fs::path incoming = directory_ / "incoming";
     std::vector<fs::path> directories;
     std::error_code error;
-    for (const auto& item : fs::directory_iterator(directory_, error))
-        if (item.is_directory(error)) directories.push_back(item.path());
+    for (fs::directory_iterator item(directory_, error), end; item != end; item.increment(error))
+        if (item->is_directory(error)) directories.push_back(item->path());
     trim_cache(directories, max_bytes, path_of(newest), [&](const fs::path& path) {
         return path.parent_path() == incoming ? CacheFile::kUnfinished : CacheFile::kEntry;
     });

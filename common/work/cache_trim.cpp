@@ -19,12 +19,12 @@ void trim_cache(const std::vector<fs::path>& directories, uint64_t max_bytes, co
     const auto hour_ago = fs::file_time_type::clock::now() - std::chrono::hours(1);
     std::error_code error;  // another process may remove a file under our eyes
     for (const fs::path& directory : directories) {
-        for (const auto& item : fs::directory_iterator(directory, error)) {
-            const CacheFile kind = item.is_regular_file(error) ? kind_of(item.path()) : CacheFile::kForeign;
+        for (fs::directory_iterator item(directory, error), end; item != end; item.increment(error)) {
+            const CacheFile kind = item->is_regular_file(error) ? kind_of(item->path()) : CacheFile::kForeign;
             if (kind == CacheFile::kForeign) continue;
-            File file{item.last_write_time(error), item.path(), 0};
+            File file{item->last_write_time(error), item->path(), 0};
             if (error) continue;
-            file.size = item.file_size(error);
+            file.size = item->file_size(error);
             if (error) continue;
             if (kind == CacheFile::kEntry) {
                 total += file.size;

@@ -88,13 +88,38 @@ struct SlowImages final : v1::JobService::Service {
     std::atomic<bool> stalls{false};
 };
 
-TEST(Images, MayTakeAnyTimeAsLongAsSomethingComes) {
+struct Images : ::testing::Test {
+    Images() {
+        grpc::ServerBuilder builder;
+        builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &number);
+        builder.RegisterService(&images);
+        server = builder.BuildAndStart();
+    }
     SlowImages images;
-    grpc::ServerBuilder builder;
     int number = 0;
-    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &number);
-    builder.RegisterService(&images);
-    const auto server = builder.BuildAndStart();
+    std::unique_ptr<grpc::Server> server;
+};
+
+TEST_F(Images, CanBeInterruptedUnlessThatIsOver) {
+    std::stop_source stop;
+    GrpcJobPort jobs(channel_to(number), {.stop = stop.get_token(), .silence_seconds = 10});
+    images.chunks = 1;
+    images.stalls = true;
+    std::jthread thread([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(600));
+        stop.request_stop();
+    });
+    const auto begin = Clock::now();
+    const Status interrupted = jobs.image("job-1", ImageKind::kFinal).status();
+    EXPECT_EQ(interrupted.code(), StatusCode::kCancelled);
+    EXPECT_EQ(interrupted.message().rfind("interrupted; nothing is lost", 0), 0u) << interrupted.message();
+    EXPECT_LT(Clock::now() - begin, std::chrono::seconds(20));
+    images.stalls = false;
+    const auto image = jobs.image("job-1", ImageKind::kFinal);
+    EXPECT_TRUE(image.ok()) << image.status().message();
+}
+
+TEST_F(Images, MayTakeAnyTimeAsLongAsSomethingComes) {
     GrpcJobPort jobs(channel_to(number), {.silence_seconds = 2});
     const auto image = jobs.image("job-1", ImageKind::kFinal);
     ASSERT_TRUE(image.ok()) << image.status().message();
@@ -130,6 +155,39 @@ TEST(Watch, GoesOnWhenTheCoordinatorIsBackInTime) {
     watch.join();
     EXPECT_TRUE(ended.ok()) << ended.message();
     EXPECT_GT(changes, 1);
+}
+
+/// What stands before a coordinator that is gone.
+struct Proxy final : v1::JobService::Service {
+    grpc::Status WatchJob(grpc::ServerContext*, const v1::WatchJobRequest*, grpc::ServerWriter<v1::Job>*) override {
+        ++calls;
+        return {grpc::StatusCode::UNAVAILABLE, "no upstream"};
+    }
+    std::atomic<int> calls{0};
+};
+
+TEST(Watch, EndsWhenThereIsNothingButAConnection) {
+    Proxy proxy;
+    grpc::ServerBuilder builder;
+    int number = 0;
+    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &number);
+    builder.RegisterService(&proxy);
+    const auto server = builder.BuildAndStart();
+    GrpcJobPort jobs(channel_to(number), {.reconnect_seconds = 1});
+    std::stop_source stop;
+    std::atomic<bool> done{false};
+    Status ended;
+    std::jthread watch([&] {
+        ended = jobs.watch_job("job-1", [](const JobInfo&) {}, stop.get_token());
+        done = true;
+    });
+    testing::wait_until(20, [&] { return done.load(); });
+    stop.request_stop();
+    watch.join();
+    EXPECT_EQ(ended.code(), StatusCode::kUnavailable);
+    EXPECT_NE(ended.message().find("no upstream"), std::string::npos) << ended.message();
+    EXPECT_GT(proxy.calls, 1);
+    EXPECT_LT(proxy.calls, 6);  // with a pause of 0.25 s before each but the first
 }
 
 }  // namespace

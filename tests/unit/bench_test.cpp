@@ -1,13 +1,28 @@
 // What a benchmark concludes from its measurements, and how its file survives a kill.
 
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
 
 #include "client/bench_log.h"
 #include "client/bench_reference.h"
 #include "common/film/atomic_file.h"
+
+namespace {
+int flock_error = 0;  ///< What the file system answers to locks, if not 0.
+}  // namespace
+
+/// Instead of the C library's.
+extern "C" int flock(int file, int operation) noexcept {
+    if (flock_error == 0) return int(::syscall(SYS_flock, file, operation));
+    errno = flock_error;
+    return -1;
+}
 
 namespace lightloom::client {
 namespace {
@@ -212,6 +227,26 @@ TEST(BenchWriter, AFileHasOneWriterUnderAllOfItsNames) {
     std::filesystem::remove_all(directory);
 }
 
+TEST(BenchWriter, GoesOnUnlockedWhereThereAreNoLocks) {
+    const std::string path = (std::filesystem::temp_directory_path() / ("bench-unlocked-" + std::to_string(::getpid()))).string();
+    for (const int error : {ENOSYS, EOPNOTSUPP, ENOLCK, EIO}) {
+        flock_error = error;
+        ::testing::internal::CaptureStderr();
+        auto writer = BenchWriter::open(path, true);
+        EXPECT_EQ(writer.ok(), error != EIO);
+        if (writer.ok()) {
+            EXPECT_TRUE(writer->replace("").ok());
+            EXPECT_TRUE(writer->append({{"run", "x"}, {"done", true}}).ok());
+            EXPECT_EQ(parse_history(*writer->text(), path, {})->done.size(), 1u);
+        }
+        const std::string warning = ::testing::internal::GetCapturedStderr();
+        EXPECT_EQ(warning.find("cannot be locked") != std::string::npos, error != EIO) << warning;
+        EXPECT_EQ(std::count(warning.begin(), warning.end(), '\n'), error != EIO) << warning;
+    }
+    flock_error = 0;
+    std::filesystem::remove(path);
+}
+
 Json finished(const std::string& label, double preparation, const std::vector<CurvePoint>& curve) {
     return done_line({{"label", label},
                       {"iterations", curve.back().iterations},
@@ -272,8 +307,15 @@ TEST(BenchReference, IsRefusedWhereItCannotJudge) {
 TEST(BenchReference, IsWarnedOfWhereItMayMislead) {
     const BenchSubject subject{{8, 8, {0, 0, 8, 8}}, 5, "another", {{"bdpt", {}, "bdpt"}}, 12};
     // Standard deviation 0.1 of 1: MAPE 100 % * sqrt(2 / pi) * 0.1 / 1.01 = 7.9 %.
-    EXPECT_NEAR(noise_mape(grey(1, 0.01f)), 7.9, 0.01);
+    EXPECT_NEAR(noise_mape(grey(1, 0.01f)).value_or(0), 7.9, 0.01);
     EXPECT_EQ(check_reference("ref.exr", grey(1, 0.01f), subject)->size(), 3u);
+    ExrImage foreign = grey(1, 0);
+    EXPECT_EQ(noise_mape(foreign), 0);
+    foreign.layers.clear();
+    EXPECT_FALSE(noise_mape(foreign));
+    const auto unknown = check_reference("ref.exr", foreign, subject);
+    ASSERT_EQ(unknown->size(), 3u);
+    EXPECT_EQ(unknown->back(), "ref.exr has no variance layer, so its own noise is unknown");
 }
 
 }  // namespace

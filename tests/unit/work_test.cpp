@@ -2,10 +2,13 @@
 
 #include "common/work/job.h"
 
+#include <dirent.h>
+#include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 
@@ -15,6 +18,21 @@
 #include "common/work/golden.h"
 #include "common/work/wire.h"
 #include "tests/support/estimates.h"
+
+namespace {
+int reads_left = -1;  ///< Of directory entries before the next one fails; negative: none fails.
+}  // namespace
+
+/// Instead of the C library's.
+extern "C" dirent* readdir(DIR* directory) {
+    static const auto real = reinterpret_cast<dirent* (*)(DIR*)>(::dlsym(RTLD_NEXT, "readdir"));
+    if (reads_left == 0) {
+        errno = EIO;
+        return nullptr;
+    }
+    if (reads_left > 0) --reads_left;
+    return real(directory);
+}
 
 namespace lightloom {
 namespace {
@@ -243,6 +261,21 @@ TEST(AssetStore, DamageIsNoticedBeforeUse) {
     std::ofstream(store.path_of(digest)) << "c0ntent";
     EXPECT_EQ(store.materialise(manifest, directory.path / "out2").code(), StatusCode::kDataLoss);
     EXPECT_FALSE(store.contains(digest));
+}
+
+/// As when a network file system breaks off in the middle of a directory.
+TEST(AssetStore, TrimmingEndsQuietlyWhereADirectoryCannotBeRead) {
+    const TempDirectory directory;
+    AssetStore store(directory.path / "store");
+    const std::string newest = "newest";
+    for (int reads = 0; reads < 20; ++reads) {
+        for (const std::string& bytes : {newest, std::string("a"), std::string("b")})
+            ASSERT_TRUE(store.put(sha256(bytes), bytes).ok());
+        reads_left = reads;
+        EXPECT_NO_THROW(store.trim(0, sha256(newest))) << reads;
+        reads_left = -1;
+        EXPECT_TRUE(store.contains(sha256(newest)));
+    }
 }
 
 TEST(Wire, SpecAndUnitsSurviveTheRoundTrip) {
