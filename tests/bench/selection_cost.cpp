@@ -13,10 +13,10 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "common/import/import.h"
 #include "common/transport/spcbpt.h"
 #include "common/transport/training.h"
 #include "common/work/job.h"
+#include "tests/bench/bench_scene.h"
 
 using namespace lightloom;
 
@@ -92,37 +92,24 @@ int main(int argc, char** argv) {
     app.add_option("--set", set);
     CLI11_PARSE(app, argc, argv);
 
-    const auto fail = [](const Status& s) { return std::fprintf(stderr, "%s\n", s.message().c_str()), 2; };
-    auto imported = import_pbrt(scene_path);
-    if (!imported.ok()) return fail(imported.status());
-    SceneOptions options;
-    if (!resolution.empty() && std::sscanf(resolution.c_str(), "%dx%d", &options.width, &options.height) != 2) return 2;
-    RenderSettings settings{"spcbpt", {}, 1, imported->description.max_depth};
-    for (const std::string& item : set)
-        if (const size_t eq = item.find('='); eq != std::string::npos)
-            settings.parameters[item.substr(0, eq)] = item.substr(eq + 1);
-    auto built = Scene::build(std::move(imported->description), options);
-    if (!built.ok()) return fail(built.status());
-    const std::shared_ptr<const Scene> scene = std::move(built).value();
-    const auto parameters = TransportParameters::read(settings);
-    if (!parameters.ok()) return fail(parameters.status());
+    const bench::LoadedScene loaded = bench::load(scene_path, resolution);
+    const std::shared_ptr<const Scene>& scene = loaded.scene;
+    const RenderSettings settings = bench::settings_of("spcbpt", set, loaded);
+    const TransportParameters parameters = bench::value_or_exit(TransportParameters::read(settings));
     TrainingReport report;
-    auto tables = make_tables(*scene, settings, {}, &report);
-    if (!tables.ok()) return fail(tables.status());
+    SubspaceTables tables = bench::value_or_exit(make_tables(*scene, settings, {}, &report));
 
-    const double frame_paths = parameters->light_paths * double(scene->frame().crop.area());
-    const auto plain = make_spcbpt(*parameters, std::make_shared<const PreparedTables>(*std::move(tables)), frame_paths);
+    const double frame_paths = parameters.light_paths * double(scene->frame().crop.area());
+    const auto plain = make_spcbpt(parameters, std::make_shared<const PreparedTables>(std::move(tables)), frame_paths);
     const CachedAlgorithm<TimedConnections> algorithm{{{plain.method}}, plain.heuristic, plain.minimum_paths};
     const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
     const Overhead empty = overhead();
     // The units of a job: caches as large as there.
-    const Plan plan(scene->frame(), parameters->light_paths);
+    const Plan plan(scene->frame(), parameters.light_paths);
     const uint64_t begin = __rdtsc();
     for (const Group& group : plan.groups_for(iterations)) {
-        for (const WorkUnit& unit : plan.units(group)) {
-            const auto part = render_unit(algorithm, *scene, settings, parameters->roulette, unit_work(unit), {});
-            if (!part.ok()) return fail(part.status());
-        }
+        for (const WorkUnit& unit : plan.units(group))
+            (void)bench::value_or_exit(render_unit(algorithm, *scene, settings, parameters.roulette, unit_work(unit), {}));
     }
     double whole = double(__rdtsc() - begin);
     for (const Clock& clock : clocks) whole -= double(clock.calls) * empty.whole;

@@ -10,11 +10,11 @@
 #include <cstdio>
 #include <numeric>
 
-#include "common/import/import.h"
 #include "common/transport/bdpt.h"
 #include "common/transport/lvcbpt.h"
 #include "common/transport/spcbpt.h"
 #include "common/transport/training.h"
+#include "tests/bench/bench_scene.h"
 
 using namespace lightloom;
 
@@ -94,32 +94,19 @@ int main(int argc, char** argv) {
     app.add_option("--set", set);
     CLI11_PARSE(app, argc, argv);
 
-    const auto fail = [](const Status& s) { return std::fprintf(stderr, "%s\n", s.message().c_str()), 2; };
-    auto imported = import_pbrt(scene_path);
-    if (!imported.ok()) return fail(imported.status());
-    SceneOptions options;
-    if (!resolution.empty() && std::sscanf(resolution.c_str(), "%dx%d", &options.width, &options.height) != 2) return 2;
-    const int max_depth = imported->description.max_depth;
-    auto built = Scene::build(std::move(imported->description), options);
-    if (!built.ok()) return fail(built.status());
-    const std::shared_ptr<const Scene> scene = std::move(built).value();
+    const bench::LoadedScene loaded = bench::load(scene_path, resolution);
+    const std::shared_ptr<const Scene>& scene = loaded.scene;
     const Rect crop = scene->frame().crop;
 
     for (const std::string& name : algorithms) {
-        RenderSettings settings{name, {}, 1, max_depth};
-        for (const std::string& item : set)
-            if (const size_t eq = item.find('='); eq != std::string::npos)
-                settings.parameters[item.substr(0, eq)] = item.substr(eq + 1);
-        const auto parameters = TransportParameters::read(settings);
-        if (!parameters.ok()) return fail(parameters.status());
+        RenderSettings settings = bench::settings_of(name, set, loaded);
+        const TransportParameters parameters = bench::value_or_exit(TransportParameters::read(settings));
         SubspaceTables tables;
-        if (parameters->needs_tables) {
+        if (parameters.needs_tables) {
             TrainingReport report;
-            auto made = make_tables(*scene, settings, {}, &report);
-            if (!made.ok()) return fail(made.status());
-            tables = *std::move(made);
+            tables = bench::value_or_exit(make_tables(*scene, settings, {}, &report));
         }
-        const double frame_paths = parameters->light_paths * double(crop.area());
+        const double frame_paths = parameters.light_paths * double(crop.area());
         std::vector<std::vector<std::vector<double>>> images(kClasses);
         for (int c = 0; c < kClasses; ++c) {
             for (uint32_t seed = 0; seed < seeds; ++seed) {
@@ -127,25 +114,24 @@ int main(int argc, char** argv) {
                 const uint64_t light_paths = uint64_t(frame_paths * iterations + 0.5);
                 const UnitWork work{0, iterations, 0, crop, 0, std::max<uint64_t>(1, light_paths)};
                 const auto render = [&](const auto& algorithm) {
-                    return render_unit(algorithm, *scene, settings, parameters->roulette, work, {});
+                    return render_unit(algorithm, *scene, settings, parameters.roulette, work, {});
                 };
-                const Result<Partial> part = [&]() -> Result<Partial> {
+                const Partial part = bench::value_or_exit([&]() -> Result<Partial> {
                     const Class wanted = Class(c);
                     if (name == "bdpt") return render(ClassOfBdpt{{frame_paths}, wanted});
                     if (name == "lvcbpt") {
-                        const LvcbptAlgorithm<> whole{{{frame_paths, parameters->connections / tables.vertices_per_path,
-                                                        TypicalSurvival(parameters->roulette)},
-                                                       parameters->connections},
-                                                      parameters->heuristic,
-                                                      parameters->minimum_paths};
+                        const LvcbptAlgorithm<> whole{{{frame_paths, parameters.connections / tables.vertices_per_path,
+                                                        TypicalSurvival(parameters.roulette)},
+                                                       parameters.connections},
+                                                      parameters.heuristic,
+                                                      parameters.minimum_paths};
                         return render(ClassOfCached<LvcbptAlgorithm<>>{whole, wanted});
                     }
                     if (name != "spcbpt") return invalid_argument("no shares of techniques for '" + name + "'");
-                    const auto whole = make_spcbpt(*parameters, std::make_shared<const PreparedTables>(tables), frame_paths);
+                    const auto whole = make_spcbpt(parameters, std::make_shared<const PreparedTables>(tables), frame_paths);
                     return render(ClassOfCached<SpcbptAlgorithm<>>{whole, wanted});
-                }();
-                if (!part.ok()) return fail(part.status());
-                images[size_t(c)].push_back(image_of(*part, crop));
+                }());
+                images[size_t(c)].push_back(image_of(part, crop));
             }
         }
         const size_t pixels = size_t(crop.area());

@@ -10,8 +10,8 @@
 #include <chrono>
 #include <cstdio>
 
-#include "common/import/import.h"
 #include "common/transport/renderer.h"
+#include "tests/bench/bench_scene.h"
 
 using namespace lightloom;
 
@@ -30,14 +30,8 @@ int main(int argc, char** argv) {
     CLI11_PARSE(app, argc, argv);
 
     tbb::global_control control(tbb::global_control::max_allowed_parallelism, size_t(threads));
-    auto imported = import_pbrt(scene_path);
-    if (!imported.ok()) return std::fprintf(stderr, "%s\n", imported.status().message().c_str()), 2;
-    SceneOptions options;
-    if (!resolution.empty() && std::sscanf(resolution.c_str(), "%dx%d", &options.width, &options.height) != 2) return 2;
-    const int max_depth = imported->description.max_depth;
-    auto built = Scene::build(std::move(imported->description), options);
-    if (!built.ok()) return std::fprintf(stderr, "%s\n", built.status().message().c_str()), 2;
-    std::shared_ptr<const Scene> scene = std::move(built).value();
+    const bench::LoadedScene loaded = bench::load(scene_path, resolution);
+    const std::shared_ptr<const Scene>& scene = loaded.scene;
 
     struct Row {
         std::unique_ptr<Renderer> renderer;
@@ -45,14 +39,8 @@ int main(int argc, char** argv) {
         double mean = 0;
     };
     std::vector<Row> rows(algorithms.size());
-    for (size_t i = 0; i < rows.size(); ++i) {
-        RenderSettings settings;
-        settings.algorithm = algorithms[i];
-        settings.max_depth = max_depth;
-        auto r = Renderer::create(scene, settings);
-        if (!r.ok()) return std::fprintf(stderr, "%s\n", r.status().message().c_str()), 2;
-        rows[i].renderer = std::move(*r);
-    }
+    for (size_t i = 0; i < rows.size(); ++i)
+        rows[i].renderer = bench::value_or_exit(Renderer::create(scene, bench::settings_of(algorithms[i], {}, loaded)));
     const Rect crop = scene->frame().crop;
     const double samples = double(crop.area()) * iterations;
     for (int rep = 0; rep < repetitions; ++rep)

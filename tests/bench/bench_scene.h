@@ -1,0 +1,51 @@
+#pragma once
+// What the benchmarks make of their command lines. They print what is wrong and exit with 2.
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/import/import.h"
+#include "common/scene/scene.h"
+#include "common/transport/renderer.h"
+
+namespace lightloom::bench {
+
+template <class T>
+T value_or_exit(Result<T> result) {
+    if (result.ok()) return *std::move(result);
+    std::fprintf(stderr, "%s\n", result.status().message().c_str());
+    std::exit(2);
+}
+
+struct LoadedScene {
+    std::shared_ptr<const Scene> scene;
+    int max_depth = 0;
+};
+
+/// `resolution`: "WxH", or empty for the scene's.
+inline LoadedScene load(const std::string& path, const std::string& resolution) {
+    ImportedScene imported = value_or_exit(import_pbrt(path));
+    SceneOptions options;
+    if (!resolution.empty() && std::sscanf(resolution.c_str(), "%dx%d", &options.width, &options.height) != 2) {
+        std::fprintf(stderr, "--resolution takes WIDTHxHEIGHT, not \"%s\"\n", resolution.c_str());
+        std::exit(2);
+    }
+    const int max_depth = imported.description.max_depth;
+    return {value_or_exit(Scene::build(std::move(imported.description), options)), max_depth};
+}
+
+/// `set`: key=value each.
+inline RenderSettings settings_of(const std::string& algorithm, const std::vector<std::string>& set, const LoadedScene& loaded) {
+    RenderSettings settings{algorithm, {}, 1, loaded.max_depth};
+    for (const std::string& item : set) {
+        const size_t equals = std::min(item.find('='), item.size());
+        settings.parameters[item.substr(0, equals)] = equals < item.size() ? item.substr(equals + 1) : "";
+    }
+    return settings;
+}
+
+}  // namespace lightloom::bench
