@@ -4,6 +4,8 @@
 #include <grpcpp/server_builder.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+
 #include "client/grpc_job_port.h"
 #include "common/film/atomic_file.h"
 #include "common/work/channel.h"
@@ -33,16 +35,18 @@ struct Upload : ::testing::Test {
 
 TEST_F(Upload, WaitsForAnotherOneOfTheSameFileAndGoesOnWhereThatBreaksOff) {
     GrpcJobPort jobs(channel_to(server->port()), {.upload_silence_seconds = 10});
+    std::atomic<bool> broken_off{false};
     std::jthread thread([&] {
         for (int i = 0; i < 10; ++i) {  // in all far longer than a few attempts take
             EXPECT_TRUE(other->append(std::string(100, 'x')).ok());
             std::this_thread::sleep_for(std::chrono::milliseconds(400));
         }
+        broken_off = true;
         other.reset();
     });
     const Status status = jobs.upload_bytes(digest, bytes);
     EXPECT_TRUE(status.ok()) << status.message();
-    EXPECT_FALSE(other);
+    EXPECT_TRUE(broken_off);
     const auto stored = service.coordinator->assets().read(digest);
     EXPECT_TRUE(stored.ok()) << stored.status().message();
 }
@@ -84,7 +88,7 @@ struct SlowImages final : v1::JobService::Service {
         while (stalls && !context->IsCancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
         return grpc::Status::OK;
     }
-    int chunks = 10;
+    std::atomic<int> chunks{10};
     std::atomic<bool> stalls{false};
 };
 
