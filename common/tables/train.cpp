@@ -11,9 +11,15 @@
 namespace lightloom {
 namespace {
 
-constexpr size_t kClassifierEnds = 60000;  ///< Enough for 1000 centroids and their borders.
+constexpr size_t kClassifierEnds = 200000;  ///< Enough for 1000 centroids and their borders.
 
-constexpr uint64_t kFewestNodes = 4;  ///< On average, in a subspace that the data tell from others.
+/// Quantile of the paths' weights at which they are cut off. Above it a handful would decide what Gamma is, and with what strength
+/// its prior counts. Gamma may be anything, so this touches no mean.
+constexpr double kWeightCut = 0.99;
+
+/// On average, in a subspace that the data tell from others: four that are independent. Paths of one length of a sample share a
+/// camera sub-path.
+constexpr uint64_t kFewestNodes = 4 * kTrainingPathsPerLength;
 
 /// Share of the time that has passed when these begin, for progress (measured; 5 10^5 samples of a hard interior).
 constexpr double kEnergyBegins = 0.1, kGammaBegins = 0.15;
@@ -184,7 +190,7 @@ GammaDataset gamma_dataset(const TrainingData& d, const std::vector<double>& bri
         weights.push_back(path.weight);
     }
     if (weights.size() > 100) {
-        const auto cut = weights.begin() + std::ptrdiff_t(double(weights.size() - 1) * 0.9999);
+        const auto cut = weights.begin() + std::ptrdiff_t(double(weights.size() - 1) * kWeightCut);
         std::nth_element(weights.begin(), cut, weights.end());
         for (GammaPath& p : out.paths) p.weight = std::min(p.weight, *cut);
     }

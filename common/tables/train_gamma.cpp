@@ -166,16 +166,21 @@ class LevelProblem {
     std::vector<double> fixed_;      ///< By path: F for B = 0.
 };
 
-constexpr double kStrengths[] = {0.01, 0.1, 1, 10};
+constexpr double kStrengths[] = {0.01, 0.1, 1, 10, 100};
+constexpr double kCoarseStrength = 0.1;
 constexpr int kCoarseSteps = 4, kStepsPerStrength = 4, kFinalSteps = 3;
 
-/// Steps of the finest two levels, which take nearly all the time, and what has been done of them.
+/// Up to here the prior's strength is chosen: it matters where data are thin, which is at the fine end.
+constexpr uint32_t kFineBits = 2;
+
+/// Steps of the finest levels, which take nearly all the time, and what has been done of them.
 class Steps {
   public:
-    Steps(bool two_levels, const std::function<void(double)>& report)
-        : total_((two_levels ? 2 : 1) * int(std::size(kStrengths)) * kStepsPerStrength + kFinalSteps), report_(report) {}
+    Steps(uint32_t coarsest_bits, const std::function<void(double)>& report)
+        : total_((int(std::min(coarsest_bits, kFineBits)) + 1) * int(std::size(kStrengths)) * kStepsPerStrength + kFinalSteps),
+          report_(report) {}
     void done_on(uint32_t bits) {
-        if (bits <= 2 && report_) report_(double(++done_) / total_);
+        if (bits <= kFineBits && report_) report_(double(++done_) / total_);
     }
 
   private:
@@ -201,10 +206,10 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
     std::vector<uint32_t> all(data.paths.size());
     std::iota(all.begin(), all.end(), 0u);
 
-    // From about 16 subspaces a side to the finest, a quarter of a subspace's size at a time.
+    // From about 16 subspaces a side to the finest, half a subspace's size at a time.
     uint32_t bits = 0;
-    while ((std::max(data.light_count, data.eye_count) >> bits) > 16) bits += 2;
-    Steps steps(bits > 0, options.progress);
+    while ((std::max(data.light_count, data.eye_count) >> bits) > 16) ++bits;
+    Steps steps(bits, options.progress);
     LevelProblem problem(data, bits, options.mix);
     std::vector<float> prior = problem.flat_prior(), b = prior;
     report->uniform_loss = problem.loss(prior, judge);
@@ -212,13 +217,12 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
     std::vector<double> room;
     while (true) {
         const bool finest = bits == 0;
-        // The prior's strength matters where data are thin, which is at the fine end.
         std::vector<float> best_b = prior;
         double level_loss = HUGE_VAL, strength = 0;
         for (const double lambda : kStrengths) {
-            if (bits > 2 && lambda != 0.1) continue;
+            if (bits > kFineBits && lambda != kCoarseStrength) continue;
             std::vector<float> candidate = b;
-            for (int i = 0; i < (bits > 2 ? kCoarseSteps : kStepsPerStrength); ++i) {
+            for (int i = 0; i < (bits > kFineBits ? kCoarseSteps : kStepsPerStrength); ++i) {
                 if (options.stop.stop_requested()) return b;
                 problem.improve(&candidate, prior, lambda, train, &room);
                 steps.done_on(bits);
@@ -242,7 +246,7 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
             b = prior;  // finer subspaces than the data support: keep the coarser model, lifted
         }
         if (finest) break;
-        bits -= 2;
+        --bits;
         LevelProblem fine(data, bits, options.mix);
         b = prior = fine.lifted(problem, b);
         problem = std::move(fine);

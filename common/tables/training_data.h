@@ -8,9 +8,9 @@
 //     vertices[i].density = n p of a technique, without N Gamma / Q (with correlation_aware: c_s n p; with the
 //                           typical survival of roulette), over p_own: i = 0 holds the ones that tables do not change
 //                           (s = 0 and s = k), 1 <= s <= k-1 the connection of x_{s-1} and x_s; 0 where impossible
-// A camera sample keeps one path with two camera vertices (the lens counts), one with three, four, and one with more; a light
-// sub-path that reached the lens keeps one. Each is chosen in proportion to its estimate; both numbers are divided by the
-// probability of that choice, so that sums over D stay unbiased.
+// A camera sample keeps at most two paths with two camera vertices (the lens counts), two with three, four, and two with more: what
+// it found is dealt to the two in turn. A light sub-path that reached the lens keeps one. Each is chosen in proportion to its
+// estimate; both numbers are divided by the probability of that choice, so that sums over D stay unbiased.
 
 #include <cstdint>
 #include <string>
@@ -29,8 +29,11 @@ struct TrainingVertex {
     uint32_t emitter = 0;    ///< x_0 only.
 };
 
+/// Lengths of camera sub-paths that are told apart, and paths that a camera sample keeps of each.
+inline constexpr int kTrainingLengths = 4, kTrainingPathsPerLength = 2;
+
 /// That a camera sample keeps at most, side by side in TrainingData::paths.
-inline constexpr size_t kTrainingPathsPerSample = 4;
+inline constexpr size_t kTrainingPathsPerSample = size_t(kTrainingLengths) * kTrainingPathsPerLength;
 
 struct TrainingPath {
     uint32_t first_vertex = 0;

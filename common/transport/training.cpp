@@ -87,16 +87,26 @@ class Reservoir {
     std::vector<TrainingVertex> vertices_;
 };
 
-/// What a camera sample keeps: a path for every length of its sub-path, because each teaches another eye subspace.
+/// What a camera sample keeps: paths for every length of its sub-path, because each teaches another eye subspace. One vertex'
+/// connections teach different light subspaces, so each length has more than one reservoir. Which one a contribution meets does not
+/// depend on its value.
 class CameraReservoirs {
   public:
-    Reservoir& of(const PathContribution& c) { return by_length_[std::clamp(c.t - 2, 0, int(kTrainingPathsPerSample) - 1)]; }
+    Reservoir& of(const PathContribution& c) {
+        Length& length = lengths_[std::clamp(c.t - 2, 0, kTrainingLengths - 1)];
+        return length.reservoirs[length.dealt++ % kTrainingPathsPerLength];
+    }
     void move_to(TrainingData* data) {
-        for (Reservoir& r : by_length_) r.move_to(data);
+        for (Length& length : lengths_)
+            for (Reservoir& r : length.reservoirs) r.move_to(data);
     }
 
   private:
-    Reservoir by_length_[kTrainingPathsPerSample];
+    struct Length {
+        Reservoir reservoirs[kTrainingPathsPerLength];
+        int dealt = 0;
+    };
+    Length lengths_[kTrainingLengths];
 };
 
 void keep_light_path(const PathVertex* y, int n, int max_edges, TrainingData* data) {
