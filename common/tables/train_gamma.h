@@ -24,7 +24,7 @@ struct GammaNode {
 
 struct GammaPath {
     uint32_t first_node = 0, node_count = 0;
-    float weight = 0;        ///< w_X, see TrainingPath::square over the squared brightness of its block.
+    float weight = 0;        ///< w_X, see TrainingPath::square over the squared brightness of its block; cut at a quantile.
     float fixed = 0;         ///< Techniques that Gamma does not change.
     float contribution = 0;  ///< Relative to the block's brightness.
     uint32_t batch = 0;      ///< Paths of a batch are not independent of one another: they share light sub-paths.
