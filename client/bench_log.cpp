@@ -121,7 +121,8 @@ Result<BenchWriter> BenchWriter::open(const std::string& path, bool resume) {
         File file(std::fopen(path.c_str(), resume ? "a" : "ax"));
         if (!file && errno == EEXIST) return exists_already(path);
         if (!file) return cannot_be_written(path, errno);
-        struct stat ours {}, named {};
+        struct stat ours {
+        }, named{};
         if (::fstat(::fileno(file.get()), &ours) != 0) return cannot_be_written(path, errno);
         if (!S_ISREG(ours.st_mode)) return BenchWriter(path, std::move(file));  // a pipe or a device, which anybody may use
         if (::flock(::fileno(file.get()), LOCK_EX | LOCK_NB) != 0) {
@@ -152,8 +153,7 @@ Status BenchWriter::replace(std::string_view content) {
     Status status = write_file_atomically(fresh, content);
     File file(status.ok() ? std::fopen(fresh.c_str(), "a") : nullptr);
     const auto locked = [&] { return ::flock(::fileno(file.get()), LOCK_EX | LOCK_NB) == 0 || has_no_locks(errno); };
-    if (status.ok() && (!file || !locked() ||
-                        std::rename(fresh.c_str(), target.c_str()) != 0))
+    if (status.ok() && (!file || !locked() || std::rename(fresh.c_str(), target.c_str()) != 0))
         status = cannot_be_written(path_, errno);
     if (!status.ok()) {
         std::filesystem::remove(fresh, error);

@@ -27,8 +27,7 @@ std::optional<double> noise_mape(const ExrImage& reference) {
     return 100 * sum / double(variance->pixels.size());
 }
 
-Result<std::vector<std::string>> check_reference(const std::string& name, const ExrImage& reference,
-                                                 const BenchSubject& subject) {
+Result<std::vector<std::string>> check_reference(const std::string& name, const ExrImage& reference, const BenchSubject& subject) {
     LL_RETURN_IF_ERROR(check_comparable({.frame = subject.frame}, reference));
     RgbImage black = reference.color;
     black.pixels.assign(black.pixels.size(), 0.0f);

@@ -81,10 +81,10 @@ std::string bench_table(const std::vector<std::string>& algorithms, const std::v
         if (name == algorithms.front()) first_iterations = iterations, first_seconds = together;
         const bool bound = std::any_of(runs.begin(), runs.end(), [](const Finish& f) { return f.lower_bound; });
         const char* mark = !estimate ? "" : bound ? ">~" : "~";
-        table += format("%-*s %5zu %6zu %12s %10s %10.2f %10s %11.2f %11.2f\n", int(width), name.c_str(), runs.size(),
-                        size_t(capped), format("%s%.1f", mark, iterations).c_str(), format("%s%.2f", mark, seconds).c_str(),
-                        preparation, format("%s%.2f", mark, together).c_str(), first_iterations / iterations,
-                        first_seconds / together);
+        table +=
+            format("%-*s %5zu %6zu %12s %10s %10.2f %10s %11.2f %11.2f\n", int(width), name.c_str(), runs.size(), size_t(capped),
+                   format("%s%.1f", mark, iterations).c_str(), format("%s%.2f", mark, seconds).c_str(), preparation,
+                   format("%s%.2f", mark, together).c_str(), first_iterations / iterations, first_seconds / together);
         if (estimate) {
             table += format("%-*s not reached: > %.0f iterations, > %.2f s\n", int(width), "",
                             median(runs, [](const Finish& f) { return f.rendered_iterations; }),
@@ -92,8 +92,9 @@ std::string bench_table(const std::vector<std::string>& algorithms, const std::v
         }
     }
     if (any_capped)
-        table += "~ extrapolated by error ~ n^-1/2 from runs that ended above the threshold; a bias breaks that law\n"
-                 ">~ the same where the error does not fall like that yet: at least so much\n";
+        table +=
+            "~ extrapolated by error ~ n^-1/2 from runs that ended above the threshold; a bias breaks that law\n"
+            ">~ the same where the error does not fall like that yet: at least so much\n";
     return table;
 }
 

@@ -64,8 +64,7 @@ struct LiveRun {
                (run.iteration_limit > 0 && render.iterations() >= run.iteration_limit);
     }
     bool may_stop() const {
-        return run.stop_after >= 0 && total_seconds() >= run.stop_after && !curve.empty() &&
-               curve.back().error <= run.threshold;
+        return run.stop_after >= 0 && total_seconds() >= run.stop_after && !curve.empty() && curve.back().error <= run.threshold;
     }
 };
 
@@ -105,8 +104,7 @@ Status render_all(std::vector<std::unique_ptr<LiveRun>> alive, const BenchOption
         for (std::unique_ptr<LiveRun>& live : alive) {
             const auto ended = advance(*live, goal, reference, writer);
             if (ended.status().code() == StatusCode::kCancelled)
-                return {StatusCode::kCancelled,
-                        "interrupted; finished runs are in " + options.out + ", --resume does the others"};
+                return {StatusCode::kCancelled, "interrupted; finished runs are in " + options.out + ", --resume does the others"};
             if (!ended.ok()) return {ended.status().code(), live->label + ": " + ended.status().message()};
             if (!*ended) continue;
             done.push_back(done_line(live->last_checkpoint, live->curve, live->run.threshold));
@@ -144,8 +142,7 @@ int bench(BenchOptions& options) {
     const auto reference = decode_exr(*reference_bytes, options.reference);
     if (!reference.ok()) return report_error(reference.status());
     if (options.scene.resolution.empty()) {
-        options.scene.resolution =
-            std::to_string(reference->frame.width) + "x" + std::to_string(reference->frame.height);
+        options.scene.resolution = std::to_string(reference->frame.width) + "x" + std::to_string(reference->frame.height);
     }
     auto local = load_scene(options.scene);
     if (!local.ok()) return report_error(local.status());
@@ -169,9 +166,9 @@ int bench(BenchOptions& options) {
     std::set<std::string> keys;
     for (uint32_t seed = 0; seed < options.seeds; ++seed) {
         for (const AlgorithmChoice& choice : *choices) {
-            runs.push_back({spec->scene_root.hex(), sha256(*reference_bytes).hex(), choice, frame.width, frame.height,
-                            max_depth, options.scene.seed + seed, options.threads, options.time, options.spp,
-                            options.threshold, options.stop_after, kBuildId});
+            runs.push_back({spec->scene_root.hex(), sha256(*reference_bytes).hex(), choice, frame.width, frame.height, max_depth,
+                            options.scene.seed + seed, options.threads, options.time, options.spp, options.threshold,
+                            options.stop_after, kBuildId});
             keys.insert(runs.back().key());
         }
     }
@@ -204,8 +201,8 @@ int bench(BenchOptions& options) {
                   {"reference", options.reference},
                   {"reference_algorithm", reference->attribute(exr_attribute::kAlgorithm)}};
         line.update(run.json());
-        alive.push_back(std::make_unique<LiveRun>(
-            LiveRun{run.algorithm.label, std::move(line), run, std::move(render).value(), {}, {}, 1}));
+        alive.push_back(
+            std::make_unique<LiveRun>(LiveRun{run.algorithm.label, std::move(line), run, std::move(render).value(), {}, {}, 1}));
     }
     if (!done.empty() && !options.scene.quiet)
         std::fprintf(stderr, "%zu of %zu runs are in %s already\n", done.size(), runs.size(), options.out.c_str());
@@ -225,30 +222,38 @@ void add_bench_command(CLI::App& app, int* exit_code) {
     command->footer(kFooter);
     command->add_option("SCENE", options->scene.scene, "pbrt-v4 scene file")->required();
     command->add_option("--reference", options->reference, "EXR that the runs are compared with")->required();
-    command->add_option("--algorithms", options->algorithms,
-                        "NAME[:KEY=VALUE]..., comma separated; the first is what the others' ratios refer to")
-        ->delimiter(',')->required();
+    command
+        ->add_option("--algorithms", options->algorithms,
+                     "NAME[:KEY=VALUE]..., comma separated; the first is what the others' ratios refer to")
+        ->delimiter(',')
+        ->required();
     command->add_option("--out", options->out, "JSON lines to write")->required()->type_name("FILE");
     command->add_flag("--resume", options->resume, "Skip the runs that FILE holds to the end; start the others again");
-    auto* time = command->add_option("--time", options->time, "Seconds that a run may take")
-                     ->check(number_between(0.001, 30 * 86400.0));
+    auto* time =
+        command->add_option("--time", options->time, "Seconds that a run may take")->check(number_between(0.001, 30 * 86400.0));
     auto* spp = command->add_option("--spp", options->spp, "Iterations (samples per pixel) that a run may take")
                     ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
-    command->add_option("--seeds", options->seeds, "Runs of each algorithm")->capture_default_str()
+    command->add_option("--seeds", options->seeds, "Runs of each algorithm")
+        ->capture_default_str()
         ->check(whole_number_between(1, 1000));
-    command->add_option("--seed", options->scene.seed, "The first run's; the others follow it")->capture_default_str()
+    command->add_option("--seed", options->scene.seed, "The first run's; the others follow it")
+        ->capture_default_str()
         ->check(whole_number());
     command->add_option("--threshold", options->threshold, "MAPE in percent at which time is taken")
-        ->capture_default_str()->check(number_between(1e-6, 1e6));
-    command->add_option("--stop-at-threshold", options->stop_after,
-                        "End a run at the first checkpoint at or below the threshold after SECONDS")
-        ->type_name("SECONDS")->check(number_between(0, 30 * 86400.0));
+        ->capture_default_str()
+        ->check(number_between(1e-6, 1e6));
+    command
+        ->add_option("--stop-at-threshold", options->stop_after,
+                     "End a run at the first checkpoint at or below the threshold after SECONDS")
+        ->type_name("SECONDS")
+        ->check(number_between(0, 30 * 86400.0));
     command->add_option("--resolution", options->scene.resolution, "WIDTHxHEIGHT in pixels (default: the reference's)");
     command->add_option("--max-depth", options->scene.max_depth, "Bounces (default: the scene's)")
         ->check(whole_number_between(0, kMaxEdges - 1));
     command->add_option("--threads", options->threads, "Threads (default: all processors)")->check(whole_number_between(1, 1024));
     command->add_option("--slice", options->slice, "Seconds that a run gets before the next one's turn")
-        ->capture_default_str()->check(number_between(0.001, 86400.0));
+        ->capture_default_str()
+        ->check(number_between(0.001, 86400.0));
     command->add_flag("-q,--quiet", options->scene.quiet, "The table and errors only");
     command->callback([options, time, spp, exit_code] {
         if (time->count() + spp->count() == 0) throw CLI::RequiredError("--time or --spp");

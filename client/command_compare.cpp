@@ -161,15 +161,15 @@ void add_compare_command(CLI::App& app, int* exit_code) {
     CLI::App* command = app.add_subcommand("compare", "Measure how far an EXR image is from a reference of the same frame");
     command->add_option("image", options->image, "Image to judge (EXR)")->required();
     command->add_option("reference", options->reference, "Reference (EXR)")->required();
-    CLI::Option* json =
-        command
-            ->add_option("--json", options->json,
-                         "Write the metrics as JSON to FILE, or to standard output instead of the table if no FILE "
-                         "follows (then give it last)")
-            ->type_name("[FILE]")
-            ->expected(0, 1);
-    command->add_option("--heat", options->heat,
-                        "Write the signed relative error as PNG: blue where the image is darker, red where it is brighter")
+    CLI::Option* json = command
+                            ->add_option("--json", options->json,
+                                         "Write the metrics as JSON to FILE, or to standard output instead of the table if no FILE "
+                                         "follows (then give it last)")
+                            ->type_name("[FILE]")
+                            ->expected(0, 1);
+    command
+        ->add_option("--heat", options->heat,
+                     "Write the signed relative error as PNG: blue where the image is darker, red where it is brighter")
         ->type_name("PNG");
     command->add_option("--heat-range", options->heat_range, "Relative error that gets the full colour")
         ->capture_default_str()

@@ -27,9 +27,8 @@ struct Options {
 };
 
 const char* name_of(MaterialKind kind) {
-    constexpr std::array<const char*, 8> kNames{
-        "diffuse",        "diffusetransmission", "conductor",       "dielectric",
-        "thindielectric", "coateddiffuse",       "coatedconductor", "mix"};
+    constexpr std::array<const char*, 8> kNames{"diffuse",        "diffusetransmission", "conductor",       "dielectric",
+                                                "thindielectric", "coateddiffuse",       "coatedconductor", "mix"};
     return kNames[size_t(kind)];
 }
 
@@ -61,27 +60,21 @@ nlohmann::json describe(const SceneDescription& d, const SceneSummary& s, const 
     out["triangles_emissive"] = s.emissive_triangle_count;
     out["spheres"] = s.sphere_count;
     out["instances"] = s.instance_count;
-    out["camera"] = {
-        {"kind", "perspective"}, {"fov_degrees", d.camera.fov_degrees}, {"lens_radius", d.camera.lens_radius}};
+    out["camera"] = {{"kind", "perspective"}, {"fov_degrees", d.camera.fov_degrees}, {"lens_radius", d.camera.lens_radius}};
     out["film"] = {{"width", d.film.width}, {"height", d.film.height}, {"exposure_scale", d.film.exposure_scale}};
     out["max_depth"] = d.max_depth;
     out["samples_per_pixel"] = d.samples_per_pixel;
     out["lights"] = nlohmann::json::array();
     for (const SceneSummary::Light& l : s.lights)
-        out["lights"].push_back(
-            {{"kind", l.kind}, {"where", l.where}, {"power", l.power}, {"primitives", l.primitives}});
+        out["lights"].push_back({{"kind", l.kind}, {"where", l.where}, {"power", l.power}, {"primitives", l.primitives}});
     out["materials"] = nlohmann::json::array();
     for (const Material& m : d.materials) out["materials"].push_back({{"name", m.name}, {"kind", name_of(m.kind)}});
     out["textures"] = count_kinds(d.textures);
     out["images"] = nlohmann::json::array();
     for (const Image& i : d.images)
-        out["images"].push_back({{"file", i.name},
-                                 {"width", i.width},
-                                 {"height", i.height},
-                                 {"channels", i.channels},
-                                 {"bytes", i.memory_bytes()}});
-    out["memory_bytes"] = {
-        {"geometry", s.geometry_bytes}, {"acceleration", s.acceleration_bytes}, {"images", s.image_bytes}};
+        out["images"].push_back(
+            {{"file", i.name}, {"width", i.width}, {"height", i.height}, {"channels", i.channels}, {"bytes", i.memory_bytes()}});
+    out["memory_bytes"] = {{"geometry", s.geometry_bytes}, {"acceleration", s.acceleration_bytes}, {"images", s.image_bytes}};
     out["seconds"] = {{"import", import_seconds}, {"build", s.build_seconds}};
     out["files"] = files;
     out["replaced"] = {{"integrator", d.integrator}, {"film_filename", d.film.file_name}};
@@ -89,17 +82,15 @@ nlohmann::json describe(const SceneDescription& d, const SceneSummary& s, const 
     return out;
 }
 
-void print(const SceneDescription& d, const SceneSummary& s, const std::string& path, size_t file_count,
-           double import_seconds) {
+void print(const SceneDescription& d, const SceneSummary& s, const std::string& path, size_t file_count, double import_seconds) {
     std::printf("%s (%zu file%s)\n", path.c_str(), file_count, file_count == 1 ? "" : "s");
     std::printf("  geometry   %" PRIu64 " triangles (%" PRIu64 " emissive), %" PRIu64 " spheres", s.triangle_count,
                 s.emissive_triangle_count, s.sphere_count);
     if (s.instance_count > 0)
-        std::printf(", %" PRIu64 " instances showing %" PRIu64 " triangles", s.instance_count,
-                    s.instanced_triangle_count);
+        std::printf(", %" PRIu64 " instances showing %" PRIu64 " triangles", s.instance_count, s.instanced_triangle_count);
     std::printf("\n  camera     perspective, fov %g degrees%s; film %d x %d, maxdepth %d, %d samples per pixel\n",
-                double(d.camera.fov_degrees), d.camera.lens_radius > 0 ? ", thin lens" : "", d.film.width,
-                d.film.height, d.max_depth, d.samples_per_pixel);
+                double(d.camera.fov_degrees), d.camera.lens_radius > 0 ? ", thin lens" : "", d.film.width, d.film.height,
+                d.max_depth, d.samples_per_pixel);
     std::printf("  lights     %zu\n", s.lights.size());
     for (const SceneSummary::Light& l : s.lights) {
         std::printf("    %-9s power %.6g W", l.kind.c_str(), l.power);
@@ -110,9 +101,8 @@ void print(const SceneDescription& d, const SceneSummary& s, const std::string& 
     for (const auto& [name, count] : count_kinds(d.materials)) std::printf(" %zu %s", count, name.c_str());
     std::printf("\n  textures   %zu images (%s)", d.images.size(), megabytes(s.image_bytes).c_str());
     for (const auto& [name, count] : count_kinds(d.textures)) std::printf(", %zu %s", count, name.c_str());
-    std::printf("\n  memory     geometry %s, acceleration structure %s, images %s\n",
-                megabytes(s.geometry_bytes).c_str(), megabytes(s.acceleration_bytes).c_str(),
-                megabytes(s.image_bytes).c_str());
+    std::printf("\n  memory     geometry %s, acceleration structure %s, images %s\n", megabytes(s.geometry_bytes).c_str(),
+                megabytes(s.acceleration_bytes).c_str(), megabytes(s.image_bytes).c_str());
     std::printf("  time       %.3f s to read, %.3f s to build\n", import_seconds, s.build_seconds);
     if (!d.integrator.empty()) std::printf("  replaced   Integrator %s, by --algorithm\n", import::quoted(d.integrator).c_str());
     if (!d.film.file_name.empty())
@@ -129,8 +119,7 @@ int run(const Options& options) {
         return kUsage;
     }
     std::vector<std::filesystem::path> inputs{options.tables};
-    for (const std::string& file : imported->files)
-        inputs.push_back(std::filesystem::path(options.scene).parent_path() / file);
+    for (const std::string& file : imported->files) inputs.push_back(std::filesystem::path(options.scene).parent_path() / file);
     std::vector<std::string> outputs{options.json};
     if (!options.draw.empty())
         for (const char* picture : kTablePictures) outputs.push_back(options.draw + picture);
@@ -167,18 +156,18 @@ int run(const Options& options) {
 
 void add_inspect_command(CLI::App& app, int* exit_code) {
     const auto options = std::make_shared<Options>();
-    CLI::App* command =
-        app.add_subcommand("inspect",
-                           "Show what a scene holds: geometry, lights with their power, materials, textures, "
-                           "memory, and everything in the file that is ignored");
+    CLI::App* command = app.add_subcommand("inspect",
+                                           "Show what a scene holds: geometry, lights with their power, materials, textures, "
+                                           "memory, and everything in the file that is ignored");
     command->add_option("scene", options->scene, "The .pbrt file")->required();
     command->add_option("--json", options->json, "Write the same as JSON to this file");
     auto* tables = command->add_option("--tables", options->tables,
                                        "Also show the learned tables in this file: KEY.tables of a table cache, KEY being "
                                        "tables.cache_key of a manifest");
-    command->add_option("--draw", options->draw,
-                        "Write PREFIX-kappa-eye.png, -kappa-light.png, -gamma.png and -q.png: subspaces of what the camera sees, "
-                        "connection matrix, energies")
+    command
+        ->add_option("--draw", options->draw,
+                     "Write PREFIX-kappa-eye.png, -kappa-light.png, -gamma.png and -q.png: subspaces of what the camera sees, "
+                     "connection matrix, energies")
         ->needs(tables);
     command->add_flag("--strict", options->strict, "Treat every ignored thing as an error");
     command->add_flag("--quiet", options->quiet, "Print nothing on success");

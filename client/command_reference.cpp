@@ -89,8 +89,8 @@ int reference(ReferenceOptions& options) {
         if (!parsed.ok()) return report_error(parsed.status());
         checker_choice = std::move(parsed).value();
         if (checker_choice.name == options.job.algorithm) {
-            return report_error(invalid_argument("--cross-check " + checker_choice.name +
-                                                 " is what makes the reference; name another algorithm"));
+            return report_error(
+                invalid_argument("--cross-check " + checker_choice.name + " is what makes the reference; name another algorithm"));
         }
     }
     auto local = load_scene(options.job);
@@ -118,15 +118,14 @@ int reference(ReferenceOptions& options) {
     const RenderSettings settings{spec->algorithm, spec->parameters, spec->seed, spec->max_depth};
     const auto preparation = prepare(*scene, settings, interrupt_token());
     if (!preparation.ok()) return report_error(preparation.status());
-    if (!preparation->note.empty())
-        std::fprintf(stderr, "lightloom reference: warning: %s\n", preparation->note.c_str());
+    if (!preparation->note.empty()) std::fprintf(stderr, "lightloom reference: warning: %s\n", preparation->note.c_str());
     auto progressive = ProgressiveRender::start(scene, settings, *preparation);
     if (!progressive.ok()) return report_error(progressive.status());
     const auto means = render(*progressive, *spec, options.job.quiet);
     if (!means.ok()) return report_error(means.status());
     const std::vector<Estimate> made = means->estimates();
-    const auto exr = encode_image(
-        *spec, {progressive->image(), progressive->variance(), progressive->iterations(), progressive->groups()}, {});
+    const auto exr =
+        encode_image(*spec, {progressive->image(), progressive->variance(), progressive->iterations(), progressive->groups()}, {});
     if (!exr.ok()) return report_error(exr.status());
     const std::filesystem::path output = output_path(options.job);
     std::filesystem::path json_path = output;
@@ -138,8 +137,8 @@ int reference(ReferenceOptions& options) {
     if (!status.ok()) return report_error(status);
     if (!options.job.quiet) {
         std::printf("%s  %s  %llu spp in %s  mean luminance %.6g +- %.2g\n", output.string().c_str(), spec->algorithm.c_str(),
-                    static_cast<unsigned long long>(progressive->iterations()),
-                    duration_text(progressive->seconds()).c_str(), made.front().mean, made.front().standard_error());
+                    static_cast<unsigned long long>(progressive->iterations()), duration_text(progressive->seconds()).c_str(),
+                    made.front().mean, made.front().standard_error());
         std::fflush(stdout);
     }
     if (progressive->dropped() > 0) {
@@ -148,9 +147,9 @@ int reference(ReferenceOptions& options) {
     }
     if (checker_choice.name.empty()) return kSuccess;
     if (progressive->groups() < kLeastGroups) {
-        return report_error(failed_precondition(
-            output.string() + " consists of " + std::to_string(progressive->groups()) +
-            " groups of iterations; a cross-check needs " + std::to_string(kLeastGroups) + " to know its error: render longer"));
+        return report_error(failed_precondition(output.string() + " consists of " + std::to_string(progressive->groups()) +
+                                                " groups of iterations; a cross-check needs " + std::to_string(kLeastGroups) +
+                                                " to know its error: render longer"));
     }
 
     const RenderSettings checker{checker_choice.name, checker_choice.parameters, spec->seed + 1, spec->max_depth};
@@ -159,12 +158,12 @@ int reference(ReferenceOptions& options) {
     json["cross_check"] = {{"algorithm", checker.algorithm}, {"parameters", checker.parameters}, {"seed", checker.seed}};
     json["cross_check"].update(check->json());
     if (Status s = write_file_atomically(json_path.string(), json.dump(1) + "\n"); !s.ok()) return report_error(s);
-    std::printf("cross-check by %s, %llu spp\n%s", checker_choice.label.c_str(),
-                static_cast<unsigned long long>(check->iterations), check->table().c_str());
+    std::printf("cross-check by %s, %llu spp\n%s", checker_choice.label.c_str(), static_cast<unsigned long long>(check->iterations),
+                check->table().c_str());
     if (check->verdict() != Verdict::kDiffer) return kSuccess;
     std::fflush(stdout);
-    std::fprintf(stderr, "lightloom reference: %s and %s differ; one of them is biased or misses paths\n",
-                 spec->algorithm.c_str(), checker_choice.name.c_str());
+    std::fprintf(stderr, "lightloom reference: %s and %s differ; one of them is biased or misses paths\n", spec->algorithm.c_str(),
+                 checker_choice.name.c_str());
     return kFailure;
 }
 
@@ -179,11 +178,13 @@ void add_reference_command(CLI::App& app, int* exit_code) {
     auto* spp = command->add_option("--spp", options->job.samples_per_pixel, "Samples per pixel")
                     ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     auto* time = command->add_option("--time", options->job.time_seconds, "Render for this many seconds")
-                     ->check(number_between(0.001, 30 * 86400.0))->excludes(spp);
+                     ->check(number_between(0.001, 30 * 86400.0))
+                     ->excludes(spp);
     command->add_option("--cross-check", options->cross_check, "Another algorithm, NAME[:KEY=VALUE]..., that must agree");
-    command->add_option("--cross-time", options->cross_time,
-                        "Seconds for its image, and as many again for the path lengths of both")
-        ->capture_default_str()->check(number_between(0.001, 30 * 86400.0));
+    command
+        ->add_option("--cross-time", options->cross_time, "Seconds for its image, and as many again for the path lengths of both")
+        ->capture_default_str()
+        ->check(number_between(0.001, 30 * 86400.0));
     command->add_option("--threads", options->threads, "Threads (default: all processors)")->check(whole_number_between(1, 1024));
     command->add_flag("-q,--quiet", options->job.quiet, "No progress; errors and the cross-check only");
     command->callback([options, spp, time, exit_code] {

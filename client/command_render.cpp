@@ -143,14 +143,18 @@ void add_render_command(CLI::App& app, int* exit_code) {
     command->add_option("--threads", options->threads, "Threads of each worker (default: all processors, shared out)")
         ->check(whole_number_between(1, 1024));
     command->add_option("--workers", options->workers, "Embedded workers; the bytes do not depend on it")
-        ->check(whole_number_between(1, 256))->capture_default_str();
-    command->add_option("--table-cache", options->cache.directory,
-                        "Directory in which learned tables are kept for the next render, or off; it holds nothing else, no "
-                        "scene files and no images")
-        ->envname("LIGHTLOOM_TABLE_CACHE")->capture_default_str();
-    command->add_option("--table-cache-size", options->cache.megabytes,
-                        "MB that it may hold; the tables used least recently go first")
-        ->check(whole_number_between(1, uint64_t(1) << 30))->capture_default_str();
+        ->check(whole_number_between(1, 256))
+        ->capture_default_str();
+    command
+        ->add_option("--table-cache", options->cache.directory,
+                     "Directory in which learned tables are kept for the next render, or off; it holds nothing else, no "
+                     "scene files and no images")
+        ->envname("LIGHTLOOM_TABLE_CACHE")
+        ->capture_default_str();
+    command
+        ->add_option("--table-cache-size", options->cache.megabytes, "MB that it may hold; the tables used least recently go first")
+        ->check(whole_number_between(1, uint64_t(1) << 30))
+        ->capture_default_str();
     command->callback([options, exit_code] {
         uint32_t threads = options->threads;
         if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency() / options->workers);

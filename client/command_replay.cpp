@@ -80,11 +80,9 @@ int replay(const ReplayOptions& options) {
     auto built = Scene::build(std::move(local->imported.description), {.width = spec->width, .height = spec->height});
     if (!built.ok()) return report_error(built.status());
     const std::shared_ptr<const Scene> scene = std::move(built).value();
-    const auto renderer = create_with_tables(scene, {.algorithm = spec->algorithm,
-                                                   .parameters = spec->parameters,
-                                                   .seed = spec->seed,
-                                                   .max_depth = spec->max_depth},
-                                          {});
+    const auto renderer = create_with_tables(
+        scene, {.algorithm = spec->algorithm, .parameters = spec->parameters, .seed = spec->seed, .max_depth = spec->max_depth},
+        {});
     if (!renderer.ok()) return report_error(renderer.status());
     const auto algorithm = find_algorithm(spec->algorithm);
     const auto parameters = parse_parameters(**algorithm, spec->parameters);
@@ -96,8 +94,8 @@ int replay(const ReplayOptions& options) {
     UnitWork work = unit_work(*unit);
     if (options.unit.empty()) {
         // The light path of a camera sample is numbered by its place in the unit.
-        const uint64_t place = (options.iteration - unit->first_iteration) * uint64_t(unit->tile.area()) +
-                               uint64_t(unit->tile.index(x, y));
+        const uint64_t place =
+            (options.iteration - unit->first_iteration) * uint64_t(unit->tile.area()) + uint64_t(unit->tile.index(x, y));
         work.first_iteration = options.iteration;
         work.iteration_count = 1;
         work.tile = {x, y, x + 1, y + 1};
@@ -141,9 +139,13 @@ void add_replay_command(CLI::App& app, int* exit_code) {
     auto* iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, from 0")
                           ->check(whole_number_between(0, JobSpec::kMaxSamplesPerPixel - 1));
     auto* pixel = command->add_option("--pixel", options->pixel, "X,Y in full-frame pixels, 0,0 at the top left")
-                      ->expected(2)->delimiter(',')->check(whole_number_between(0, 65535));
+                      ->expected(2)
+                      ->delimiter(',')
+                      ->check(whole_number_between(0, 65535));
     auto* unit = command->add_option("--unit", options->unit, "GROUP,TILE: the whole unit instead of one sample")
-                     ->expected(2)->delimiter(',')->check(whole_number_between(0, UINT32_MAX));
+                     ->expected(2)
+                     ->delimiter(',')
+                     ->check(whole_number_between(0, UINT32_MAX));
     command->add_option("--spp", options->spp, "Samples per pixel of the job, if it was bounded by them")
         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     iteration->needs(pixel);

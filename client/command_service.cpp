@@ -30,7 +30,8 @@ struct ServiceOptions {
 
 void add_server_option(CLI::App& command, ServiceOptions& options) {
     command.add_option("--server", options.server, "HOST:PORT of the coordinator")
-        ->envname("LIGHTLOOM_SERVER")->capture_default_str();
+        ->envname("LIGHTLOOM_SERVER")
+        ->capture_default_str();
 }
 
 GrpcJobPort connect(const ServiceOptions& options) {
@@ -39,10 +40,9 @@ GrpcJobPort connect(const ServiceOptions& options) {
 }
 
 int service_error(const ServiceOptions& options, const Status& status) {
-    if (status.code() != StatusCode::kUnavailable && status.code() != StatusCode::kDeadlineExceeded)
-        return report_error(status);
-    return report_error({status.code(), "no answer from " + options.server + " (" + status.message() +
-                                            "); is lightloom-server running there?"});
+    if (status.code() != StatusCode::kUnavailable && status.code() != StatusCode::kDeadlineExceeded) return report_error(status);
+    return report_error(
+        {status.code(), "no answer from " + options.server + " (" + status.message() + "); is lightloom-server running there?"});
 }
 
 int submit_job(const ServiceOptions& options) {
@@ -84,8 +84,8 @@ int list_jobs(const ServiceOptions& options) {
         if (job.state == JobState::kPreparing) note = phase_text(job) + " ";
         if (job.message.empty() && !is_terminal(job.state) && job.eta_seconds >= 0) note += duration_text(job.eta_seconds);
         std::printf("%-18s %-10s %-8s %14s %8llu  %s\n", job.job_id.c_str(), std::string(to_string(job.state)).c_str(),
-                    job.spec.algorithm.c_str(), units.c_str(),
-                    static_cast<unsigned long long>(job.samples_per_pixel_done), note.c_str());
+                    job.spec.algorithm.c_str(), units.c_str(), static_cast<unsigned long long>(job.samples_per_pixel_done),
+                    note.c_str());
     }
     return kSuccess;
 }

@@ -16,8 +16,8 @@ enum ExitCode : int {
     kCancelled = 130,
 };
 
-void add_render_command(CLI::App& app, int* exit_code);      // render, embedded
-void add_service_commands(CLI::App& app, int* exit_code);    // submit, watch, fetch, cancel, list
+void add_render_command(CLI::App& app, int* exit_code);    // render, embedded
+void add_service_commands(CLI::App& app, int* exit_code);  // submit, watch, fetch, cancel, list
 void add_inspect_command(CLI::App& app, int* exit_code);
 void add_compare_command(CLI::App& app, int* exit_code);
 void add_algorithms_command(CLI::App& app, int* exit_code);

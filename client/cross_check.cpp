@@ -24,9 +24,7 @@ const char* text_of(Verdict verdict) {
     return "";
 }
 
-nlohmann::ordered_json estimate_json(const Estimate& e) {
-    return {{"mean", e.mean}, {"standard_error", e.standard_error()}};
-}
+nlohmann::ordered_json estimate_json(const Estimate& e) { return {{"mean", e.mean}, {"standard_error", e.standard_error()}}; }
 
 std::vector<std::string> image_rows() {
     std::vector<std::string> what{"image"};
@@ -47,26 +45,21 @@ Verdict CrossCheck::verdict() const {
 
 std::string CrossCheck::table() const {
     char line[160];
-    std::snprintf(line, sizeof line, "%-20s %12s %12s %9s  %-22s\n", "", "reference", "check", "ratio",
-                  "95 %, all together");
+    std::snprintf(line, sizeof line, "%-20s %12s %12s %9s  %-22s\n", "", "reference", "check", "ratio", "95 %, all together");
     std::string table = line;
     for (const CrossCheckRow& row : rows) {
         const RatioInterval& i = row.interval;
-        std::snprintf(line, sizeof line, "%-20s %12.6g %12.6g %9.5f  [%9.5f, %9.5f] %s\n", row.what.c_str(),
-                      row.reference.mean, row.check.mean, i.ratio, i.low, i.high,
-                      row.verdict == Verdict::kAgree ? "" : text_of(row.verdict));
+        std::snprintf(line, sizeof line, "%-20s %12.6g %12.6g %9.5f  [%9.5f, %9.5f] %s\n", row.what.c_str(), row.reference.mean,
+                      row.check.mean, i.ratio, i.low, i.high, row.verdict == Verdict::kAgree ? "" : text_of(row.verdict));
         table += line;
     }
     return table;
 }
 
 nlohmann::ordered_json CrossCheck::json() const {
-    nlohmann::ordered_json json{{"outcome", text_of(verdict())},
-                                {"iterations", iterations},
-                                {"seconds", seconds},
-                                {"doubtful_level", kDoubtLevel},
-                                {"differ_level", kDifferLevel},
-                                {"rows", nlohmann::ordered_json::array()}};
+    nlohmann::ordered_json json{
+        {"outcome", text_of(verdict())}, {"iterations", iterations},     {"seconds", seconds},
+        {"doubtful_level", kDoubtLevel}, {"differ_level", kDifferLevel}, {"rows", nlohmann::ordered_json::array()}};
     for (const CrossCheckRow& row : rows) {
         json["rows"].push_back({{"what", row.what},
                                 {"reference", estimate_json(row.reference)},

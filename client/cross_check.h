@@ -30,9 +30,9 @@ struct CrossCheckRow {
 
 struct CrossCheck {
     std::vector<CrossCheckRow> rows;
-    uint64_t iterations = 0;       ///< Of the checking algorithm's image.
-    double seconds = 0;            ///< Of rendering, path lengths included.
-    Verdict verdict() const;       ///< The worst.
+    uint64_t iterations = 0;  ///< Of the checking algorithm's image.
+    double seconds = 0;       ///< Of rendering, path lengths included.
+    Verdict verdict() const;  ///< The worst.
     std::string table() const;
     nlohmann::ordered_json json() const;
 };

@@ -299,9 +299,9 @@ Status GrpcJobPort::send(const Digest& digest, uint64_t size, const std::string&
         if (theirs) {
             // The other client may have died: the coordinator takes as long as its keepalive to notice that.
             if (Clock::now() - grown >= Seconds(options_.upload_silence_seconds))
-                return {StatusCode::kAborted,
-                        name + ": another client is sending this file, but nothing more of it has arrived for " +
-                            seconds_text(options_.upload_silence_seconds) + "; try again later"};
+                return {StatusCode::kAborted, name +
+                                                  ": another client is sending this file, but nothing more of it has arrived for " +
+                                                  seconds_text(options_.upload_silence_seconds) + "; try again later"};
             std::this_thread::sleep_for(kUploadInterval);
             continue;
         }
@@ -327,9 +327,8 @@ Status GrpcJobPort::upload(const Digest& digest, const std::filesystem::path& pa
 }
 
 Status GrpcJobPort::upload_bytes(const Digest& digest, std::string_view bytes) {
-    return send(digest, bytes.size(), "the scene's list of files", [&](uint64_t offset) -> Result<std::string_view> {
-        return bytes.substr(offset, kMaxChunkBytes);
-    });
+    return send(digest, bytes.size(), "the scene's list of files",
+                [&](uint64_t offset) -> Result<std::string_view> { return bytes.substr(offset, kMaxChunkBytes); });
 }
 
 }  // namespace lightloom

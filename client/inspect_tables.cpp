@@ -37,9 +37,7 @@ size_t used_labels(const SubspaceTree& tree) {
 }
 
 /// Of sorted values.
-double quantile(const std::vector<float>& sorted, double q) {
-    return double(sorted[size_t(q * double(sorted.size() - 1) + 0.5)]);
-}
+double quantile(const std::vector<float>& sorted, double q) { return double(sorted[size_t(q * double(sorted.size() - 1) + 0.5)]); }
 
 struct Statistics {
     size_t light_labels = 0, eye_labels = 0, windows = 0;
@@ -159,8 +157,7 @@ nlohmann::ordered_json describe(const TableFile& file) {
     const Statistics s = measure(t);
     return {{"sha256", file.digest.hex()},
             {"size_bytes", file.size_bytes},
-            {"light_subspaces",
-             {{"count", t.light_count}, {"emitter_cells", t.division.cell_count()}, {"labels", s.light_labels}}},
+            {"light_subspaces", {{"count", t.light_count}, {"emitter_cells", t.division.cell_count()}, {"labels", s.light_labels}}},
             {"eye_subspaces", {{"count", t.eye_count}, {"labels", s.eye_labels}}},
             {"q",
              {{"minimum", s.q[0]},
@@ -187,8 +184,8 @@ void print(const TableFile& file) {
     std::printf("  eye        %u subspaces; %zu labels occur\n", t.eye_count, s.eye_labels);
     std::printf("  Q          minimum %.4g, 10 %% %.4g, median %.4g, 90 %% %.4g, maximum %.4g; the ten largest hold %.1f %%\n",
                 s.q[0], s.q[1], s.q[2], s.q[3], s.q[4], 100 * s.q_top_ten);
-    std::printf("  Gamma      entropy of a column %.2f to %.2f bits, mean %.2f; uniform would be %.2f\n",
-                s.entropy[0], s.entropy[2], s.entropy[1], std::log2(double(t.light_count)));
+    std::printf("  Gamma      entropy of a column %.2f to %.2f bits, mean %.2f; uniform would be %.2f\n", s.entropy[0],
+                s.entropy[2], s.entropy[1], std::log2(double(t.light_count)));
     std::printf("  windows    %zu subspaces keep more than one\n", s.windows);
 }
 

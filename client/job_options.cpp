@@ -23,12 +23,14 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
     command.add_option("SCENE", options.scene, "pbrt-v4 scene file; everything that it refers to lies beside or below it")
         ->required();
     command.add_option("-a,--algorithm", options.algorithm, "Name from `lightloom algorithms`")->capture_default_str();
-    command.add_option("--set", options.settings, "Parameter of the algorithm, KEY=VALUE; may be repeated")->take_all()
+    command.add_option("--set", options.settings, "Parameter of the algorithm, KEY=VALUE; may be repeated")
+        ->take_all()
         ->allow_extra_args(false);
     command.add_option("--max-depth", options.max_depth, "Bounces; paths have up to this + 1 edges (default: the scene's)")
         ->check(whole_number_between(0, kMaxEdges - 1));
     command.add_option("--resolution", options.resolution, "WIDTHxHEIGHT in pixels (default: the scene's)");
-    command.add_option("--seed", options.seed, "Another seed makes another, independent image")->capture_default_str()
+    command.add_option("--seed", options.seed, "Another seed makes another, independent image")
+        ->capture_default_str()
         ->check(whole_number());
 }
 
@@ -37,7 +39,8 @@ void add_image_settings(CLI::App& command, JobOptions& options) {
                      "Write colour as half floats; refused where a value is beyond their range, and nothing is lost");
     auto* png = command.add_option("--png", options.png, "Also write an 8-bit sRGB picture");
     command.add_option("--exposure", options.exposure, "Stops by which the picture is brightened (the EXR never is)")
-        ->check(number_between(-30.0, 30.0))->needs(png);
+        ->check(number_between(-30.0, 30.0))
+        ->needs(png);
 }
 
 void add_output_settings(CLI::App& command, JobOptions& options) {
@@ -46,9 +49,11 @@ void add_output_settings(CLI::App& command, JobOptions& options) {
     command.add_flag("--layers", options.layers, "Also store albedo, normal and depth of what the camera sees first");
     auto* spp = command.add_option("--spp", options.samples_per_pixel, "Samples per pixel (default: the scene's)")
                     ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
-    command.add_option("--time", options.time_seconds,
-                       "Stop after this many seconds of rendering, at a boundary that --spp can reproduce")
-        ->check(number_between(0.001, 30 * 86400.0))->excludes(spp);
+    command
+        .add_option("--time", options.time_seconds,
+                    "Stop after this many seconds of rendering, at a boundary that --spp can reproduce")
+        ->check(number_between(0.001, 30 * 86400.0))
+        ->excludes(spp);
     command.add_option("--json", options.json, "Write statistics to this file");
     command.add_flag("-q,--quiet", options.quiet, "No progress; errors only");
     command.add_flag("--strict", options.strict,
@@ -92,16 +97,14 @@ Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
     spec.algorithm = options.algorithm;
     for (const std::string& setting : options.settings) {
         const size_t equals = setting.find('=');
-        if (equals == std::string::npos || equals == 0)
-            return invalid_argument("--set takes KEY=VALUE, not \"" + setting + "\"");
+        if (equals == std::string::npos || equals == 0) return invalid_argument("--set takes KEY=VALUE, not \"" + setting + "\"");
         const std::string key = setting.substr(0, equals);
         if (!spec.parameters.emplace(key, setting.substr(equals + 1)).second)
             return invalid_argument("--set " + key + " is given twice; which value is meant?");
     }
     const auto algorithm = find_algorithm(spec.algorithm);
     if (!algorithm.ok()) return invalid_argument(algorithm.status().message());
-    if (const auto parameters = parse_parameters(**algorithm, spec.parameters); !parameters.ok())
-        return parameters.status();
+    if (const auto parameters = parse_parameters(**algorithm, spec.parameters); !parameters.ok()) return parameters.status();
     spec.seed = options.seed;
     spec.time_limit_seconds = options.time_seconds;
     spec.samples_per_pixel = options.samples_per_pixel;

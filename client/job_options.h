@@ -13,9 +13,9 @@ namespace lightloom::client {
 
 struct JobOptions {
     std::string scene;
-    std::string output;  ///< Empty: the scene's name with .exr, in the current directory.
-    std::string png;     ///< Empty: none.
-    double exposure = 0; ///< Of the PNG, in stops.
+    std::string output;   ///< Empty: the scene's name with .exr, in the current directory.
+    std::string png;      ///< Empty: none.
+    double exposure = 0;  ///< Of the PNG, in stops.
     std::string algorithm = "path";
     uint32_t samples_per_pixel = 0;  ///< 0: the scene's (unless there is a time limit).
     double time_seconds = 0;

@@ -23,8 +23,7 @@ Status check_output_files(std::span<const std::filesystem::path> inputs, std::sp
         if (fs::is_directory(status)) return invalid_argument(path + ": is a directory; give a file name");
         if (fs::is_other(status)) continue;  // a pipe or a device
         const fs::path target = place_of(path);
-        if (read.contains(target))
-            return invalid_argument(path + ": is an input, which would be lost; give another file name");
+        if (read.contains(target)) return invalid_argument(path + ": is an input, which would be lost; give another file name");
         if (!written.insert(target).second) return invalid_argument(path + ": is another output, too; give another file name");
         // Where the bytes will go: what a link points to is replaced, not the link.
         const std::string probe = (fs::exists(status) ? target.string() : path) + ".probe-" + std::to_string(::getpid());

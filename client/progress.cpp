@@ -134,8 +134,9 @@ void Progress::show(const JobInfo& job) {
         std::fprintf(stderr, "\r\033[K[%s] %s", bar.c_str(), line_.c_str());
         std::fflush(stderr);
         open_ = true;
-    } else if (preparing ? new_phase : running ? job.unit_done > 0 && percent >= last_percent_ + 10
-                                     : new_state && is_terminal(job.state)) {
+    } else if (preparing ? new_phase
+               : running ? job.unit_done > 0 && percent >= last_percent_ + 10
+                         : new_state && is_terminal(job.state)) {
         if (running) last_percent_ = percent;
         print_line();
     }

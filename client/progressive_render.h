@@ -43,8 +43,8 @@ class ProgressiveRender {
     static Result<ProgressiveRender> start(std::shared_ptr<const Scene> scene, const RenderSettings& settings,
                                            const Preparation& preparation);
     /// `preparation_seconds` were spent on `renderer`; `plan` and `exposure_scale` are those of a job on `frame`.
-    ProgressiveRender(std::unique_ptr<const Renderer> renderer, const FrameLayout& frame, const Plan& plan,
-                      float exposure_scale, double preparation_seconds);
+    ProgressiveRender(std::unique_ptr<const Renderer> renderer, const FrameLayout& frame, const Plan& plan, float exposure_scale,
+                      double preparation_seconds);
 
     /// Renders the next group on the threads of the calling arena, cut short where it would go beyond `iteration_limit`; no
     /// group follows one that was cut. kCancelled after a stop request; then the rendering is as it was.

@@ -39,33 +39,32 @@ std::string random_id() {
 
 Status write_statistics(const std::string& path, const JobInfo& job, const Digest& digest, const ClientTimes& times) {
     const double seconds = job.render_seconds > 0 ? job.render_seconds : 1e-9;
-    Json json = {
-        {"job", job.job_id},
-        {"algorithm", job.spec.algorithm},
-        {"state", to_string(job.state)},
-        {"sha256", digest.hex()},
-        {"samples_per_pixel", job.samples_per_pixel_done},
-        {"width", job.spec.frame.crop.width()},
-        {"height", job.spec.frame.crop.height()},
-        {"seconds",
-         {{"import", times.import_seconds},
-          {"digest", times.digest_seconds},
-          {"upload", times.upload_seconds},
-          {"prepare", job.prepare_seconds},
-          {"render", job.render_seconds},
-          {"finish", job.finish_seconds},
-          {"submit_to_end", times.wait_seconds},
-          {"fetch", times.fetch_seconds}}},
-        {"samples", job.camera_samples},
-        {"samples_per_second", double(job.camera_samples) / seconds},
-        {"light_paths", job.light_paths},
-        {"rays", job.rays},
-        {"rays_per_second", double(job.rays) / seconds},
-        {"units", job.unit_done},
-        {"workers", job.worker_count},
-        {"dropped_samples", job.dropped_samples},
-        {"duplicates_same", job.duplicates_same},
-        {"duplicates_different", job.duplicates_different}};
+    Json json = {{"job", job.job_id},
+                 {"algorithm", job.spec.algorithm},
+                 {"state", to_string(job.state)},
+                 {"sha256", digest.hex()},
+                 {"samples_per_pixel", job.samples_per_pixel_done},
+                 {"width", job.spec.frame.crop.width()},
+                 {"height", job.spec.frame.crop.height()},
+                 {"seconds",
+                  {{"import", times.import_seconds},
+                   {"digest", times.digest_seconds},
+                   {"upload", times.upload_seconds},
+                   {"prepare", job.prepare_seconds},
+                   {"render", job.render_seconds},
+                   {"finish", job.finish_seconds},
+                   {"submit_to_end", times.wait_seconds},
+                   {"fetch", times.fetch_seconds}}},
+                 {"samples", job.camera_samples},
+                 {"samples_per_second", double(job.camera_samples) / seconds},
+                 {"light_paths", job.light_paths},
+                 {"rays", job.rays},
+                 {"rays_per_second", double(job.rays) / seconds},
+                 {"units", job.unit_done},
+                 {"workers", job.worker_count},
+                 {"dropped_samples", job.dropped_samples},
+                 {"duplicates_same", job.duplicates_same},
+                 {"duplicates_different", job.duplicates_different}};
     if (job.tables.asset.size_bytes > 0) json["tables"] = to_json(job.tables);
     return write_file_atomically(path, json.dump(1) + "\n");
 }
@@ -95,8 +94,7 @@ Result<ImageFiles> as_half(const ImageFiles& files, const std::string& name) {
     auto exr = encode_exr(*image, ExrPixelType::kHalf);
     if (!exr.ok()) return exr.status();
     Json json = Json::parse(files.manifest, nullptr, false);
-    if (json.is_discarded() || !json["image"].is_object())
-        return data_loss("the manifest that arrived is damaged; fetch it again");
+    if (json.is_discarded() || !json["image"].is_object()) return data_loss("the manifest that arrived is damaged; fetch it again");
     const Digest digest = sha256(*exr);
     json["image"]["sha256"] = digest.hex();
     json["image"]["size_bytes"] = exr->size();
@@ -184,8 +182,8 @@ Result<JobInfo> submit(JobPort& port, const JobSpec& spec) {
 
 Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool cancel_on_interrupt) {
     Progress progress(quiet);
-    const Status status =
-        port.watch_job(job_id, [&](const JobInfo& job) { progress.show(job); }, interrupt_token());
+    const Status status = port.watch_job(
+        job_id, [&](const JobInfo& job) { progress.show(job); }, interrupt_token());
     progress.finish();
     if (status.code() == StatusCode::kCancelled) {
         if (cancel_on_interrupt) {
@@ -194,8 +192,7 @@ Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool
             if (cancelled->state == JobState::kFailed)
                 return Status(StatusCode::kAborted, "job " + job_id + " failed: " + cancelled->message);
         }
-        return Status(StatusCode::kCancelled,
-                      "interrupted; job " + job_id + (cancel_on_interrupt ? " was cancelled" : " goes on"));
+        return Status(StatusCode::kCancelled, "interrupted; job " + job_id + (cancel_on_interrupt ? " was cancelled" : " goes on"));
     }
     if (!status.ok()) return status;
     auto job = port.get_job(job_id);
@@ -224,8 +221,8 @@ int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTi
                                                     job.job_id + "` without --half writes it as float"));
         } else {
             output.replace_extension(kFloatInstead);
-            half_refused = failed_precondition(halves.status().message() +
-                                               "; so that nothing is lost it was written as float to " + output.string());
+            half_refused = failed_precondition(halves.status().message() + "; so that nothing is lost it was written as float to " +
+                                               output.string());
         }
     }
     const std::filesystem::path manifest_path = std::filesystem::path(output).replace_extension(kManifest);
@@ -241,8 +238,8 @@ int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTi
     if (!status.ok()) return report_error(status);
     if (!options.quiet) {
         std::printf("%s  %llu spp in %s  sha256 %s\n", output.string().c_str(),
-                    static_cast<unsigned long long>(job.samples_per_pixel_done),
-                    duration_text(job.render_seconds).c_str(), files.digest.hex().c_str());
+                    static_cast<unsigned long long>(job.samples_per_pixel_done), duration_text(job.render_seconds).c_str(),
+                    files.digest.hex().c_str());
         if (!options.png.empty()) std::printf("%s\n", options.png.c_str());
     }
     if (job.dropped_samples > 0) {

@@ -40,8 +40,10 @@ Status no_job(const std::string& id) {
 }  // namespace
 
 Coordinator::Coordinator(CoordinatorOptions options)
-    : options_(std::move(options)), assets_(options_.directory / "assets"),
-      table_cache_(options_.table_cache, options_.table_cache_bytes), workers_(options_.lease_seconds),
+    : options_(std::move(options)),
+      assets_(options_.directory / "assets"),
+      table_cache_(options_.table_cache, options_.table_cache_bytes),
+      workers_(options_.lease_seconds),
       ticker_([this](std::stop_token stop) { tick(stop); }) {
     // Jobs do not outlive the coordinator, so nobody names the tables that it finds.
     if (const size_t count = assets_.remove_all_that_begin_with(kTablesPrefix); count > 0)
@@ -100,8 +102,7 @@ Result<JobSpec> Coordinator::canonical_spec(const JobSpec& spec) const {
         return invalid_argument("the time limit must lie between 0 and 30 days");
     if (spec.max_depth < -1 || spec.max_depth >= kMaxEdges)
         return invalid_argument("max depth must lie between 0 and " + std::to_string(kMaxEdges - 1));
-    if (spec.width < 0 || spec.height < 0 || spec.width > 65536 || spec.height > 65536 ||
-        (spec.width == 0) != (spec.height == 0))
+    if (spec.width < 0 || spec.height < 0 || spec.width > 65536 || spec.height > 65536 || (spec.width == 0) != (spec.height == 0))
         return invalid_argument("a resolution needs a width and a height between 1 and 65536");
     return out;
 }
@@ -109,8 +110,7 @@ Result<JobSpec> Coordinator::canonical_spec(const JobSpec& spec) const {
 Status Coordinator::check_assets(const JobSpec& spec) const {
     const Digest& root = spec.scene_root;
     if (!options_.read_scene) return internal_error("this coordinator has no scene reader");
-    if (!assets_.contains(root))
-        return failed_precondition("the scene's file list " + root.hex() + " was not uploaded");
+    if (!assets_.contains(root)) return failed_precondition("the scene's file list " + root.hex() + " was not uploaded");
     const auto text = assets_.read(root);
     if (!text.ok()) return text.status();
     const auto manifest = AssetManifest::parse(*text);
@@ -143,8 +143,7 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     if (auto answer = repeated()) return *answer;
     const auto unended = std::count_if(jobs_.begin(), jobs_.end(), [](const auto& j) { return !is_terminal(j->state); });
     if (size_t(unended) >= options_.max_jobs)
-        return Status(StatusCode::kResourceExhausted,
-                      "the coordinator holds as many jobs as it may; submit again when some ended");
+        return Status(StatusCode::kResourceExhausted, "the coordinator holds as many jobs as it may; submit again when some ended");
     auto record = std::make_shared<JobRecord>();
     JobRecord& job = *record;
     job.id = new_id("job");

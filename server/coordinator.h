@@ -28,18 +28,18 @@ struct CoordinatorOptions {
     std::filesystem::path directory;  ///< Assets and finished images; made if need be.
     BuildIdentity identity;           ///< What a worker must be equal to.
     SceneReader read_scene;
-    bool scene_files_needed = true;   ///< False where read_scene and the workers have the files by other means.
+    bool scene_files_needed = true;  ///< False where read_scene and the workers have the files by other means.
     double lease_seconds = 10;
     double heartbeat_seconds = 1;
-    std::optional<uint64_t> shuffle_seed;          ///< Lease units in a random order (tests).
+    std::optional<uint64_t> shuffle_seed;  ///< Lease units in a random order (tests).
     /// Called by any thread at any time.
     std::function<TimePoint()> clock = [] { return std::chrono::steady_clock::now(); };
     uint64_t waiting_bytes = uint64_t(512) << 20;  ///< Room for partials that wait for earlier groups.
     std::filesystem::path table_cache;             ///< Tables of earlier jobs; empty: none are kept.
     uint64_t table_cache_bytes = uint64_t(4) << 30;
-    uint64_t training_bytes = uint64_t(8) << 30;   ///< Room for the training data of one job: 5 10^6 samples of a hard interior.
-    size_t max_jobs = 10000;  ///< That have not ended.
-    size_t kept_jobs = 1000;  ///< Ended jobs that are remembered; the oldest are forgotten, their files stay.
+    uint64_t training_bytes = uint64_t(8) << 30;  ///< Room for the training data of one job: 5 10^6 samples of a hard interior.
+    size_t max_jobs = 10000;                      ///< That have not ended.
+    size_t kept_jobs = 1000;                      ///< Ended jobs that are remembered; the oldest are forgotten, their files stay.
 };
 
 class Coordinator {
@@ -63,15 +63,14 @@ class Coordinator {
     Result<WorkerGrant> register_worker(const WorkerHello& hello);
     Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds,
                                                const std::function<bool()>& cancelled);
-    Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id,
-                                                 const std::vector<RunningUnit>& running);
+    Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running);
     Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why);
     Status goodbye(const std::string& worker_id);
     /// What the payload of a unit must be; kNotFound if the job or unit is not open. For limits before bytes are taken in.
     Result<PartialExpectation> expected_partial(const UnitReference& unit) const;
     /// A partial that came over the wire: checked against the unit before anything reads it.
-    Result<SubmitAck> submit_payload(const std::string& worker_id, const UnitReference& unit,
-                                     const PartialDescriptor& descriptor, std::string_view payload);
+    Result<SubmitAck> submit_payload(const std::string& worker_id, const UnitReference& unit, const PartialDescriptor& descriptor,
+                                     std::string_view payload);
     /// A partial of this process. `digest` is its payload's.
     Result<SubmitAck> submit_partial(const std::string& worker_id, const UnitReference& unit, const Digest& digest,
                                      Partial partial);
@@ -136,9 +135,9 @@ class Coordinator {
     std::mutex repair_mutex_;  ///< Before mutex_.
     mutable std::mutex mutex_;
     mutable std::condition_variable work_changed_, job_changed_;
-    std::vector<std::shared_ptr<JobRecord>> jobs_;            // oldest first
-    std::vector<std::shared_ptr<void>> discarded_;            // large things that the ticker frees without the mutex
-    std::map<std::string, JobRecord*> requests_;              // by request id
+    std::vector<std::shared_ptr<JobRecord>> jobs_;  // oldest first
+    std::vector<std::shared_ptr<void>> discarded_;  // large things that the ticker frees without the mutex
+    std::map<std::string, JobRecord*> requests_;    // by request id
     WorkerRegistry workers_;
     bool closing_ = false;
     std::jthread ticker_;  // last: stops before anything that it uses goes away

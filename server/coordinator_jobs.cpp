@@ -99,8 +99,8 @@ void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, Tab
     discard_training(job);
     size_window(job);
     job.state = JobState::kRunning;
-    spdlog::info("{}: {}x{}, {} tile(s), {} unit(s)", job.id, frame.crop.width(), frame.crop.height(),
-                 job.units->tile_count(), job.units->unit_total());
+    spdlog::info("{}: {}x{}, {} tile(s), {} unit(s)", job.id, frame.crop.width(), frame.crop.height(), job.units->tile_count(),
+                 job.units->unit_total());
     changed(job);
     work_changed_.notify_all();
 }
@@ -110,8 +110,7 @@ void Coordinator::size_window(JobRecord& job) const {
     // by experience only; before there is any, it is the most that fits into a partial.
     const double area = double(job.spec.frame.crop.area());
     double splats = 0;
-    if (job.unit_light_paths > 0)
-        splats = std::min(area, job.splats_per_path.value_or(area) * job.unit_light_paths);
+    if (job.unit_light_paths > 0) splats = std::min(area, job.splats_per_path.value_or(area) * job.unit_light_paths);
     const double group_bytes = 3 * sizeof(double) * area + double(job.units->tile_count()) * splats * sizeof(SplatSum);
     const double waiting_groups = std::floor(double(options_.waiting_bytes) / group_bytes);
     job.units->set_window(uint32_t(std::min(1 + waiting_groups, double(kMaxWindow))));

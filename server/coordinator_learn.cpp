@@ -24,7 +24,10 @@ double learning_seconds(const TablesInfo& info) { return info.classifier_seconds
 class Coordinator::Tracing final : public TracingPort {
   public:
     Tracing(Coordinator& coordinator, JobRecord& job, size_t emitter_count, std::stop_token stop)
-        : coordinator_(coordinator), job_(job), emitter_count_(emitter_count), stop_(std::move(stop)) {}
+        : coordinator_(coordinator),
+          job_(job),
+          emitter_count_(emitter_count),
+          stop_(std::move(stop)) {}
 
     Result<TracedRound> collect() override {
         std::unique_lock lock(coordinator_.mutex_);

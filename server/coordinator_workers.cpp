@@ -19,9 +19,8 @@ Result<WorkerGrant> Coordinator::register_worker(const WorkerHello& hello) {
     if (hello.thread_count == 0) return invalid_argument("a worker needs at least one thread");
     if (hello.identity != options_.identity) {
         const Status refusal = failed_precondition(
-            "this worker could render other pixels than the coordinator and is refused: worker has " +
-            describe(hello.identity) + "; coordinator has " + describe(options_.identity) +
-            "; install the same build on both hosts");
+            "this worker could render other pixels than the coordinator and is refused: worker has " + describe(hello.identity) +
+            "; coordinator has " + describe(options_.identity) + "; install the same build on both hosts");
         spdlog::error("worker on {} (process {}): {}", hello.host, hello.process_id, refusal.message());
         return refusal;
     }
@@ -88,8 +87,7 @@ Result<std::vector<UnitLease>> Coordinator::lease_units(const std::string& worke
     return leases;
 }
 
-Result<std::vector<UnitReference>> Coordinator::heartbeat(const std::string& worker_id,
-                                                          const std::vector<RunningUnit>& running) {
+Result<std::vector<UnitReference>> Coordinator::heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running) {
     const std::lock_guard lock(mutex_);
     WorkerRecord* worker = workers_.find(worker_id);
     if (!worker) return no_worker(worker_id);
@@ -156,8 +154,7 @@ Status Coordinator::goodbye(const std::string& worker_id) {
 Result<PartialExpectation> Coordinator::expected_partial(const UnitReference& reference) const {
     const std::lock_guard lock(mutex_);
     const auto job = find_job(reference.job_id);
-    if (!job || job->state != JobState::kRunning)
-        return not_found("job " + reference.job_id + " is not running (any more)");
+    if (!job || job->state != JobState::kRunning) return not_found("job " + reference.job_id + " is not running (any more)");
     const auto unit = reference.key.kind == UnitKind::kRender ? job->units->find(reference.key) : std::nullopt;
     if (!unit) return invalid_argument("job " + reference.job_id + " has leased no such unit");
     return PartialExpectation{job->spec.frame, unit->tile, unit->iteration_count, unit->light_path_count};
@@ -196,16 +193,18 @@ std::optional<SubmitAck> Coordinator::repeated_result(JobRecord& job, UnitTable&
         case UnitTable::Completion::kDuplicateDifferent:
             ++job.duplicates_different;
             changed(job);
-            spdlog::error("{}: unit {} from {} differs from the bytes taken in before; one of two workers computes wrongly: "
-                          "compare their hosts and builds", job.id, unit_name(key), worker.id);
+            spdlog::error(
+                "{}: unit {} from {} differs from the bytes taken in before; one of two workers computes wrongly: "
+                "compare their hosts and builds",
+                job.id, unit_name(key), worker.id);
             return SubmitAck{SubmitOutcome::kDuplicateDifferent, "the unit was taken in before with other bytes"};
         case UnitTable::Completion::kFirst: break;
     }
     return std::nullopt;
 }
 
-Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, const UnitReference& reference,
-                                              const Digest& digest, Partial partial) {
+Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, const UnitReference& reference, const Digest& digest,
+                                              Partial partial) {
     std::shared_ptr<Reducer> reducer;
     std::shared_ptr<JobRecord> job;
     uint32_t index = 0;

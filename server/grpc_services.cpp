@@ -16,7 +16,9 @@ namespace lightloom {
 
 struct GrpcServer::Services {
     explicit Services(Coordinator& coordinator)
-        : job(coordinator, closing), asset(coordinator, closing), worker(coordinator, closing) {}
+        : job(coordinator, closing),
+          asset(coordinator, closing),
+          worker(coordinator, closing) {}
     std::atomic<bool> closing{false};
     JobServiceImpl job;
     AssetServiceImpl asset;

@@ -31,16 +31,16 @@ struct JobRecord {
     std::string created_at;  ///< UTC, for the manifest only.
     float exposure_scale = 1;
     std::vector<ImageLayer> layers;  ///< First-hit layers, until the image is written.
-    std::optional<UnitTable> units;    ///< Until the job ends; then `ended_units` is left of it.
+    std::optional<UnitTable> units;  ///< Until the job ends; then `ended_units` is left of it.
     struct UnitCounts {
         uint64_t total = 0, done = 0;
     } ended_units;
-    double unit_light_paths = 0;           ///< Of a unit of the largest groups, about.
+    double unit_light_paths = 0;            ///< Of a unit of the largest groups, about.
     std::optional<double> splats_per_path;  ///< The most that a partial had so far.
-    std::shared_ptr<Reducer> reducer;  ///< Has its own lock; used without ours.
-    uint32_t merged_groups = 0;        ///< Complete groups merged so far.
-    uint64_t merged_iterations = 0;    ///< Iterations of these.
-    std::set<uint32_t> workers;        ///< Indices of those whose units were merged.
+    std::shared_ptr<Reducer> reducer;       ///< Has its own lock; used without ours.
+    uint32_t merged_groups = 0;             ///< Complete groups merged so far.
+    uint64_t merged_iterations = 0;         ///< Iterations of these.
+    std::set<uint32_t> workers;             ///< Indices of those whose units were merged.
     UnitCounters counters;  ///< Of all units that arrived; in the end, of those that are in the image. So is `dropped`.
     uint64_t dropped = 0;
     uint64_t duplicates_same = 0, duplicates_different = 0, expired_leases = 0, rejected = 0;
@@ -48,17 +48,17 @@ struct JobRecord {
     uint64_t image_size = 0;
     std::filesystem::path directory;
     PreparePhase phase = PreparePhase::kReadingScene;
-    SceneFacts facts;                   ///< From the reading of the scene until the units are planned.
-    std::optional<TrainingRound> round; ///< In kPreparing, of a job that makes tables.
-    AssetReference guide;               ///< Tables that the training units read; empty for pilots and probes.
+    SceneFacts facts;                                ///< From the reading of the scene until the units are planned.
+    std::optional<TrainingRound> round;              ///< In kPreparing, of a job that makes tables.
+    AssetReference guide;                            ///< Tables that the training units read; empty for pilots and probes.
     std::shared_ptr<const std::string> guide_bytes;  ///< Of these, should the disk lose them.
     bool capped_by_time_limit = false;
-    Digest table_key;                   ///< Of the tables that the job needs; set before `makes_tables` or `maker`.
-    bool makes_tables = false;          ///< It probes, traces and learns itself.
-    bool may_wait = true;               ///< For another job's tables: not again for those that were taken over and were damaged.
-    std::shared_ptr<JobRecord> maker;   ///< Makes the same tables; this job waits for them.
-    TimePoint training_begin;           ///< The first training unit was leased; unset before.
-    TimePoint round_begin;              ///< The same of the open round.
+    Digest table_key;                  ///< Of the tables that the job needs; set before `makes_tables` or `maker`.
+    bool makes_tables = false;         ///< It probes, traces and learns itself.
+    bool may_wait = true;              ///< For another job's tables: not again for those that were taken over and were damaged.
+    std::shared_ptr<JobRecord> maker;  ///< Makes the same tables; this job waits for them.
+    TimePoint training_begin;          ///< The first training unit was leased; unset before.
+    TimePoint round_begin;             ///< The same of the open round.
     struct Learning {
         TimePoint begin;   ///< Of the phase kLearning.
         double share = 0;  ///< Of that phase that is done, about.
@@ -66,7 +66,7 @@ struct JobRecord {
         std::optional<double> seconds_left(TimePoint now) const;
     } learning;
     TablesInfo tables;
-    Digest tables_asset;                ///< Of the tables that the job names, or is about to; zero before.
+    Digest tables_asset;  ///< Of the tables that the job names, or is about to; zero before.
 
     std::jthread prepare_task, train_task, finish_task;
     int running_tasks = 0;  ///< Of these. A job is forgotten only without any, so that nobody waits for one under the mutex.

@@ -10,8 +10,7 @@ namespace lightloom {
 
 class JobServiceImpl final : public v1::JobService::Service {
   public:
-    JobServiceImpl(Coordinator& coordinator, const std::atomic<bool>& closing)
-        : coordinator_(coordinator), closing_(closing) {}
+    JobServiceImpl(Coordinator& coordinator, const std::atomic<bool>& closing) : coordinator_(coordinator), closing_(closing) {}
 
     grpc::Status SubmitJob(grpc::ServerContext*, const v1::SubmitJobRequest* request, v1::Job* response) override;
     grpc::Status GetJob(grpc::ServerContext*, const v1::GetJobRequest* request, v1::Job* response) override;
@@ -19,8 +18,7 @@ class JobServiceImpl final : public v1::JobService::Service {
     grpc::Status CancelJob(grpc::ServerContext*, const v1::CancelJobRequest* request, v1::Job* response) override;
     grpc::Status WatchJob(grpc::ServerContext* context, const v1::WatchJobRequest* request,
                           grpc::ServerWriter<v1::Job>* writer) override;
-    grpc::Status GetImage(grpc::ServerContext*, const v1::GetImageRequest* request,
-                          grpc::ServerWriter<v1::Chunk>* writer) override;
+    grpc::Status GetImage(grpc::ServerContext*, const v1::GetImageRequest* request, grpc::ServerWriter<v1::Chunk>* writer) override;
     grpc::Status GetManifest(grpc::ServerContext*, const v1::GetManifestRequest* request,
                              grpc::ServerWriter<v1::Chunk>* writer) override;
 

@@ -37,8 +37,8 @@ Result<AffordableSet> affordable_set(const JobSpec& spec, const TracedRound& pro
     const uint32_t threads = std::max(1u, crew.most_threads);  // of the worker that traced the probe: the largest, to be safe
     const auto affordable = [&](bool guided, uint64_t most) {
         // Every round learns once more what the probe's learning cost.
-        const double budget = kTrainingShare * spec.time_limit_seconds - set.probe_traced_seconds -
-                              (guided ? 3 : 2) * set.probe_learned_seconds;
+        const double budget =
+            kTrainingShare * spec.time_limit_seconds - set.probe_traced_seconds - (guided ? 3 : 2) * set.probe_learned_seconds;
         const double per_sample = (guided ? kGuidedCost : 1) * set.probe_traced_seconds / samples;
         return affordable_training_samples({.trace_seconds_per_sample = per_sample / double(std::max<size_t>(1, crew.workers)),
                                             .learn_seconds_per_sample = kLearningOverTracing * per_sample * threads},

@@ -24,9 +24,7 @@ Status LocalJobPort::watch_job(const std::string& job_id, const std::function<vo
     return {StatusCode::kCancelled, "interrupted"};
 }
 
-Result<std::string> LocalJobPort::image(const std::string& job_id, ImageKind kind) {
-    return coordinator_.image(job_id, kind);
-}
+Result<std::string> LocalJobPort::image(const std::string& job_id, ImageKind kind) { return coordinator_.image(job_id, kind); }
 Result<std::string> LocalJobPort::manifest(const std::string& job_id) { return coordinator_.manifest(job_id); }
 
 Result<std::vector<Digest>> LocalJobPort::find_missing(const std::vector<Digest>& digests) {
@@ -42,13 +40,9 @@ Status LocalJobPort::upload(const Digest& digest, const std::filesystem::path& p
     return bytes.ok() ? upload_bytes(digest, *bytes) : bytes.status();
 }
 
-Status LocalJobPort::upload_bytes(const Digest& digest, std::string_view bytes) {
-    return coordinator_.assets().put(digest, bytes);
-}
+Status LocalJobPort::upload_bytes(const Digest& digest, std::string_view bytes) { return coordinator_.assets().put(digest, bytes); }
 
-Result<WorkerGrant> LocalWorkerPort::register_worker(const WorkerHello& hello) {
-    return coordinator_.register_worker(hello);
-}
+Result<WorkerGrant> LocalWorkerPort::register_worker(const WorkerHello& hello) { return coordinator_.register_worker(hello); }
 
 Result<std::vector<UnitLease>> LocalWorkerPort::lease_units(const std::string& worker_id, double wait_seconds,
                                                             std::stop_token stop) {
@@ -60,13 +54,11 @@ Result<std::vector<UnitReference>> LocalWorkerPort::heartbeat(const std::string&
     return coordinator_.heartbeat(worker_id, running);
 }
 
-Result<SubmitAck> LocalWorkerPort::submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial,
-                                                 double) {
+Result<SubmitAck> LocalWorkerPort::submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial, double) {
     // Encoded for the digest, which tells duplicates apart; reading it back would only cost time.
     const auto encoded = encode_partial(partial, lease.spec.frame);
     if (!encoded.ok()) return encoded.status();
-    return coordinator_.submit_partial(worker_id, lease.reference(), encoded->descriptor.payload_digest,
-                                       std::move(partial));
+    return coordinator_.submit_partial(worker_id, lease.reference(), encoded->descriptor.payload_digest, std::move(partial));
 }
 
 Result<SubmitAck> LocalWorkerPort::submit_training(const std::string& worker_id, const UnitLease& lease, std::string_view payload,
@@ -80,8 +72,7 @@ Status LocalWorkerPort::release_unit(const std::string& worker_id, const UnitRef
 
 Status LocalWorkerPort::goodbye(const std::string& worker_id) { return coordinator_.goodbye(worker_id); }
 
-Status LocalWorkerPort::read_asset(const Digest& digest, uint64_t offset,
-                                   const std::function<Status(std::string_view)>& sink) {
+Status LocalWorkerPort::read_asset(const Digest& digest, uint64_t offset, const std::function<Status(std::string_view)>& sink) {
     const auto bytes = coordinator_.assets().read(digest);
     if (!bytes.ok()) return bytes.status();
     return sink(std::string_view(*bytes).substr(std::min<size_t>(offset, bytes->size())));

@@ -83,12 +83,15 @@ int main(int argc, char** argv) {
     app.add_option("--listen", listen, "HOST:PORT for clients and workers; port 0 picks a free one")->capture_default_str();
     app.add_option("--data", data,
                    "Directory for scene files, images, the tables that running jobs read (assets/, removed with the last "
-                   "such job) and the table cache (tables/)")->capture_default_str();
+                   "such job) and the table cache (tables/)")
+        ->capture_default_str();
     app.add_option("--status", status, "HOST:PORT of the status page (/healthz, /api/v1/status), or off")->capture_default_str();
     app.add_option("--lease", lease, "Seconds without a heartbeat after which a unit goes to another worker")
-        ->check(number_between(0.2, 3600))->capture_default_str();
+        ->check(number_between(0.2, 3600))
+        ->capture_default_str();
     app.add_option("--threads", threads, "Threads with which the coordinator itself traces and renders; 0 leaves that to workers")
-        ->check(whole_number_between(0, 1024))->capture_default_str();
+        ->check(whole_number_between(0, 1024))
+        ->capture_default_str();
     app.add_option("--table-cache-size", table_cache_mb,
                    "MB of the table cache: learned tables that later jobs find again, also after a restart; those used "
                    "least recently go first; 0 keeps none")
@@ -169,8 +172,7 @@ int main(int argc, char** argv) {
     if (threads > 0) own.emplace(coordinator, *identity, threads, std::filesystem::path(data) / "worker");
     const bool tcp = !listen.starts_with("unix:");
     spdlog::info("build {}, listening on {}, status on port {}", identity->build_id,
-                 tcp ? "port " + std::to_string((*server)->port()) : listen,
-                 http ? http->port() : 0);
+                 tcp ? "port " + std::to_string((*server)->port()) : listen, http ? http->port() : 0);
     if (!port_file.empty()) {
         const std::string ports =
             std::to_string(tcp ? (*server)->port() : 0) + " " + std::to_string(http ? http->port() : 0) + "\n";

@@ -62,8 +62,8 @@ class Reducer {
     mutable std::mutex mutex_;
     std::unique_ptr<Sums> sums_;
     uint32_t current_units_ = 0;
-    UnitCounters counters_, current_counters_;      ///< Of all complete groups; of the one that is being summed.
-    std::vector<Dropped> dropped_;                  ///< Of both; those of the latter are the last ones.
+    UnitCounters counters_, current_counters_;  ///< Of all complete groups; of the one that is being summed.
+    std::vector<Dropped> dropped_;              ///< Of both; those of the latter are the last ones.
     bool frozen_ = false;
     /// Partials of later groups wait as they are: a group's sums take four times their room.
     std::map<uint32_t, std::vector<std::pair<WorkUnit, Partial>>> waiting_;

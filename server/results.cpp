@@ -68,10 +68,8 @@ std::string replay_command(const JobSpec& spec, const std::string& scene, const 
     command += " --seed " + std::to_string(spec.seed) + " --max-depth " + std::to_string(spec.max_depth);
     if (spec.width > 0) command += " --resolution " + std::to_string(spec.width) + "x" + std::to_string(spec.height);
     if (spec.samples_per_pixel > 0) command += " --spp " + std::to_string(spec.samples_per_pixel);
-    if (sample.splat)
-        return command + " --unit " + std::to_string(dropped.unit.group) + "," + std::to_string(dropped.unit.tile);
-    return command + " --iteration " + std::to_string(sample.iteration) + " --pixel " + std::to_string(x) + "," +
-           std::to_string(y);
+    if (sample.splat) return command + " --unit " + std::to_string(dropped.unit.group) + "," + std::to_string(dropped.unit.tile);
+    return command + " --iteration " + std::to_string(sample.iteration) + " --pixel " + std::to_string(x) + "," + std::to_string(y);
 }
 
 std::string to_json(const Manifest& m) {
@@ -87,15 +85,13 @@ std::string to_json(const Manifest& m) {
                      {"spec_digest", spec.image_digest().hex()}};
     const Rect& crop = spec.frame.crop;
     json["spec"] = settings_json(spec);
-    json["spec"].update(Json{{"requested_samples_per_pixel", spec.samples_per_pixel},
-                             {"time_limit_seconds", spec.time_limit_seconds},
-                             {"layers", spec.first_hit_layers},
-                             {"scene", m.scene_main},
-                             {"scene_root", spec.scene_root.hex()},
-                             {"frame",
-                              {{"width", spec.frame.width},
-                               {"height", spec.frame.height},
-                               {"crop", {crop.x0, crop.y0, crop.x1, crop.y1}}}}});
+    json["spec"].update(Json{
+        {"requested_samples_per_pixel", spec.samples_per_pixel},
+        {"time_limit_seconds", spec.time_limit_seconds},
+        {"layers", spec.first_hit_layers},
+        {"scene", m.scene_main},
+        {"scene_root", spec.scene_root.hex()},
+        {"frame", {{"width", spec.frame.width}, {"height", spec.frame.height}, {"crop", {crop.x0, crop.y0, crop.x1, crop.y1}}}}});
     json["build"] = {{"build_id", m.identity.build_id},
                      {"math_profile", m.identity.math_profile},
                      {"golden_digest", m.identity.golden_digest.hex()}};
@@ -145,8 +141,7 @@ Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, 
     image.color = std::move(developed.color);
     image.layers = std::move(layers);
     // Unknown is not zero.
-    if (!developed.variance.pixels.empty())
-        image.layers.push_back({"variance", "RGB", std::move(developed.variance.pixels)});
+    if (!developed.variance.pixels.empty()) image.layers.push_back({"variance", "RGB", std::move(developed.variance.pixels)});
     image.attributes = {{exr_attribute::kAlgorithm, spec.algorithm},
                         {exr_attribute::kParameters, parameters},
                         {exr_attribute::kSeed, std::to_string(spec.seed)},
@@ -172,8 +167,7 @@ Result<std::string> read_image(const std::filesystem::path& job_directory) {
     return read_file((job_directory / "image.exr").string());
 }
 
-Result<std::string> preview_png(const std::filesystem::path& job_directory, const Reducer* reducer,
-                                float exposure_scale) {
+Result<std::string> preview_png(const std::filesystem::path& job_directory, const Reducer* reducer, float exposure_scale) {
     if (reducer) {
         const auto image = reducer->image(exposure_scale);
         if (!image.ok()) return image.status();

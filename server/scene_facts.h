@@ -15,9 +15,9 @@
 namespace lightloom {
 
 struct SceneFacts {
-    FrameLayout frame;         ///< With the job's resolution.
-    float exposure_scale = 1;  ///< Multiplies the developed image.
-    int max_depth = 5;         ///< Bounces, if the job leaves them to the scene.
+    FrameLayout frame;               ///< With the job's resolution.
+    float exposure_scale = 1;        ///< Multiplies the developed image.
+    int max_depth = 5;               ///< Bounces, if the job leaves them to the scene.
     std::vector<ImageLayer> layers;  ///< First-hit layers, if the job asks for them.
     /// The built scene, of which learning needs the lights. Called only for a job whose tables have to be made; holds no scene.
     std::function<Result<std::shared_ptr<const Scene>>()> build_scene;

@@ -88,7 +88,9 @@ http::response<http::string_body> respond(const Coordinator& coordinator, const 
 class Session : public std::enable_shared_from_this<Session> {
   public:
     Session(tcp::socket socket, const Coordinator& coordinator, int& connections)
-        : stream_(std::move(socket)), coordinator_(coordinator), connections_(connections) {
+        : stream_(std::move(socket)),
+          coordinator_(coordinator),
+          connections_(connections) {
         ++connections_;
         parser_.header_limit(kMaxHeaderBytes);
         parser_.body_limit(0);

@@ -34,18 +34,12 @@ void put(std::string& out, std::string_view name, std::string_view value) {
 double finite(double value) { return std::isfinite(value) ? value : 0; }
 
 Json to_json(const TablesInfo& info) {
-    return {{"light_subspaces", info.light_subspaces},
-            {"eye_subspaces", info.eye_subspaces},
-            {"training_samples", info.training_samples},
-            {"capped_by_time_limit", info.capped_by_time_limit},
-            {"trace_seconds", info.trace_seconds},
-            {"classifier_seconds", info.classifier_seconds},
-            {"energy_seconds", info.energy_seconds},
-            {"gamma_seconds", info.gamma_seconds},
-            {"uniform_loss", finite(info.uniform_loss)},
-            {"loss", finite(info.loss)},
-            {"prior_strength", info.prior_strength},
-            {"note", info.note}};
+    return {{"light_subspaces", info.light_subspaces},   {"eye_subspaces", info.eye_subspaces},
+            {"training_samples", info.training_samples}, {"capped_by_time_limit", info.capped_by_time_limit},
+            {"trace_seconds", info.trace_seconds},       {"classifier_seconds", info.classifier_seconds},
+            {"energy_seconds", info.energy_seconds},     {"gamma_seconds", info.gamma_seconds},
+            {"uniform_loss", finite(info.uniform_loss)}, {"loss", finite(info.loss)},
+            {"prior_strength", info.prior_strength},     {"note", info.note}};
 }
 
 /// False unless the field is there and of the type.
@@ -73,11 +67,10 @@ Result<TablesInfo> info_from(std::string_view text) {
     const bool complete =
         json.is_object() && take(json, "light_subspaces", &info.light_subspaces) &&
         take(json, "eye_subspaces", &info.eye_subspaces) && take(json, "training_samples", &info.training_samples) &&
-        take(json, "capped_by_time_limit", &info.capped_by_time_limit) &&
-        take(json, "trace_seconds", &info.trace_seconds) && take(json, "classifier_seconds", &info.classifier_seconds) &&
-        take(json, "energy_seconds", &info.energy_seconds) && take(json, "gamma_seconds", &info.gamma_seconds) &&
-        take(json, "uniform_loss", &info.uniform_loss) && take(json, "loss", &info.loss) &&
-        take(json, "prior_strength", &info.prior_strength) && take(json, "note", &info.note);
+        take(json, "capped_by_time_limit", &info.capped_by_time_limit) && take(json, "trace_seconds", &info.trace_seconds) &&
+        take(json, "classifier_seconds", &info.classifier_seconds) && take(json, "energy_seconds", &info.energy_seconds) &&
+        take(json, "gamma_seconds", &info.gamma_seconds) && take(json, "uniform_loss", &info.uniform_loss) &&
+        take(json, "loss", &info.loss) && take(json, "prior_strength", &info.prior_strength) && take(json, "note", &info.note);
     if (!complete) return data_loss("the entry's report is malformed");
     info.from_cache = true;
     return info;

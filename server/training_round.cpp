@@ -7,7 +7,9 @@
 namespace lightloom {
 
 TrainingRound::TrainingRound(UnitKind kind, const TrainingWork& work, std::optional<uint64_t> shuffle_seed)
-    : kind_(kind), work_(work), units_(Plan::training(kind, work), work.sample_count, UINT32_MAX, shuffle_seed),
+    : kind_(kind),
+      work_(work),
+      units_(Plan::training(kind, work), work.sample_count, UINT32_MAX, shuffle_seed),
       parts_(units_.group_total()) {}
 
 uint64_t TrainingRound::samples_done() const {
@@ -20,9 +22,7 @@ void TrainingRound::add(uint32_t unit, Part part) {
     parts_[unit] = std::move(part);
 }
 
-double TrainingRound::projected_bytes() const {
-    return double(bytes_) * units_.group_total() / double(units_.done_count());
-}
+double TrainingRound::projected_bytes() const { return double(bytes_) * units_.group_total() / double(units_.done_count()); }
 
 std::vector<TrainingRound::Part> TrainingRound::take() {
     auto parts = std::move(parts_);

@@ -7,7 +7,10 @@
 namespace lightloom {
 
 UnitTable::UnitTable(Plan plan, uint64_t iterations, uint32_t window, std::optional<uint64_t> shuffle_seed)
-    : plan_(std::move(plan)), iterations_(iterations), window_(std::max(window, 1u)), shuffle_(shuffle_seed) {
+    : plan_(std::move(plan)),
+      iterations_(iterations),
+      window_(std::max(window, 1u)),
+      shuffle_(shuffle_seed) {
     if (iterations_ > 0) {
         group_total_ = plan_.group_count(iterations_);
         unit_total_ = uint64_t(group_total_) * plan_.tile_count();
@@ -27,8 +30,7 @@ UnitTable::Entry* UnitTable::entry(const UnitKey& key) {
 
 Group UnitTable::group(uint32_t index) const {
     Group out = plan_.group(index);
-    if (iterations_ > 0)
-        out.iteration_count = uint32_t(std::min<uint64_t>(out.iteration_count, iterations_ - out.first_iteration));
+    if (iterations_ > 0) out.iteration_count = uint32_t(std::min<uint64_t>(out.iteration_count, iterations_ - out.first_iteration));
     return out;
 }
 
@@ -157,8 +159,7 @@ UnitTable::Completion UnitTable::complete(const UnitKey& key, uint32_t worker, c
     }
     Entry* e = entry(key);
     if (!e) return Completion::kUnknown;
-    if (e->state == State::kDone)
-        return e->digest == digest ? Completion::kDuplicateSame : Completion::kDuplicateDifferent;
+    if (e->state == State::kDone) return e->digest == digest ? Completion::kDuplicateSame : Completion::kDuplicateDifferent;
     if (e->state == State::kLeased) {
         leased_.erase(key);
         --leased_count_;

@@ -34,7 +34,7 @@ struct WorkerRecord {
     uint32_t waiting = 0;             ///< Of its calls for units, those that wait now.
     uint64_t merged = 0;              ///< Units of images.
     int failures_in_a_row = 0;
-    TimePoint rests_until;            ///< Gets no unit before that while others are there that do not rest.
+    TimePoint rests_until;  ///< Gets no unit before that while others are there that do not rest.
     std::set<UnitReference> held;
 
     /// A worker may hold one unit beside the one that it renders, so that it does not idle between two.

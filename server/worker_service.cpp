@@ -10,8 +10,7 @@ grpc::Status invalid(const std::string& what) { return {grpc::StatusCode::INVALI
 
 }  // namespace
 
-grpc::Status WorkerServiceImpl::Register(grpc::ServerContext*, const v1::WorkerHello* request,
-                                         v1::WorkerGrant* response) {
+grpc::Status WorkerServiceImpl::Register(grpc::ServerContext*, const v1::WorkerHello* request, v1::WorkerGrant* response) {
     const auto hello = wire::get(*request);
     if (!hello.ok()) return wire::to_grpc(hello.status());
     const auto grant = coordinator_.register_worker(*hello);
@@ -22,8 +21,8 @@ grpc::Status WorkerServiceImpl::Register(grpc::ServerContext*, const v1::WorkerH
 
 grpc::Status WorkerServiceImpl::LeaseUnits(grpc::ServerContext* context, const v1::LeaseUnitsRequest* request,
                                            v1::LeaseUnitsResponse* response) {
-    const auto leases = coordinator_.lease_units(request->worker_id(), request->wait_seconds(),
-                                                 [&] { return closing_ || context->IsCancelled(); });
+    const auto leases =
+        coordinator_.lease_units(request->worker_id(), request->wait_seconds(), [&] { return closing_ || context->IsCancelled(); });
     if (!leases.ok()) return wire::to_grpc(leases.status());
     for (const UnitLease& lease : *leases) wire::put(lease, response->add_leases());
     return grpc::Status::OK;
@@ -74,8 +73,7 @@ grpc::Status WorkerServiceImpl::SubmitResult(grpc::ServerContext*, grpc::ServerR
     const auto expected = coordinator_.expected_partial(unit);
     if (!expected.ok()) {
         const bool stale = expected.status().code() == StatusCode::kNotFound;
-        wire::put(SubmitAck{stale ? SubmitOutcome::kStale : SubmitOutcome::kRejected, expected.status().message()},
-                  response);
+        wire::put(SubmitAck{stale ? SubmitOutcome::kStale : SubmitOutcome::kRejected, expected.status().message()}, response);
         return grpc::Status::OK;
     }
     if (descriptor->splat_count > uint64_t(expected->frame.crop.area()))
@@ -118,8 +116,7 @@ grpc::Status WorkerServiceImpl::SubmitTraining(grpc::ServerContext*, grpc::Serve
     return grpc::Status::OK;
 }
 
-grpc::Status WorkerServiceImpl::ReleaseUnit(grpc::ServerContext*, const v1::ReleaseUnitRequest* request,
-                                            v1::ReleaseUnitResponse*) {
+grpc::Status WorkerServiceImpl::ReleaseUnit(grpc::ServerContext*, const v1::ReleaseUnitRequest* request, v1::ReleaseUnitResponse*) {
     int code = request->status_code();
     if (code < 0 || code > int(StatusCode::kDataLoss)) code = int(StatusCode::kUnknown);
     const auto unit = wire::get(request->unit());

@@ -10,20 +10,17 @@ namespace lightloom {
 
 class WorkerServiceImpl final : public v1::WorkerService::Service {
   public:
-    WorkerServiceImpl(Coordinator& coordinator, const std::atomic<bool>& closing)
-        : coordinator_(coordinator), closing_(closing) {}
+    WorkerServiceImpl(Coordinator& coordinator, const std::atomic<bool>& closing) : coordinator_(coordinator), closing_(closing) {}
 
     grpc::Status Register(grpc::ServerContext*, const v1::WorkerHello* request, v1::WorkerGrant* response) override;
     grpc::Status LeaseUnits(grpc::ServerContext* context, const v1::LeaseUnitsRequest* request,
                             v1::LeaseUnitsResponse* response) override;
-    grpc::Status Heartbeat(grpc::ServerContext*, const v1::HeartbeatRequest* request,
-                           v1::HeartbeatResponse* response) override;
+    grpc::Status Heartbeat(grpc::ServerContext*, const v1::HeartbeatRequest* request, v1::HeartbeatResponse* response) override;
     grpc::Status SubmitResult(grpc::ServerContext*, grpc::ServerReader<v1::SubmitResultRequest>* reader,
                               v1::SubmitResultResponse* response) override;
     grpc::Status SubmitTraining(grpc::ServerContext*, grpc::ServerReader<v1::SubmitTrainingRequest>* reader,
                                 v1::SubmitResultResponse* response) override;
-    grpc::Status ReleaseUnit(grpc::ServerContext*, const v1::ReleaseUnitRequest* request,
-                             v1::ReleaseUnitResponse*) override;
+    grpc::Status ReleaseUnit(grpc::ServerContext*, const v1::ReleaseUnitRequest* request, v1::ReleaseUnitResponse*) override;
     grpc::Status Goodbye(grpc::ServerContext*, const v1::GoodbyeRequest* request, v1::GoodbyeResponse*) override;
 
   private:

@@ -15,8 +15,7 @@ constexpr double kSlowestBytesPerSecond = 1e6;
 
 void set_deadline(grpc::ClientContext& context, double seconds) {
     context.set_deadline(std::chrono::system_clock::now() +
-                         std::chrono::duration_cast<std::chrono::system_clock::duration>(
-                             std::chrono::duration<double>(seconds)));
+                         std::chrono::duration_cast<std::chrono::system_clock::duration>(std::chrono::duration<double>(seconds)));
 }
 
 /// `message` holds the header; the payload follows in chunks.
@@ -38,7 +37,9 @@ grpc::Status send(grpc::ClientWriter<Request>& writer, Request& message, std::st
 }  // namespace
 
 GrpcWorkerPort::GrpcWorkerPort(const std::shared_ptr<grpc::Channel>& channel, double read_seconds)
-    : read_seconds_(read_seconds), worker_(v1::WorkerService::NewStub(channel)), assets_(v1::AssetService::NewStub(channel)) {}
+    : read_seconds_(read_seconds),
+      worker_(v1::WorkerService::NewStub(channel)),
+      assets_(v1::AssetService::NewStub(channel)) {}
 
 Result<WorkerGrant> GrpcWorkerPort::register_worker(const WorkerHello& hello) {
     grpc::ClientContext context;
@@ -152,8 +153,7 @@ Status GrpcWorkerPort::goodbye(const std::string& worker_id) {
     return wire::from_grpc(worker_->Goodbye(&context, request, &response));
 }
 
-Status GrpcWorkerPort::read_asset(const Digest& digest, uint64_t offset,
-                                  const std::function<Status(std::string_view)>& sink) {
+Status GrpcWorkerPort::read_asset(const Digest& digest, uint64_t offset, const std::function<Status(std::string_view)>& sink) {
     // How long an asset takes is not known before its size is; a call that ran out of time but moved is continued from there.
     for (;;) {
         const uint64_t begin = offset;
@@ -165,8 +165,8 @@ Status GrpcWorkerPort::read_asset(const Digest& digest, uint64_t offset,
         const auto reader = assets_->Read(&context, request);
         v1::Chunk chunk;
         while (reader->Read(&chunk)) {
-            Status status = chunk.offset_bytes() == offset ? sink(chunk.data())
-                                                           : data_loss("the coordinator sent a chunk out of order");
+            Status status =
+                chunk.offset_bytes() == offset ? sink(chunk.data()) : data_loss("the coordinator sent a chunk out of order");
             if (!status.ok()) {
                 context.TryCancel();
                 (void)reader->Finish();

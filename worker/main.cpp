@@ -101,9 +101,10 @@ int main(int argc, char** argv) {
     }
     RendererCache renderers([&](const JobSpec& spec, std::stop_token s) { return fetcher.scene(spec, s); },
                             [&](const AssetReference& tables, std::stop_token s) { return fetcher.tables(tables, s); });
-    Worker worker(port, {.identity = *identity, .thread_count = threads, .host = host_name(), .process_id = uint64_t(::getpid())},
-                  [&](const UnitLease& lease, std::stop_token s) { return renderers.renderer(lease, s); },
-                  [&](const UnitLease& lease, std::stop_token s) { return renderers.tracer(lease, s); });
+    Worker worker(
+        port, {.identity = *identity, .thread_count = threads, .host = host_name(), .process_id = uint64_t(::getpid())},
+        [&](const UnitLease& lease, std::stop_token s) { return renderers.renderer(lease, s); },
+        [&](const UnitLease& lease, std::stop_token s) { return renderers.tracer(lease, s); });
     const Status status = worker.run(stop.get_token());
     if (!status.ok()) {
         spdlog::error("{}", status.message());

@@ -96,8 +96,7 @@ Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, st
     if (!text.ok()) return text.status();
     const auto manifest = AssetManifest::parse(*text);
     if (!manifest.ok()) return manifest.status();
-    for (const AssetEntry& entry : manifest->entries)
-        LL_RETURN_IF_ERROR(fetch(store_, entry.digest, entry.size_bytes, stop));
+    for (const AssetEntry& entry : manifest->entries) LL_RETURN_IF_ERROR(fetch(store_, entry.digest, entry.size_bytes, stop));
 
     const std::filesystem::path directory = scratch_ / root.hex();
     LL_RETURN_IF_ERROR(store_.materialise(*manifest, directory));

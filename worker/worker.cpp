@@ -39,7 +39,10 @@ std::string name_of(const UnitReference& unit) {
 }  // namespace
 
 Worker::Worker(WorkerPort& port, WorkerOptions options, RendererSource renderers, TracerSource tracers)
-    : port_(port), options_(std::move(options)), renderers_(std::move(renderers)), tracers_(std::move(tracers)),
+    : port_(port),
+      options_(std::move(options)),
+      renderers_(std::move(renderers)),
+      tracers_(std::move(tracers)),
       arena_(int(options_.thread_count)) {}
 
 std::string Worker::id() {
@@ -68,8 +71,8 @@ Status Worker::sign_in(std::stop_token stop, const std::string& stale_id) {
         }
         const StatusCode code = grant.status().code();
         // Anything else, like a stream that broke, may be better the next time.
-        if (code == StatusCode::kFailedPrecondition || code == StatusCode::kInvalidArgument ||
-            code == StatusCode::kUnimplemented || code == StatusCode::kPermissionDenied) {
+        if (code == StatusCode::kFailedPrecondition || code == StatusCode::kInvalidArgument || code == StatusCode::kUnimplemented ||
+            code == StatusCode::kPermissionDenied) {
             const std::lock_guard lock(mutex_);
             refusal_ = grant.status();
             return grant.status();
@@ -189,8 +192,7 @@ Status Worker::render_unit(const UnitLease& lease, std::stop_token unit_stop, st
     const auto renderer = renderers_(lease, unit_stop);
     if (!renderer.ok()) return renderer.status();
     Result<Partial> partial = internal_error("not rendered");
-    const auto seconds =
-        in_turn(lease, unit_stop, drain, [&] { partial = (*renderer)->render(unit_work(lease.unit), unit_stop); });
+    const auto seconds = in_turn(lease, unit_stop, drain, [&] { partial = (*renderer)->render(unit_work(lease.unit), unit_stop); });
     if (!seconds.ok()) return seconds.status();
     if (!partial.ok()) return partial.status();
     return submit(
@@ -205,8 +207,8 @@ Status Worker::trace_unit(const UnitLease& lease, std::stop_token unit_stop, std
         // A probe measures what a sample costs. The first ones also pay for threads, page faults and cold caches, a tenth of
         // a second that the job pays once and that would make a short probe call every sample several times too dear.
         TrainingWork first = lease.unit.training;
-        first.sample_count = std::min(first.sample_count,
-                                      std::max(first.sample_count / kWarmUpShare, kWarmUpPerThread * options_.thread_count));
+        first.sample_count =
+            std::min(first.sample_count, std::max(first.sample_count / kWarmUpShare, kWarmUpPerThread * options_.thread_count));
         const auto warm = in_turn(lease, unit_stop, drain, [&] { data = (*tracer)(first, unit_stop); });
         if (!warm.ok()) return warm.status();
         if (!data.ok()) return data.status();
@@ -215,9 +217,7 @@ Status Worker::trace_unit(const UnitLease& lease, std::stop_token unit_stop, std
     if (!seconds.ok()) return seconds.status();
     if (!data.ok()) return data.status();
     const std::string payload = serialize(*data);
-    const auto send = [&](const std::string& worker_id) {
-        return port_.submit_training(worker_id, lease, payload, *seconds);
-    };
+    const auto send = [&](const std::string& worker_id) { return port_.submit_training(worker_id, lease, payload, *seconds); };
     return submit(lease, send, drain);
 }
 

@@ -28,9 +28,9 @@ using TracerSource = std::function<Result<TrainingTracer>(const UnitLease& lease
 struct WorkerOptions {
     BuildIdentity identity;
     uint32_t thread_count = 1;
-    std::string host;          ///< For people.
-    uint64_t process_id = 0;   ///< For people.
-    double drain_seconds = 20; ///< How long a stopping worker may take to finish the unit that it renders.
+    std::string host;           ///< For people.
+    uint64_t process_id = 0;    ///< For people.
+    double drain_seconds = 20;  ///< How long a stopping worker may take to finish the unit that it renders.
 };
 
 class Worker {
@@ -73,8 +73,8 @@ class Worker {
     tbb::task_arena arena_;
     std::mutex render_mutex_;  ///< One unit renders at a time, on all threads.
     std::mutex sign_in_mutex_;
-    std::mutex beat_mutex_;    ///< Heartbeats and units given back reach the coordinator in order. Before mutex_.
-    std::mutex mutex_;         ///< Guards what follows.
+    std::mutex beat_mutex_;  ///< Heartbeats and units given back reach the coordinator in order. Before mutex_.
+    std::mutex mutex_;       ///< Guards what follows.
     std::condition_variable_any wake_;
     WorkerGrant grant_;
     std::map<UnitReference, Running> running_;

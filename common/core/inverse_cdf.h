@@ -58,7 +58,9 @@ class InverseCdfTable {
 
     /// At most kMaxOutcomes.
     InverseCdfTable(uint32_t outcomes, uint32_t columns)
-        : outcomes_(outcomes), first_(size_t(outcomes + 1) * columns), cutpoints_(size_t(kCuts) * columns) {}
+        : outcomes_(outcomes),
+          first_(size_t(outcomes + 1) * columns),
+          cutpoints_(size_t(kCuts) * columns) {}
 
     /// `weights`: finite, non-negative, with a positive sum. Each positive one gets at least 2^-31.
     void set(uint32_t column, std::span<const float> weights) {

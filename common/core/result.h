@@ -52,8 +52,8 @@ inline Status internal_error(std::string m) { return {StatusCode::kInternal, std
 template <typename T>
 class [[nodiscard]] Result {
   public:
-    Result(T value) : value_(std::move(value)) {}             // NOLINT: implicit by design
-    Result(Status status) : status_(std::move(status)) {}     // NOLINT: implicit by design
+    Result(T value) : value_(std::move(value)) {}          // NOLINT: implicit by design
+    Result(Status status) : status_(std::move(status)) {}  // NOLINT: implicit by design
 
     bool ok() const { return value_.has_value(); }
     const Status& status() const { return status_; }
@@ -71,8 +71,8 @@ class [[nodiscard]] Result {
     Status status_;
 };
 
-#define LL_RETURN_IF_ERROR(expr)                              \
-    do {                                                      \
+#define LL_RETURN_IF_ERROR(expr)                                                       \
+    do {                                                                               \
         if (::lightloom::Status ll_status = (expr); !ll_status.ok()) return ll_status; \
     } while (false)
 

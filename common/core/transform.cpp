@@ -80,9 +80,7 @@ std::optional<Mat4> look_at(const Vec3& eye, const Vec3& target, const Vec3& up)
         const double len = std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z);
         return D3{v.x / len, v.y / len, v.z / len};
     };
-    const auto crossed = [](D3 a, D3 b) {
-        return D3{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-    };
+    const auto crossed = [](D3 a, D3 b) { return D3{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; };
     const D3 dir = unit({double(target.x) - eye.x, double(target.y) - eye.y, double(target.z) - eye.z});
     const D3 right = unit(crossed(unit({up.x, up.y, up.z}), dir));
     const D3 new_up = crossed(dir, right);

@@ -22,19 +22,16 @@ struct Mat4 {
         return {float(r[0] * inv), float(r[1] * inv), float(r[2] * inv)};
     }
     Vec3 vector(const Vec3& v) const {
-        return {float(m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z),
-                float(m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z),
+        return {float(m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z), float(m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z),
                 float(m[2][0] * v.x + m[2][1] * v.y + m[2][2] * v.z)};
     }
     /// The product with the transpose of the upper 3x3: pass the INVERSE of the point transformation to map normals.
     Vec3 normal_by_inverse(const Vec3& n) const {
-        return {float(m[0][0] * n.x + m[1][0] * n.y + m[2][0] * n.z),
-                float(m[0][1] * n.x + m[1][1] * n.y + m[2][1] * n.z),
+        return {float(m[0][0] * n.x + m[1][0] * n.y + m[2][0] * n.z), float(m[0][1] * n.x + m[1][1] * n.y + m[2][1] * n.z),
                 float(m[0][2] * n.x + m[1][2] * n.y + m[2][2] * n.z)};
     }
     double determinant3() const {
-        return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
-               m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+        return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
                m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
     }
     bool swaps_handedness() const { return determinant3() < 0; }

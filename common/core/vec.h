@@ -38,9 +38,7 @@ constexpr float abs_dot(const Vec3& a, const Vec3& b) {
     const float d = dot(a, b);
     return d < 0 ? -d : d;
 }
-constexpr Vec3 cross(const Vec3& a, const Vec3& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+constexpr Vec3 cross(const Vec3& a, const Vec3& b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 constexpr float length_squared(const Vec3& a) { return dot(a, a); }
 inline float length(const Vec3& a) { return std::sqrt(length_squared(a)); }
 inline Vec3 normalize(const Vec3& a) { return a / length(a); }

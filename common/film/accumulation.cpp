@@ -11,9 +11,7 @@ constexpr double kRange = FixedSums::kRange;
 /// Rounded up a little, so that sums of bounds stay bounds.
 double loosened(double bound) { return bound * (1 + 0x1p-40) + 0x1p-44; }
 
-Status out_of_range() {
-    return data_loss("the light in a pixel adds up to more than 1e25 radiance units; scale the lights down");
-}
+Status out_of_range() { return data_loss("the light in a pixel adds up to more than 1e25 radiance units; scale the lights down"); }
 
 /// Value of one channel of a group or of the whole: camera mean plus splats per light path.
 inline double pixel_value(double camera, uint64_t count, double splat, uint64_t light_paths) {
@@ -91,8 +89,8 @@ Status Accumulation::fold(const GroupSum& group, uint32_t iterations) {
     for (size_t p = 0; p < group.camera_count_.size(); ++p) {
         if (group.camera_count_[p] != expected) {
             return failed_precondition("accumulation: pixel " + std::to_string(p) + " of the group has " +
-                                       std::to_string(group.camera_count_[p]) + " camera samples, not " +
-                                       std::to_string(expected) + "; only complete groups may be folded");
+                                       std::to_string(group.camera_count_[p]) + " camera samples, not " + std::to_string(expected) +
+                                       "; only complete groups may be folded");
         }
     }
     if (camera_bound_ + group.camera_bound_ >= kRange || splat_bound_ + group.splat_bound_ >= kRange) {

@@ -32,7 +32,7 @@ class GroupSum {
     friend class Accumulation;
     FrameLayout frame_;
     FixedSums camera_, splat_;            // 3 per pixel of the crop
-    std::vector<uint64_t> camera_count_;   // samples per pixel
+    std::vector<uint64_t> camera_count_;  // samples per pixel
     uint64_t light_paths_ = 0;
     uint64_t dropped_ = 0;
     double camera_bound_ = 0, splat_bound_ = 0;  // No sum can be larger: sums of the partials' largest magnitudes.

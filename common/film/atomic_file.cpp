@@ -31,8 +31,7 @@ Status write_file_atomically(const std::string& path, std::string_view bytes) {
     const std::string target = none ? path : resolved.string();
     struct stat info {};
     const bool stream = stat(target.c_str(), &info) == 0 && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode);
-    const std::string temporary =
-        stream ? target : target + ".tmp-" + std::to_string(getpid()) + "-" + std::to_string(counter++);
+    const std::string temporary = stream ? target : target + ".tmp-" + std::to_string(getpid()) + "-" + std::to_string(counter++);
     const int file = open(temporary.c_str(), stream ? O_WRONLY | O_CLOEXEC : O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (file < 0) return failure(path, "cannot be written", errno);
     int error = 0;

@@ -74,17 +74,15 @@ Imf::Slice slice_of(Imf::PixelType type, void* data, size_t pixel_bytes, const R
     return Imf::Slice(type, base, pixel_bytes, row_bytes);
 }
 
-Status check_values(const std::vector<float>& values, size_t channels, const Rect& crop, const std::string& what,
-                    bool half_range) {
+Status check_values(const std::vector<float>& values, size_t channels, const Rect& crop, const std::string& what, bool half_range) {
     for (size_t i = 0; i < values.size(); ++i) {
         const float v = values[i];
         if (std::isfinite(v) && !(half_range && std::fabs(v) > 65504.0f)) continue;
         const size_t p = i / channels;
-        const std::string where = "EXR " + what + ": pixel (" + std::to_string(crop.x0 + int(p % size_t(crop.width()))) +
-                                  ", " + std::to_string(crop.y0 + int(p / size_t(crop.width()))) + ")";
+        const std::string where = "EXR " + what + ": pixel (" + std::to_string(crop.x0 + int(p % size_t(crop.width()))) + ", " +
+                                  std::to_string(crop.y0 + int(p / size_t(crop.width()))) + ")";
         if (!std::isfinite(v)) return data_loss(where + " is NaN or infinite");
-        return invalid_argument(where + " is " + std::to_string(v) +
-                                ", beyond the 65504 of half");
+        return invalid_argument(where + " is " + std::to_string(v) + ", beyond the 65504 of half");
     }
     return Status::ok_status();
 }
@@ -133,8 +131,8 @@ Result<std::string> encode_exr(const ExrImage& image, ExrPixelType type) {
         Imf::Header header(display, data, 1.0f, Imath::V2f(0, 0), 1.0f, Imf::INCREASING_Y, Imf::ZIP_COMPRESSION);
         header.zipCompressionLevel() = kZipLevel;
         for (const auto& [name, value] : image.attributes) {
-            if (name.empty() || name.size() > 255 || header.find(name) != header.end() || name == "name" ||
-                name == "type" || name == "version" || name == "chunkCount" || name == "tiles") {
+            if (name.empty() || name.size() > 255 || header.find(name) != header.end() || name == "name" || name == "type" ||
+                name == "version" || name == "chunkCount" || name == "tiles") {
                 return invalid_argument("EXR: \"" + name + "\" cannot be the name of a string attribute");
             }
             header.insert(name, Imf::StringAttribute(value));
@@ -206,8 +204,8 @@ Result<ExrImage> decode_exr(std::string_view bytes, const std::string& name) {
         // Full-frame coordinates begin at the display window's corner.
         const auto relative = [](int value, int origin) { return int64_t(value) - origin; };
         const int64_t x0 = relative(data.min.x, display.min.x), y0 = relative(data.min.y, display.min.y);
-        if (std::max({std::abs(x0), std::abs(y0), relative(display.max.x, display.min.x),
-                      relative(display.max.y, display.min.y)}) > kMaxSide) {
+        if (std::max({std::abs(x0), std::abs(y0), relative(display.max.x, display.min.x), relative(display.max.y, display.min.y)}) >
+            kMaxSide) {
             return refuse("the EXR display window is out of range");
         }
         ExrImage image;
@@ -236,8 +234,7 @@ Result<ExrImage> decode_exr(std::string_view bytes, const std::string& name) {
             }
             if (part_of_color) {
                 const size_t c = channel == "G" ? 1 : (channel == "B" ? 2 : 0);
-                frame_buffer.insert(channel,
-                                    slice_of(Imf::FLOAT, image.color.pixels.data() + c, 3 * sizeof(float), memory));
+                frame_buffer.insert(channel, slice_of(Imf::FLOAT, image.color.pixels.data() + c, 3 * sizeof(float), memory));
             } else {
                 const size_t dot = channel.rfind('.');
                 layers[dot == std::string::npos ? channel : channel.substr(0, dot)].push_back(channel);
@@ -252,8 +249,8 @@ Result<ExrImage> decode_exr(std::string_view bytes, const std::string& name) {
             ImageLayer& layer = image.layers.emplace_back();
             layer = {layer_name, letters, std::vector<float>(area * letters.size())};
             for (size_t c = 0; c < names.size(); ++c) {
-                frame_buffer.insert(names[c], slice_of(Imf::FLOAT, layer.pixels.data() + c,
-                                                       letters.size() * sizeof(float), memory));
+                frame_buffer.insert(names[c],
+                                    slice_of(Imf::FLOAT, layer.pixels.data() + c, letters.size() * sizeof(float), memory));
             }
         }
         file.setFrameBuffer(frame_buffer);

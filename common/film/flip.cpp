@@ -20,9 +20,8 @@ struct Triple {
 
 // Linear sRGB to XYZ (IEC 61966-2-1, D65) and its inverse. The illuminant is the XYZ of RGB white, so that greys have no
 // chroma to the last digit.
-constexpr double kToXyz[3][3] = {{0.4124564, 0.3575761, 0.1804375},
-                                 {0.2126729, 0.7151522, 0.0721750},
-                                 {0.0193339, 0.1191920, 0.9503041}};
+constexpr double kToXyz[3][3] = {
+    {0.4124564, 0.3575761, 0.1804375}, {0.2126729, 0.7151522, 0.0721750}, {0.0193339, 0.1191920, 0.9503041}};
 constexpr Triple kWhite{kToXyz[0][0] + kToXyz[0][1] + kToXyz[0][2], kToXyz[1][0] + kToXyz[1][1] + kToXyz[1][2],
                         kToXyz[2][0] + kToXyz[2][1] + kToXyz[2][2]};
 
@@ -92,11 +91,11 @@ inline double hyab(Triple a, Triple b) {
     return std::fabs(a.x - b.x) + std::sqrt(da * da + db * db);
 }
 
-constexpr double kColorExponent = 0.7;    // q_c
-constexpr double kColorSplit = 0.4;       // p_c
+constexpr double kColorExponent = 0.7;     // q_c
+constexpr double kColorSplit = 0.4;        // p_c
 constexpr double kColorSplitValue = 0.95;  // p_t
-constexpr double kFeatureExponent = 0.5;  // q_f
-constexpr double kFeatureWidth = 0.082;   // w, in degrees
+constexpr double kFeatureExponent = 0.5;   // q_f
+constexpr double kFeatureWidth = 0.082;    // w, in degrees
 
 /// Maps the powered colour distance to [0, 1], most of the range for distances below 40 % of the largest
 /// [A20, sec. 4.1.3].
@@ -226,8 +225,8 @@ std::vector<float> difference(const Appearance& a, const Appearance& b) {
     std::vector<float> map(a.color.size());
     for (size_t i = 0; i < map.size(); ++i) {
         const double color = kColorError(hyab(a.color[i], b.color[i]));
-        const double feature = std::max(std::fabs(a.edge.values[i] - b.edge.values[i]),
-                                        std::fabs(a.point.values[i] - b.point.values[i]));
+        const double feature =
+            std::max(std::fabs(a.edge.values[i] - b.edge.values[i]), std::fabs(a.point.values[i] - b.point.values[i]));
         // [A20, sec. 4.2]: a difference of sqrt(2) is the largest.
         static_assert(kFeatureExponent == 0.5);
         const double feature_error = std::min(1.0, std::sqrt(feature * 0.70710678118654752440));

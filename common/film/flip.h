@@ -16,11 +16,10 @@ inline constexpr double kFlipPixelsPerDegree = 67;
 
 /// Error per pixel in [0, 1], row-major. Both images are linear RGB and are clamped to [0, 1] first. Images are of equal
 /// size and finite.
-std::vector<float> ldr_flip(const RgbImage& image, const RgbImage& reference,
-                            double pixels_per_degree = kFlipPixelsPerDegree);
+std::vector<float> ldr_flip(const RgbImage& image, const RgbImage& reference, double pixels_per_degree = kFlipPixelsPerDegree);
 
 struct HdrFlip {
-    std::vector<float> map;                     ///< Maximum over the exposures of the LDR-FLIP of the tone-mapped images.
+    std::vector<float> map;                        ///< Maximum over the exposures of the LDR-FLIP of the tone-mapped images.
     double start_exposure = 0, stop_exposure = 0;  ///< In stops, found from the reference alone.
     int exposures = 0;
 };

@@ -143,9 +143,8 @@ Result<std::vector<RegionRatio>> region_ratios(const RgbImage& image, const RgbI
 Status check_comparable(const ExrImage& image, const ExrImage& reference) {
     if (image.frame == reference.frame) return Status::ok_status();
     const auto describe = [](const FrameLayout& f) {
-        return std::to_string(f.width) + " x " + std::to_string(f.height) + " pixels with window [" +
-               std::to_string(f.crop.x0) + "," + std::to_string(f.crop.x1) + ") x [" + std::to_string(f.crop.y0) + "," +
-               std::to_string(f.crop.y1) + ")";
+        return std::to_string(f.width) + " x " + std::to_string(f.height) + " pixels with window [" + std::to_string(f.crop.x0) +
+               "," + std::to_string(f.crop.x1) + ") x [" + std::to_string(f.crop.y0) + "," + std::to_string(f.crop.y1) + ")";
     };
     return invalid_argument("the images do not match: " + describe(image.frame) + ", but the reference has " +
                             describe(reference.frame));

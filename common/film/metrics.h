@@ -22,18 +22,18 @@ struct Metrics {
     /// relMSE over what is left after the largest `trim_percent` percent of its terms (rounded down) were dropped.
     double relmse_trimmed = 0;
     double trim_percent = 0;
-    double rmse = 0;    ///< sqrt of the mean of (x - r)^2.
-    double srrmse = 0;  ///< sqrt of the mean of [(x - r) / ((|x| + |r|) / 2)]^2 with 0/0 = 0; at most 2.
-    double ssim = 0;    ///< See ssim(). 1 for equal images.
-    double flip = 0;    ///< Mean of ldr_flip() at 67 pixels per degree. 0 for equal images, at most 1.
-    double hdr_flip = 0;      ///< Mean of hdr_flip() at 67 pixels per degree.
-    double mean_ratio = 0;    ///< sum x / sum r over all pixels and channels: a sign of bias. 1 if both sums are 0.
+    double rmse = 0;        ///< sqrt of the mean of (x - r)^2.
+    double srrmse = 0;      ///< sqrt of the mean of [(x - r) / ((|x| + |r|) / 2)]^2 with 0/0 = 0; at most 2.
+    double ssim = 0;        ///< See ssim(). 1 for equal images.
+    double flip = 0;        ///< Mean of ldr_flip() at 67 pixels per degree. 0 for equal images, at most 1.
+    double hdr_flip = 0;    ///< Mean of hdr_flip() at 67 pixels per degree.
+    double mean_ratio = 0;  ///< sum x / sum r over all pixels and channels: a sign of bias. 1 if both sums are 0.
     std::array<double, 3> mean_image{}, mean_reference{};  ///< Per channel.
 };
 
 /// One cell of a grid laid over the image.
 struct RegionRatio {
-    Rect rect;  ///< Relative to the image's corner.
+    Rect rect;                                  ///< Relative to the image's corner.
     double mean_image = 0, mean_reference = 0;  ///< Over pixels and channels.
     double ratio = 0;                           ///< As Metrics::mean_ratio.
 };

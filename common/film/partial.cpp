@@ -48,8 +48,8 @@ Result<PartialBounds> check_partial(const Partial& partial, const FrameLayout& f
     int64_t splat_bits = 0;
     for (const SplatSum& splat : partial.splats) {
         if (splat.pixel < next || splat.pixel >= crop_area) {
-            return data_loss("partial: splat pixel " + std::to_string(splat.pixel) +
-                             " is out of order or outside the crop of " + std::to_string(crop_area) + " pixels");
+            return data_loss("partial: splat pixel " + std::to_string(splat.pixel) + " is out of order or outside the crop of " +
+                             std::to_string(crop_area) + " pixels");
         }
         next = uint64_t(splat.pixel) + 1;
         const int64_t bits = largest_magnitude_bits(splat.rgb.data(), 3);

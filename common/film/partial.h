@@ -31,8 +31,8 @@ struct DroppedSample {
 struct UnitCounters {
     uint64_t camera_samples = 0;
     uint64_t light_paths = 0;
-    uint64_t rays = 0;      ///< Closest-hit and shadow rays together.
-    uint64_t vertices = 0;  ///< Surface vertices created by both kinds of walk.
+    uint64_t rays = 0;         ///< Closest-hit and shadow rays together.
+    uint64_t vertices = 0;     ///< Surface vertices created by both kinds of walk.
     uint64_t connections = 0;  ///< Connections (next event included) whose visibility was tested.
 
     UnitCounters& operator+=(const UnitCounters& o) {
@@ -46,12 +46,12 @@ struct UnitCounters {
 };
 
 struct Partial {
-    Rect tile;                        ///< Pixels that `camera` covers, full-frame coordinates.
-    uint32_t samples_per_pixel = 0;   ///< Camera samples in each pixel of the tile (= iterations of the unit).
-    std::vector<double> camera;       ///< 3 * tile.area(), row-major, RGB interleaved: sums of camera samples.
-    uint64_t light_paths = 0;         ///< Light paths whose splats are in `splats` (also those that hit nothing).
-    std::vector<SplatSum> splats;     ///< Ascending by pixel, no pixel twice.
-    uint64_t dropped_count = 0;       ///< Non-finite samples dropped.
+    Rect tile;                           ///< Pixels that `camera` covers, full-frame coordinates.
+    uint32_t samples_per_pixel = 0;      ///< Camera samples in each pixel of the tile (= iterations of the unit).
+    std::vector<double> camera;          ///< 3 * tile.area(), row-major, RGB interleaved: sums of camera samples.
+    uint64_t light_paths = 0;            ///< Light paths whose splats are in `splats` (also those that hit nothing).
+    std::vector<SplatSum> splats;        ///< Ascending by pixel, no pixel twice.
+    uint64_t dropped_count = 0;          ///< Non-finite samples dropped.
     std::vector<DroppedSample> dropped;  ///< The first of them, at most kMaxDroppedRecords.
     UnitCounters counters;
 

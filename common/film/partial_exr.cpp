@@ -159,8 +159,7 @@ bool is_zero(const std::array<double, 3>& rgb) { return rgb[0] == 0 && rgb[1] ==
 Status check_frame(const FrameLayout& frame, const Rect& tile) {
     const Rect& crop = frame.crop;
     constexpr int64_t kMaxPixels = kMaxPartialPixels;  // part of every bound below
-    if (crop.empty() || crop.x0 < 0 || crop.y0 < 0 || crop.x1 > frame.width || crop.y1 > frame.height ||
-        crop.area() > kMaxPixels) {
+    if (crop.empty() || crop.x0 < 0 || crop.y0 < 0 || crop.x1 > frame.width || crop.y1 > frame.height || crop.area() > kMaxPixels) {
         return invalid_argument("partial: the crop window is empty, outside the frame or larger than " +
                                 std::to_string(kMaxPixels) + " pixels");
     }
@@ -242,8 +241,8 @@ Result<Partial> decode_partial(const PartialExpectation& expected, const Partial
                          std::to_string(expected.samples_per_pixel) + " and " + std::to_string(expected.light_paths));
     }
     if (d.splat_count > crop_area) {
-        return data_loss("partial: declares " + std::to_string(d.splat_count) + " splat sums for " +
-                         std::to_string(crop_area) + " pixels");
+        return data_loss("partial: declares " + std::to_string(d.splat_count) + " splat sums for " + std::to_string(crop_area) +
+                         " pixels");
     }
     const Layout layout = make_layout(expected.frame, expected.tile, d.splat_count);
     if (payload.size() != layout.size || d.payload_size != layout.size) {
@@ -301,8 +300,8 @@ Result<Partial> decode_partial(const PartialExpectation& expected, const Partial
                 if (partial.splats.size() == d.splat_count) {
                     return data_loss("partial: more splat sums than the declared " + std::to_string(d.splat_count));
                 }
-                const uint32_t pixel = how == SplatLayout::kSparse ? load(from + (kPlanes * count + i) * 4)
-                                                                   : uint32_t(size_t(line) * count + i);
+                const uint32_t pixel =
+                    how == SplatLayout::kSparse ? load(from + (kPlanes * count + i) * 4) : uint32_t(size_t(line) * count + i);
                 partial.splats.push_back({pixel, value});
             }
         }

@@ -56,7 +56,6 @@ Result<EncodedPartial> encode_partial(const Partial& partial, const FrameLayout&
 
 /// Safe on any bytes: kDataLoss, naming what differs, unless the payload is exactly what encode_partial() makes for the
 /// expected unit.
-Result<Partial> decode_partial(const PartialExpectation& expected, const PartialDescriptor& descriptor,
-                               std::string_view payload);
+Result<Partial> decode_partial(const PartialExpectation& expected, const PartialDescriptor& descriptor, std::string_view payload);
 
 }  // namespace lightloom

@@ -37,13 +37,9 @@ Result<std::string> encode(int width, int height, const uint8_t* rgb) {
 
 }  // namespace
 
-double srgb_encode(double linear) {
-    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * math::pow(linear, 1 / 2.4) - 0.055;
-}
+double srgb_encode(double linear) { return linear <= 0.0031308 ? 12.92 * linear : 1.055 * math::pow(linear, 1 / 2.4) - 0.055; }
 
-double srgb_decode(double encoded) {
-    return encoded <= 0.04045 ? encoded / 12.92 : math::pow((encoded + 0.055) / 1.055, 2.4);
-}
+double srgb_decode(double encoded) { return encoded <= 0.04045 ? encoded / 12.92 : math::pow((encoded + 0.055) / 1.055, 2.4); }
 
 uint8_t srgb_code(float linear) {
     static const std::array<float, 255> kThresholds = make_thresholds();

@@ -31,8 +31,7 @@ Estimate WeightedMean::estimate() const {
     return {mean_, moment_ / (double(count_ - 1) * weight_), double(count_ - 1)};
 }
 
-RegionMeans::RegionMeans(int columns, int rows)
-    : columns_(columns), rows_(rows), means_(size_t(1 + columns * rows)) {}
+RegionMeans::RegionMeans(int columns, int rows) : columns_(columns), rows_(rows), means_(size_t(1 + columns * rows)) {}
 
 void RegionMeans::add(const RgbImage& group, double weight) {
     const std::vector<double> means = luminance_means(group, columns_, rows_);
@@ -73,8 +72,8 @@ RatioInterval ratio_interval(const Estimate& image, const Estimate& reference, d
     if (!(variance < kInfinity)) return {ratio, -kInfinity, kInfinity};
     double half = kFloatResolution * std::max(1.0, std::fabs(ratio));
     if (variance > 0) {
-        const double degrees = variance * variance / (from_image * from_image / image.degrees +
-                                                      from_reference * from_reference / reference.degrees);
+        const double degrees =
+            variance * variance / (from_image * from_image / image.degrees + from_reference * from_reference / reference.degrees);
         half += student_quantile(level, degrees) * std::sqrt(variance) / std::fabs(reference.mean);
     }
     return {ratio, ratio - half, ratio + half};

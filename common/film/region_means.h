@@ -13,7 +13,7 @@ namespace lightloom {
 /// A mean and what is known of its error.
 struct Estimate {
     double mean = 0;
-    double variance = 0;  ///< Of the mean.
+    double variance = 0;                                       ///< Of the mean.
     double degrees = std::numeric_limits<double>::infinity();  ///< Of freedom of the variance.
 
     double standard_error() const;

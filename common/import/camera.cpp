@@ -30,8 +30,9 @@ void check_camera(const ParameterList& p, const PerspectiveCamera& camera) {
     if (camera.lens_radius > 0) {
         const double radius = camera.lens_radius * scale, focus = camera.focal_distance * scale;
         if (!usable(radius) || !usable(focus) || radius > kSteepest * focus)
-            fail(p.where(), p.what() + ": lensradius and focaldistance must lie between 1e-15 and 1e15, and lensradius must not "
-                                       "exceed a million times focaldistance; set lensradius to 0 for a pinhole");
+            fail(p.where(), p.what() +
+                                ": lensradius and focaldistance must lie between 1e-15 and 1e15, and lensradius must not "
+                                "exceed a million times focaldistance; set lensradius to 0 for a pinhole");
     }
     // The image on a plane at distance 1, of a square film if nothing here says more.
     double x[2] = {-1, 1}, y[2] = {-1, 1};
@@ -45,10 +46,10 @@ void check_camera(const ParameterList& p, const PerspectiveCamera& camera) {
     const double half = math::tan(double(camera.fov_degrees) * (kPiD / 360));
     constexpr double kNarrowest = 1e-9;
     for (const double* side : {x, y})
-        if (!(std::fmax(std::fabs(side[0]), std::fabs(side[1])) * half <= kSteepest) ||
-            !((side[1] - side[0]) * half >= kNarrowest))
-            fail(p.where(), p.what() + ": fov, screenwindow and frameaspectratio give a picture that is wider than a million "
-                                       "times or narrower than 1e-9 times its distance; correct them");
+        if (!(std::fmax(std::fabs(side[0]), std::fabs(side[1])) * half <= kSteepest) || !((side[1] - side[0]) * half >= kNarrowest))
+            fail(p.where(), p.what() +
+                                ": fov, screenwindow and frameaspectratio give a picture that is wider than a million "
+                                "times or narrower than 1e-9 times its distance; correct them");
 }
 
 /// "pixelbounds" or "cropwindow", whether there is one. pbrt-v4 turns inverted ranges round and cuts what lies outside; those
@@ -72,8 +73,7 @@ bool read_crop(const ParameterList& p, FilmDescription* film) {
     }
     for (size_t i = 0; i < 4; i += 2) {
         const std::string axis = i == 0 ? "x" : "y";
-        if (crop.numbers[i] > crop.numbers[i + 1])
-            refuse("has " + axis + "0 above " + axis + "1; its order is x0 x1 y0 y1");
+        if (crop.numbers[i] > crop.numbers[i + 1]) refuse("has " + axis + "0 above " + axis + "1; its order is x0 x1 y0 y1");
         if (film->crop[i] == film->crop[i + 1]) refuse("is empty: no pixel lies between " + axis + "0 and " + axis + "1");
     }
     return true;
@@ -99,8 +99,7 @@ void set_camera(Context* context, const std::string& kind, const ParameterList& 
         if (window->size() != 4) fail(p.where(), p.what() + ": screenwindow needs four numbers");
         camera.has_screen_window = true;
         for (size_t i = 0; i < 4; ++i) camera.screen_window[i] = float((*window)[i]);
-        if (!(camera.screen_window[0] < camera.screen_window[1]) ||
-            !(camera.screen_window[2] < camera.screen_window[3]))
+        if (!(camera.screen_window[0] < camera.screen_window[1]) || !(camera.screen_window[2] < camera.screen_window[3]))
             fail(p.where(), p.what() + ": screenwindow must be x0 < x1, y0 < y1");
     }
     check_camera(p, camera);
@@ -131,8 +130,7 @@ void set_film(Context* context, const std::string& kind, const ParameterList& p)
     if (!(context->iso > 0)) fail(p.where(), p.what() + ": iso must be positive");
     const std::string sensor = p.one_string("sensor", "cie1931");
     if (sensor != "cie1931")
-        fail(p.where(),
-             p.what() + ": the sensor " + quoted(sensor) + " is not supported; use \"cie1931\" or remove it");
+        fail(p.where(), p.what() + ": the sensor " + quoted(sensor) + " is not supported; use \"cie1931\" or remove it");
     if (p.one_float("whitebalance", 0) != 0) fail(p.where(), p.what() + ": whitebalance is not supported; remove it");
     p.ignore(&context->diagnostics, "diagonal", "it matters only for cameras with real lenses");
     p.ignore(&context->diagnostics, "savefp16", "the output's precision is the command line's business");
@@ -141,14 +139,13 @@ void set_film(Context* context, const std::string& kind, const ParameterList& p)
 
 void set_pixel_filter(Context* context, const std::string& kind, const ParameterList& p) {
     constexpr std::array<std::string_view, 5> kKinds{"box", "gaussian", "mitchell", "sinc", "triangle"};
-    if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end())
-        fail(p.where(), p.what() + " is unknown; use \"box\"");
+    if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end()) fail(p.where(), p.what() + " is unknown; use \"box\"");
     context->has_pixel_filter = true;
     if (kind == "box") {
         const float x = p.one_float("xradius", 0.5f), y = p.one_float("yradius", 0.5f);
         if (x != 0.5f || y != 0.5f)
-            context->diagnostics.warn(
-                p.where(), p.what() + ": a radius other than 0.5 is ignored; the picture is a little sharper");
+            context->diagnostics.warn(p.where(),
+                                      p.what() + ": a radius other than 0.5 is ignored; the picture is a little sharper");
         return;
     }
     for (const std::string_view name : {"xradius", "yradius"}) p.accept("float", name);
@@ -156,15 +153,13 @@ void set_pixel_filter(Context* context, const std::string& kind, const Parameter
     if (kind == "sinc") p.accept("float", "tau");
     if (kind == "mitchell")
         for (const std::string_view name : {"B", "C"}) p.accept("float", name);
-    context->diagnostics.warn(p.where(),
-                              p.what() + " is replaced by a box of radius 0.5; the picture is a little sharper");
+    context->diagnostics.warn(p.where(), p.what() + " is replaced by a box of radius 0.5; the picture is a little sharper");
 }
 
 void set_sampler(Context* context, const std::string& kind, const ParameterList& p) {
     constexpr std::array<std::string_view, 7> kKinds{"halton",     "sobol",       "paddedsobol", "zsobol",
                                                      "stratified", "independent", "pmj02bn"};
-    if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end())
-        fail(p.where(), p.what() + " is unknown; use \"halton\"");
+    if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end()) fail(p.where(), p.what() + " is unknown; use \"halton\"");
     int64_t samples = 0;
     if (kind == "stratified") {
         const int x = p.one_int("xsamples", 4), y = p.one_int("ysamples", 4);
@@ -194,12 +189,11 @@ void set_integrator(Context* context, const std::string& kind, const ParameterLi
         context->diagnostics.warn(p.where(), p.what() + ": a maxdepth above " + std::to_string(kMaxDepth) + " becomes that");
     context->scene.max_depth = std::min(depth, kMaxDepth);
     if (p.one_bool("regularize", false))
-        context->diagnostics.warn(p.where(),
-                                  p.what() + ": regularize is ignored, it would blur the picture's glossy light");
+        context->diagnostics.warn(p.where(), p.what() + ": regularize is ignored, it would blur the picture's glossy light");
     const std::string reason = "algorithm and parameters come from the command line";
     for (const std::string_view name :
-         {"lightsampler", "samplelights", "samplebsdf", "visualizestrategies", "visualizeweights", "bootstrapsamples",
-          "chains", "mutationsperpixel", "largestepprobability", "sigma", "photonsperiteration", "radius", "seed"})
+         {"lightsampler", "samplelights", "samplebsdf", "visualizestrategies", "visualizeweights", "bootstrapsamples", "chains",
+          "mutationsperpixel", "largestepprobability", "sigma", "photonsperiteration", "radius", "seed"})
         p.ignore(&context->diagnostics, name, reason);
 }
 

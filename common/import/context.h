@@ -52,10 +52,10 @@ struct AreaLightDefinition {
 struct PendingShape {
     std::variant<TriangleMesh, Sphere> geometry;
     std::vector<uint32_t> faces;  ///< As make_shape() gives them; empty if nothing asks for them.
-    int32_t object = kNone;  ///< Index into SceneDescription::objects, or kNone.
+    int32_t object = kNone;       ///< Index into SceneDescription::objects, or kNone.
     MaterialReference material;
     std::shared_ptr<const AreaLightDefinition> area_light;  ///< Null if the shape does not emit.
-    bool is_scaled_quadric = false;  ///< A sphere or disk that its transformation makes larger or smaller.
+    bool is_scaled_quadric = false;                         ///< A sphere or disk that its transformation makes larger or smaller.
     float alpha = 1;
     std::string alpha_texture;  ///< Empty if the shape has none.
     Location where;
@@ -78,7 +78,9 @@ enum class TextureUse { kFloat, kReflectance, kUnbounded };
 
 struct Context {
     Context(FileSource* source, const ImportOptions& import_options)
-        : files(source), options(import_options), diagnostics(import_options.strict) {}
+        : files(source),
+          options(import_options),
+          diagnostics(import_options.strict) {}
 
     FileSource* files;
     ImportOptions options;
@@ -97,11 +99,11 @@ struct Context {
     std::map<std::tuple<float, float, float>, TextureId> constants;
     std::map<std::string, int32_t> image_index;  ///< By file, encoding and channel choice.
     std::map<std::tuple<float, float, float, bool>, int32_t> emission_index;
-    std::vector<TextureCost> texture_costs;     ///< One per scene texture.
-    std::vector<TextureRange> texture_ranges;   ///< The same.
+    std::vector<TextureCost> texture_costs;        ///< One per scene texture.
+    std::vector<TextureRange> texture_ranges;      ///< The same.
     std::map<int32_t, TextureRange> image_ranges;  ///< Of the one-channel images of textures, by their index.
-    std::map<MaterialId, int> mix_levels;       ///< Of mix materials; others have none.
-    int texture_depth = 0, material_depth = 0;  ///< Of the definitions being resolved.
+    std::map<MaterialId, int> mix_levels;          ///< Of mix materials; others have none.
+    int texture_depth = 0, material_depth = 0;     ///< Of the definitions being resolved.
 
     float exposure_time = 1, iso = 100;
     bool has_pixel_filter = false;
@@ -122,8 +124,7 @@ TextureId named_texture(Context* context, const Location& where, const std::stri
 TextureId float_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name);
 
 /// Parameter `name` as "rgb", "spectrum" or "texture"; kNone if absent. Not kFloat.
-TextureId spectrum_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name,
-                                     TextureUse use);
+TextureId spectrum_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name, TextureUse use);
 
 /// Parameter `name` of type "spectrum" read from its values or file; nothing if absent.
 std::optional<Spectrum> spectrum_parameter(Context* context, const ParameterList& parameters, std::string_view name);
@@ -143,8 +144,7 @@ AreaEmission area_emission(Context* context, const AreaLightDefinition& definiti
 bool area_light_uses_power(const AreaLightDefinition& definition);
 
 // camera.cpp
-void set_camera(Context* context, const std::string& kind, const ParameterList& parameters,
-                const Mat4& camera_to_world);
+void set_camera(Context* context, const std::string& kind, const ParameterList& parameters, const Mat4& camera_to_world);
 void set_film(Context* context, const std::string& kind, const ParameterList& parameters);
 void set_pixel_filter(Context* context, const std::string& kind, const ParameterList& parameters);
 void set_sampler(Context* context, const std::string& kind, const ParameterList& parameters);
@@ -159,9 +159,8 @@ struct ShapeState {
 };
 /// The shape's geometry. `*faces` says for every triangle of a mesh which of pbrt's shapes it is a part of, as ascending
 /// numbers without gaps; it is empty if every triangle is a shape of its own.
-std::variant<TriangleMesh, Sphere> make_shape(Context* context, const std::string& kind,
-                                              const ParameterList& parameters, const ShapeState& state,
-                                              std::vector<uint32_t>* faces);
+std::variant<TriangleMesh, Sphere> make_shape(Context* context, const std::string& kind, const ParameterList& parameters,
+                                              const ShapeState& state, std::vector<uint32_t>* faces);
 
 // resolve.cpp
 /// Resolves all references and moves the shapes into the scene.

@@ -9,9 +9,7 @@ std::string Location::text() const {
     return line > 0 ? name + ":" + std::to_string(line) : name;
 }
 
-void fail(const Location& where, const std::string& what) {
-    throw ImportFailure{invalid_argument(where.text() + ": " + what)};
-}
+void fail(const Location& where, const std::string& what) { throw ImportFailure{invalid_argument(where.text() + ": " + what)}; }
 
 std::string quoted(const std::string& text) {
     constexpr size_t kLongest = 80;

@@ -10,8 +10,8 @@
 namespace lightloom::import {
 namespace {
 
-constexpr std::string_view kAreaLightParameters[] = {
-    "rgb L", "blackbody L", "spectrum L", "float scale", "float power", "bool twosided", "string filename"};
+constexpr std::string_view kAreaLightParameters[] = {"rgb L",       "blackbody L",   "spectrum L",     "float scale",
+                                                     "float power", "bool twosided", "string filename"};
 
 std::string read_name(Tokenizer* tokens, const Location& where, const std::string& word) {
     const Token token = tokens->next();
@@ -63,8 +63,7 @@ void Parser::option(Tokenizer* tokens, const Location& where) {
 }
 
 bool Parser::global_option(Tokenizer* tokens, const std::string& word, const Location& where) {
-    constexpr std::array<std::string_view, 6> kWords{"Camera",  "Film",       "PixelFilter",
-                                                     "Sampler", "Integrator", "Accelerator"};
+    constexpr std::array<std::string_view, 6> kWords{"Camera", "Film", "PixelFilter", "Sampler", "Integrator", "Accelerator"};
     if (std::find(kWords.begin(), kWords.end(), word) == kWords.end()) return false;
     require_world(where, word, false);
     const std::string kind = read_name(tokens, where, word);
@@ -116,8 +115,7 @@ bool Parser::world_item(Tokenizer* tokens, const std::string& word, const Locati
     } else if (word == "AreaLightSource") {
         require_world(where, word, true);
         const std::string kind = read_name(tokens, where, word);
-        if (kind != "diffuse")
-            fail(where, "AreaLightSource " + quoted(kind) + " is not supported; the only kind is \"diffuse\"");
+        if (kind != "diffuse") fail(where, "AreaLightSource " + quoted(kind) + " is not supported; the only kind is \"diffuse\"");
         ParameterList list = parameters(tokens, where, word, kind, "light");
         // Now, not when a shape emits: none might.
         list.check(kAreaLightParameters);
@@ -169,8 +167,7 @@ void Parser::shape(Tokenizer* tokens, const Location& where) {
     pending.object = current_object_;
     pending.area_light = state_.area_light;
     if (pending.area_light && current_object_ != kNone) {
-        context_->diagnostics.warn(
-            where, "an area light inside an object instance is ignored, as in pbrt: its shapes do not emit");
+        context_->diagnostics.warn(where, "an area light inside an object instance is ignored, as in pbrt: its shapes do not emit");
         pending.area_light = nullptr;
     }
     if (const Parameter* p = list.find("texture", "alpha")) {
@@ -205,8 +202,7 @@ void Parser::object_instance(Tokenizer* tokens, const Location& where) {
     require_world(where, "ObjectInstance", true);
     const std::string name = read_name(tokens, where, "ObjectInstance");
     if (current_object_ != kNone)
-        fail(where,
-             "ObjectInstance inside ObjectBegin: nested instances are not supported; place the inner object outside");
+        fail(where, "ObjectInstance inside ObjectBegin: nested instances are not supported; place the inner object outside");
     instances_.push_back({name, static_transform(where, "the instance"), where});
 }
 

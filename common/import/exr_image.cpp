@@ -84,8 +84,7 @@ Status check_image_size(uint64_t width, uint64_t height, uint64_t channels, uint
         return invalid_argument("the image claims " + claim + " pixels; sides from 1 to 16384 are supported");
     // No supported compression shrinks data further than this.
     if (width * height * channels > file_bytes * kMaxExpansion)
-        return data_loss("the image claims " + claim + " pixels, which its " + std::to_string(file_bytes) +
-                         " bytes cannot hold");
+        return data_loss("the image claims " + claim + " pixels, which its " + std::to_string(file_bytes) + " bytes cannot hold");
     return {};
 }
 
@@ -109,8 +108,8 @@ Result<ExrPixels> read_exr(const std::string& bytes, ExrChannels channels) try {
     for (const std::string& name : names)
         if (list[name.c_str()].xSampling != 1 || list[name.c_str()].ySampling != 1)
             return invalid_argument("the EXR image has sub-sampled channels, which are not supported");
-    LL_RETURN_IF_ERROR(check_image_size(uint64_t(std::max<int64_t>(width, 0)), uint64_t(std::max<int64_t>(height, 0)),
-                                        names.size(), bytes.size()));
+    LL_RETURN_IF_ERROR(check_image_size(uint64_t(std::max<int64_t>(width, 0)), uint64_t(std::max<int64_t>(height, 0)), names.size(),
+                                        bytes.size()));
     if (channels == ExrChannels::kFirstThree && names.size() >= 3) {
         auto channel = list.begin();
         for (std::string& name : names) name = (channel++).name();
@@ -118,8 +117,9 @@ Result<ExrPixels> read_exr(const std::string& bytes, ExrChannels channels) try {
     }
     const std::optional<ExrPrimaries> primaries = primaries_of(file.header());
     if (!primaries && names.size() >= 3)
-        return invalid_argument("the EXR image's chromaticities are not those of sRGB, Display P3 or Rec. 2020; convert it to "
-                                "sRGB's primaries");
+        return invalid_argument(
+            "the EXR image's chromaticities are not those of sRGB, Display P3 or Rec. 2020; convert it to "
+            "sRGB's primaries");
     ExrPixels out;
     if (primaries) out.primaries = *primaries;
     out.width = int(width);

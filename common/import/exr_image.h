@@ -17,7 +17,7 @@ Rgb luminance_weights(ExrPrimaries primaries);
 
 struct ExrPixels {
     int width = 0, height = 0;
-    int channels = 0;           ///< 1 (Y or a single channel), 3 (R, G, B, or the first three) or 4 (with A).
+    int channels = 0;  ///< 1 (Y or a single channel), 3 (R, G, B, or the first three) or 4 (with A).
     ExrPrimaries primaries = ExrPrimaries::kRec709;
     std::vector<float> values;  ///< Row 0 at the top.
 };

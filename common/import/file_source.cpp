@@ -37,8 +37,7 @@ Result<std::string> DirectorySource::read_bytes(const std::string& name) {
 
 Result<std::string> MemorySource::read_bytes(const std::string& name) {
     const auto it = contents_.find(name);
-    if (it == contents_.end())
-        return not_found("cannot open " + quoted(name) + ": no such file below the scene's directory");
+    if (it == contents_.end()) return not_found("cannot open " + quoted(name) + ": no such file below the scene's directory");
     return it->second;
 }
 
@@ -47,8 +46,7 @@ Result<std::string> normalise_reference(std::string_view reference) {
     if (reference.empty()) return invalid_argument("the file name is empty");
     if (reference.front() == '/')
         return invalid_argument("the file name " + shown + " is absolute; use a path below the scene file's directory");
-    if (reference.find('\0') != std::string_view::npos)
-        return invalid_argument("the file name " + shown + " contains a zero byte");
+    if (reference.find('\0') != std::string_view::npos) return invalid_argument("the file name " + shown + " contains a zero byte");
     std::vector<std::string_view> parts;
     size_t begin = 0;
     while (begin <= reference.size()) {
@@ -56,9 +54,8 @@ Result<std::string> normalise_reference(std::string_view reference) {
         const std::string_view part = reference.substr(begin, end - begin);
         if (part == "..") {
             if (parts.empty())
-                return invalid_argument(
-                    "the file name " + shown +
-                    " leaves the scene file's directory; move the file below it, or a worker could not get it");
+                return invalid_argument("the file name " + shown +
+                                        " leaves the scene file's directory; move the file below it, or a worker could not get it");
             parts.pop_back();
         } else if (!part.empty() && part != ".") {
             parts.push_back(part);
@@ -104,8 +101,7 @@ Result<std::string> inflate_gzip(const std::string& bytes, uint64_t max_bytes) {
         const int code = inflate(&stream, Z_NO_FLUSH);
         const size_t produced = chunk.size() - stream.avail_out;
         if (out.size() + produced > max_bytes)
-            return invalid_argument("the gzip data expand to more than the limit of " + std::to_string(max_bytes) +
-                                    " bytes");
+            return invalid_argument("the gzip data expand to more than the limit of " + std::to_string(max_bytes) + " bytes");
         out.append(chunk.data(), produced);
         if (code == Z_STREAM_END) {
             const bool done = stream.avail_in == 0 && consumed == bytes.size();

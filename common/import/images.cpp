@@ -96,8 +96,7 @@ void fill(Image* image, const T* raw, int channels, bool has_alpha, const ImageR
 void to_srgb_primaries(ExrPrimaries from, Image* image, bool* clipped) {
     if (from == ExrPrimaries::kRec709) return;
     // Both have the white D65 (SMPTE EG 432-1, ITU-R BT.2020).
-    constexpr double kP3[3][3] = {
-        {1.2249402, -0.2249402, 0.0}, {-0.0420569, 1.0420569, 0.0}, {-0.0196376, -0.0786361, 1.0982736}};
+    constexpr double kP3[3][3] = {{1.2249402, -0.2249402, 0.0}, {-0.0420569, 1.0420569, 0.0}, {-0.0196376, -0.0786361, 1.0982736}};
     constexpr double kRec2020[3][3] = {
         {1.6604910, -0.5876411, -0.0728499}, {-0.1245505, 1.1328999, -0.0083494}, {-0.0181508, -0.1005789, 1.1187297}};
     const auto& m = from == ExrPrimaries::kDisplayP3 ? kP3 : kRec2020;
@@ -135,8 +134,7 @@ Result<Image> read_with_stb(const std::string& bytes, const ImageRequest& reques
     int channels = 0;
     if (!stbi_info_from_memory(data, size, &image.width, &image.height, &channels))
         return invalid_argument(std::string("the image cannot be decoded: ") + stbi_failure_reason());
-    LL_RETURN_IF_ERROR(
-        check_image_size(uint64_t(image.width), uint64_t(image.height), uint64_t(channels), bytes.size()));
+    LL_RETURN_IF_ERROR(check_image_size(uint64_t(image.width), uint64_t(image.height), uint64_t(channels), bytes.size()));
     const auto failed = [] { return data_loss(std::string("the image is damaged: ") + stbi_failure_reason()); };
     if (stbi_is_hdr_from_memory(data, size)) {
         const std::unique_ptr<float, void (*)(void*)> raw(
@@ -164,8 +162,7 @@ bool has_fixed_encoding(const std::string& name) {
     return extension == "jpg" || extension == "jpeg" || extension == "tga";
 }
 
-Result<Image> read_image(const std::string& name, const std::string& bytes, const ImageRequest& request,
-                         std::string* warning) {
+Result<Image> read_image(const std::string& name, const std::string& bytes, const ImageRequest& request, std::string* warning) {
     bool out_of_gamut = false;
     const std::string extension = lower_extension(name);
     if (bytes.size() > (size_t(1) << 30)) return invalid_argument("the image file is larger than 1 GiB");

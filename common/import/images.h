@@ -28,7 +28,6 @@ bool has_fixed_encoding(const std::string& name);
 /// Decodes `bytes` of the file `name` (its extension selects the format). Dimensions are checked against the size of
 /// the data before anything of their size is allocated. Values that are not finite are an error. Neither the
 /// message nor `*warning`, what of the picture changed, names the file.
-Result<Image> read_image(const std::string& name, const std::string& bytes, const ImageRequest& request,
-                         std::string* warning);
+Result<Image> read_image(const std::string& name, const std::string& bytes, const ImageRequest& request, std::string* warning);
 
 }  // namespace lightloom::import

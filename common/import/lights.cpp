@@ -20,8 +20,7 @@ Rgb light_colour(Context* context, const ParameterList& p, std::string_view name
     bool clipped = false;
     const Parameter* given = nullptr;
     if ((given = p.find("rgb", name))) {
-        if (given->numbers.size() != 3)
-            fail(given->where, p.what() + ": " + quoted(given->name) + " needs three numbers");
+        if (given->numbers.size() != 3) fail(given->where, p.what() + ": " + quoted(given->name) + " needs three numbers");
         colour = {float(given->numbers[0]), float(given->numbers[1]), float(given->numbers[2])};
     } else if ((given = p.find("blackbody", name))) {
         if (given->numbers.size() != 1 || !(given->numbers[0] >= 100) || !(given->numbers[0] <= 1e6))
@@ -32,16 +31,15 @@ Rgb light_colour(Context* context, const ParameterList& p, std::string_view name
         if (given->strings.size() == 1) reduced = named_illuminant_rgb(given->strings[0], &clipped);
         if (!reduced) reduced = illuminant_rgb(*spectrum_parameter(context, p, name), &clipped);
         if (!reduced)
-            fail(given->where,
-                 p.what() + ": the spectrum " + quoted(given->name) + " has no luminance between 380 and 780 nm");
+            fail(given->where, p.what() + ": the spectrum " + quoted(given->name) + " has no luminance between 380 and 780 nm");
         colour = *reduced;
     }
     if (given && (colour.r < 0 || colour.g < 0 || colour.b < 0))
         fail(given->where, p.what() + ": " + quoted(given->name) + " is negative");
     if (clipped)
-        context->diagnostics.warn(
-            given->where, p.what() + ": the colour of " + quoted(given->name) +
-                              " lies outside the RGB gamut; its negative component became 0 at equal luminance");
+        context->diagnostics.warn(given->where,
+                                  p.what() + ": the colour of " + quoted(given->name) +
+                                      " lies outside the RGB gamut; its negative component became 0 at equal luminance");
     return colour;
 }
 
@@ -52,9 +50,7 @@ float light_scale(const ParameterList& p) {
 }
 
 /// The value of "power" or "illuminance" if it is in force (pbrt: if positive); 0 otherwise.
-double magnitude(const ParameterList& p, std::string_view name) {
-    return double(std::fmax(p.one_float(name, -1), 0.0f));
-}
+double magnitude(const ParameterList& p, std::string_view name) { return double(std::fmax(p.one_float(name, -1), 0.0f)); }
 
 Rgb checked(const ParameterList& p, const Rgb& colour, double factor) {
     const Rgb out = colour * float(factor);
@@ -107,8 +103,7 @@ void spot_light(Context* context, const ParameterList& p, const Mat4& m) {
     const double total_height = height(cone), falloff_height = height(double(cone) - delta);
     double scale = light_scale(p);
     // The flux of unit intensity on the axis: the smoothstep's mean over its band is one half.
-    if (const double power = magnitude(p, "power"); power > 0)
-        scale *= power / (kPiD * (falloff_height + total_height));
+    if (const double power = magnitude(p, "power"); power > 0) scale *= power / (kPiD * (falloff_height + total_height));
     const Vec3 from = p.one_point3("from").value_or(Vec3{0, 0, 0}), to = p.one_point3("to").value_or(Vec3{0, 0, 1});
     SpotLight light;
     light.position = light_position(p, m, from);
@@ -137,8 +132,7 @@ double illuminance_of(int width, int height, Luminance luminance) {
     double sum = 0;
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x) {
-            const Vec3 w =
-                equal_area_square_to_sphere({(float(x) + 0.5f) / float(width), (float(y) + 0.5f) / float(height)});
+            const Vec3 w = equal_area_square_to_sphere({(float(x) + 0.5f) / float(width), (float(y) + 0.5f) / float(height)});
             if (w.z > 0) sum += double(luminance(x, y)) * w.z;
         }
     return sum * 2 * kPiD / (double(width) * height);
@@ -161,8 +155,7 @@ void infinite_light(Context* context, const ParameterList& p, const Mat4& m) {
     InfiniteLight light;
     light.light_to_world = m;
     light.source = p.where().text();
-    if (!similarity_scale(m))
-        fail(p.where(), p.what() + ": its transformation must be a rotation, reflection or uniform scale");
+    if (!similarity_scale(m)) fail(p.where(), p.what() + ": its transformation must be a rotation, reflection or uniform scale");
     double scale = light_scale(p);
     const double illuminance = magnitude(p, "illuminance");
     const std::string reference = p.one_string("filename", "");
@@ -174,15 +167,13 @@ void infinite_light(Context* context, const ParameterList& p, const Mat4& m) {
         light.image = context->load_image(p.where(), reference, ImageRequest{});
         const Image& image = context->scene.images[size_t(light.image)];
         if (image.width != image.height)
-            fail(p.where(), quoted(reference) +
-                                ": an environment map must be a square equal-area octahedral image, not " +
+            fail(p.where(), quoted(reference) + ": an environment map must be a square equal-area octahedral image, not " +
                                 std::to_string(image.width) + " x " + std::to_string(image.height) +
                                 "; convert it with \"imgtool makeequiarea\"");
         if (illuminance > 0) {
             const double own = illuminance_of(context, p.where(), reference, image);
             if (!(own > 0))
-                fail(p.where(),
-                     quoted(reference) + ": the map is black above its horizon, so illuminance cannot scale it");
+                fail(p.where(), quoted(reference) + ": the map is black above its horizon, so illuminance cannot scale it");
             scale *= illuminance / own;
         }
         light.radiance = checked(p, Rgb(1.0f), scale);
@@ -205,9 +196,7 @@ void add_light(Context* context, const std::string& kind, const ParameterList& p
         fail(p.where(), p.what() + " is not supported; use point, spot, distant or infinite");
 }
 
-bool area_light_uses_power(const AreaLightDefinition& definition) {
-    return magnitude(definition.parameters, "power") > 0;
-}
+bool area_light_uses_power(const AreaLightDefinition& definition) { return magnitude(definition.parameters, "power") > 0; }
 
 AreaEmission area_emission(Context* context, const AreaLightDefinition& definition, double area) {
     const ParameterList& p = definition.parameters;

@@ -63,8 +63,7 @@ float read_index(Context* context, const ParameterList& p, std::string_view name
         context->diagnostics.warn(s->where, p.what() + ": the dispersion of " + quoted(s->name) +
                                                 " is ignored: its index at 587.6 nm is used for all colours");
     }
-    if (!(index > 0) || !(index < 100))
-        fail(p.where(), p.what() + ": the index of refraction must lie between 0 and 100");
+    if (!(index > 0) || !(index < 100)) fail(p.where(), p.what() + ": the index of refraction must lie between 0 and 100");
     return index;
 }
 
@@ -91,8 +90,7 @@ void read_conductor(Context* context, const ParameterList& p, const std::string&
     if (eta_metal) m->eta = constant_texture(context, eta_metal->eta);
     if (k_metal) m->k = constant_texture(context, k_metal->k);
     if (eta && k && !eta_metal && !k_metal) {
-        const ConductorRgb both =
-            conductor_rgb(*spectrum_parameter(context, p, eta_name), *spectrum_parameter(context, p, k_name));
+        const ConductorRgb both = conductor_rgb(*spectrum_parameter(context, p, eta_name), *spectrum_parameter(context, p, k_name));
         m->eta = constant_texture(context, both.eta);
         m->k = constant_texture(context, both.k);
     }
@@ -111,8 +109,8 @@ void read_layers(Context* context, const ParameterList& p, Material* m) {
     const auto count = [&](std::string_view name, int fallback) {
         const int value = p.one_int(name, fallback);
         if (value < 1 || value > kMaxLayerEvents)
-            fail(p.where(), p.what() + ": " + std::string(name) + " must lie between 1 and " +
-                                std::to_string(kMaxLayerEvents) + ", not " + std::to_string(value));
+            fail(p.where(), p.what() + ": " + std::string(name) + " must lie between 1 and " + std::to_string(kMaxLayerEvents) +
+                                ", not " + std::to_string(value));
         return value;
     };
     const int events = count("maxdepth", m->layer_events);
@@ -144,11 +142,9 @@ void read_mix(Context* context, const ParameterList& p, Material* m) {
     m->mix_b = resolve_material_reference(context, {true, names->strings[1], 0, names->where});
     --context->material_depth;
     const int levels = 1 + std::max(context->mix_levels[m->mix_a], context->mix_levels[m->mix_b]);
-    if (levels > kMaxMixDepth)
-        fail(p.where(), p.what() + ": mix materials refer to one another more than 32 levels deep");
+    if (levels > kMaxMixDepth) fail(p.where(), p.what() + ": mix materials refer to one another more than 32 levels deep");
     if (m->mix_a == kInterfaceMaterial || m->mix_b == kInterfaceMaterial)
-        fail(p.where(),
-             p.what() + ": a mix with an \"interface\" material is not supported; use the shape's alpha instead");
+        fail(p.where(), p.what() + ": a mix with an \"interface\" material is not supported; use the shape's alpha instead");
     m->mix_amount = float_texture_parameter(context, p, "amount");
     if (m->mix_amount == kNone) m->mix_amount = constant_texture(context, Rgb(0.5f));
 }
@@ -234,8 +230,7 @@ MaterialId resolve_material_reference(Context* context, const MaterialReference&
     constexpr MaterialId kInProgress = -3;
     if (!reference.named) {
         const auto [it, inserted] = context->resolved_anonymous_materials.try_emplace(reference.anonymous, kNone);
-        if (inserted)
-            it->second = make_material(context, "", context->anonymous_materials[size_t(reference.anonymous)]);
+        if (inserted) it->second = make_material(context, "", context->anonymous_materials[size_t(reference.anonymous)]);
         return it->second;
     }
     const std::string& name = reference.name;

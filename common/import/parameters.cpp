@@ -63,15 +63,12 @@ void add_value(const Token& token, const TypeRow& row, Parameter* p) {
         fail(token.where, "the parameter " + title(*p) + " needs a quoted string, not " + quoted(text));
     double number = 0;
     if (!parse_number(token.text, &number))
-        fail(token.where,
-             "the parameter " + title(*p) + " has the value " + quoted(text) + ", which is not a finite number");
+        fail(token.where, "the parameter " + title(*p) + " has the value " + quoted(text) + ", which is not a finite number");
     if (row.canonical == "integer") {
         if (number != std::floor(number) || number < INT_MIN || number > INT_MAX)
-            fail(token.where,
-                 "the parameter " + title(*p) + " has the value " + quoted(text) + ", which is not a 32-bit integer");
+            fail(token.where, "the parameter " + title(*p) + " has the value " + quoted(text) + ", which is not a 32-bit integer");
     } else if (!std::isfinite(float(number))) {
-        fail(token.where,
-             "the parameter " + title(*p) + " has the value " + quoted(text) + ", which is beyond single precision");
+        fail(token.where, "the parameter " + title(*p) + " has the value " + quoted(text) + ", which is beyond single precision");
     }
     p->numbers.push_back(number);
 }
@@ -96,15 +93,13 @@ ParameterList ParameterList::parse(Tokenizer* tokens, const Location& where, std
             fail(p.where, "unknown parameter type " + quoted(p.type) + " of " + quoted(text) + " in " + list.what_);
         p.type = row->canonical;
         for (const Parameter& other : list.parameters_)
-            if (other.name == p.name)
-                fail(p.where, "the parameter " + quoted(p.name) + " is given twice in " + list.what_);
+            if (other.name == p.name) fail(p.where, "the parameter " + quoted(p.name) + " is given twice in " + list.what_);
         if (tokens->peek().kind == TokenKind::kOpen) {
             tokens->next();
             while (tokens->peek().kind != TokenKind::kClose) {
                 const Token value = tokens->next();
                 if (value.kind == TokenKind::kEnd || value.kind == TokenKind::kOpen)
-                    fail(p.where,
-                         "the value list of " + title(p) + " in " + list.what_ + " is not closed; add the missing ]");
+                    fail(p.where, "the value list of " + title(p) + " in " + list.what_ + " is not closed; add the missing ]");
                 add_value(value, *row, &p);
             }
             tokens->next();
@@ -197,8 +192,7 @@ const std::vector<double>* ParameterList::numbers(std::string_view type, std::st
 }
 
 void ParameterList::ignore(Diagnostics* diagnostics, std::string_view name, const std::string& reason) const {
-    if (const Parameter* p = find_any(name))
-        diagnostics->warn(p->where, what_ + ": " + title(*p) + " is ignored: " + reason);
+    if (const Parameter* p = find_any(name)) diagnostics->warn(p->where, what_ + ": " + title(*p) + " is ignored: " + reason);
 }
 
 void ParameterList::ignore_all(Diagnostics* diagnostics, const std::string& reason) const {

@@ -7,33 +7,92 @@ namespace lightloom::import {
 namespace {
 
 // What some kind of shape, light, material or texture asks for: an Attribute directive may set nothing else.
-constexpr std::string_view kShapeParameters[] = {
-    "float alpha", "texture alpha", "float radius", "float zmin", "float zmax", "float phimax", "float innerradius",
-    "float height", "point3 P", "normal N", "vector3 S", "point2 uv", "integer indices", "integer faceIndices",
-    "string filename", "float edgelength", "float displacement", "texture displacement", "string emissionfilename"};
+constexpr std::string_view kShapeParameters[] = {"float alpha",
+                                                 "texture alpha",
+                                                 "float radius",
+                                                 "float zmin",
+                                                 "float zmax",
+                                                 "float phimax",
+                                                 "float innerradius",
+                                                 "float height",
+                                                 "point3 P",
+                                                 "normal N",
+                                                 "vector3 S",
+                                                 "point2 uv",
+                                                 "integer indices",
+                                                 "integer faceIndices",
+                                                 "string filename",
+                                                 "float edgelength",
+                                                 "float displacement",
+                                                 "texture displacement",
+                                                 "string emissionfilename"};
 constexpr std::string_view kLightParameters[] = {
-    "rgb I", "blackbody I", "spectrum I", "rgb L", "blackbody L", "spectrum L", "float scale", "float power",
-    "float illuminance", "point3 from", "point3 to", "float coneangle", "float conedeltaangle", "string filename",
+    "rgb I",         "blackbody I",       "spectrum I",  "rgb L",     "blackbody L",     "spectrum L",           "float scale",
+    "float power",   "float illuminance", "point3 from", "point3 to", "float coneangle", "float conedeltaangle", "string filename",
     "point3 portal", "bool twosided"};
-constexpr std::string_view kMaterialParameters[] = {
-    "string type", "string normalmap", "float displacement", "texture displacement", "rgb reflectance",
-    "spectrum reflectance", "texture reflectance", "rgb transmittance", "spectrum transmittance", "texture transmittance",
-    "float scale", "float eta", "rgb eta", "spectrum eta", "texture eta", "rgb k", "spectrum k", "texture k",
-    "float interface.eta", "spectrum interface.eta", "rgb conductor.eta", "spectrum conductor.eta",
-    "texture conductor.eta", "rgb conductor.k", "spectrum conductor.k", "texture conductor.k", "float roughness",
-    "texture roughness", "float uroughness", "texture uroughness", "float vroughness", "texture vroughness",
-    "float interface.roughness", "texture interface.roughness", "float interface.uroughness",
-    "texture interface.uroughness", "float interface.vroughness", "texture interface.vroughness",
-    "float conductor.roughness", "texture conductor.roughness", "float conductor.uroughness",
-    "texture conductor.uroughness", "float conductor.vroughness", "texture conductor.vroughness", "bool remaproughness",
-    "float thickness", "integer maxdepth", "integer nsamples", "float g", "texture g", "rgb albedo", "spectrum albedo",
-    "texture albedo", "string materials", "float amount", "texture amount"};
+constexpr std::string_view kMaterialParameters[] = {"string type",
+                                                    "string normalmap",
+                                                    "float displacement",
+                                                    "texture displacement",
+                                                    "rgb reflectance",
+                                                    "spectrum reflectance",
+                                                    "texture reflectance",
+                                                    "rgb transmittance",
+                                                    "spectrum transmittance",
+                                                    "texture transmittance",
+                                                    "float scale",
+                                                    "float eta",
+                                                    "rgb eta",
+                                                    "spectrum eta",
+                                                    "texture eta",
+                                                    "rgb k",
+                                                    "spectrum k",
+                                                    "texture k",
+                                                    "float interface.eta",
+                                                    "spectrum interface.eta",
+                                                    "rgb conductor.eta",
+                                                    "spectrum conductor.eta",
+                                                    "texture conductor.eta",
+                                                    "rgb conductor.k",
+                                                    "spectrum conductor.k",
+                                                    "texture conductor.k",
+                                                    "float roughness",
+                                                    "texture roughness",
+                                                    "float uroughness",
+                                                    "texture uroughness",
+                                                    "float vroughness",
+                                                    "texture vroughness",
+                                                    "float interface.roughness",
+                                                    "texture interface.roughness",
+                                                    "float interface.uroughness",
+                                                    "texture interface.uroughness",
+                                                    "float interface.vroughness",
+                                                    "texture interface.vroughness",
+                                                    "float conductor.roughness",
+                                                    "texture conductor.roughness",
+                                                    "float conductor.uroughness",
+                                                    "texture conductor.uroughness",
+                                                    "float conductor.vroughness",
+                                                    "texture conductor.vroughness",
+                                                    "bool remaproughness",
+                                                    "float thickness",
+                                                    "integer maxdepth",
+                                                    "integer nsamples",
+                                                    "float g",
+                                                    "texture g",
+                                                    "rgb albedo",
+                                                    "spectrum albedo",
+                                                    "texture albedo",
+                                                    "string materials",
+                                                    "float amount",
+                                                    "texture amount"};
 constexpr std::string_view kTextureParameters[] = {
-    "float value", "rgb value", "spectrum value", "texture value", "float tex", "rgb tex", "spectrum tex", "texture tex",
-    "float tex1", "rgb tex1", "spectrum tex1", "texture tex1", "float tex2", "rgb tex2", "spectrum tex2", "texture tex2",
-    "float scale", "texture scale", "float amount", "texture amount", "integer dimension", "string mapping",
-    "float uscale", "float vscale", "float udelta", "float vdelta", "string filename", "string filter",
-    "float maxanisotropy", "string wrap", "string encoding", "bool invert"};
+    "float value",     "rgb value",      "spectrum value",    "texture value",  "float tex",           "rgb tex",
+    "spectrum tex",    "texture tex",    "float tex1",        "rgb tex1",       "spectrum tex1",       "texture tex1",
+    "float tex2",      "rgb tex2",       "spectrum tex2",     "texture tex2",   "float scale",         "texture scale",
+    "float amount",    "texture amount", "integer dimension", "string mapping", "float uscale",        "float vscale",
+    "float udelta",    "float vdelta",   "string filename",   "string filter",  "float maxanisotropy", "string wrap",
+    "string encoding", "bool invert"};
 
 std::string read_string(Tokenizer* tokens, const Location& where, const std::string& word) {
     const Token token = tokens->next();
@@ -46,8 +105,7 @@ double read_number(Tokenizer* tokens, const Location& where, const std::string& 
     double value = 0;
     if (token.kind != TokenKind::kWord || !parse_number(token.text, &value))
         fail(token.where.line ? token.where : where,
-             word + " needs a finite number" +
-                 (token.kind == TokenKind::kEnd ? "" : ", not " + quoted(std::string(token.text))));
+             word + " needs a finite number" + (token.kind == TokenKind::kEnd ? "" : ", not " + quoted(std::string(token.text))));
     return value;
 }
 
@@ -71,9 +129,7 @@ Mat4 read_matrix(Tokenizer* tokens, const Location& where, const std::string& wo
     return m;
 }
 
-Vec3 vec3(const std::vector<double>& v, size_t first) {
-    return {float(v[first]), float(v[first + 1]), float(v[first + 2])};
-}
+Vec3 vec3(const std::vector<double>& v, size_t first) { return {float(v[first]), float(v[first + 1]), float(v[first + 2])}; }
 
 /// What a scope's directives begin with.
 std::string scope_name(char kind) { return kind == 'a' ? "Attribute" : kind == 't' ? "Transform" : "Object"; }
@@ -113,8 +169,8 @@ void Parser::directive(Tokenizer* tokens, const Token& token) {
     if (token.kind != TokenKind::kWord)
         fail(token.where, "expected a directive such as Shape, not " + quoted(std::string(token.text)));
     const std::string word(token.text);
-    if (transformation(tokens, word, token.where) || scope(tokens, word, token.where) ||
-        global_option(tokens, word, token.where) || world_item(tokens, word, token.where))
+    if (transformation(tokens, word, token.where) || scope(tokens, word, token.where) || global_option(tokens, word, token.where) ||
+        world_item(tokens, word, token.where))
         return;
     fail(token.where, "unknown directive " + quoted(word) + "; remove it or correct its name");
 }
@@ -152,8 +208,8 @@ bool Parser::transformation(Tokenizer* tokens, const std::string& word, const Lo
         const std::string name = read_string(tokens, where, word);
         const auto it = coordinate_systems_.find(name);
         if (it == coordinate_systems_.end())
-            fail(where, "CoordSysTransform: no coordinate system is named " + quoted(name) +
-                            "; define it with CoordinateSystem first");
+            fail(where,
+                 "CoordSysTransform: no coordinate system is named " + quoted(name) + "; define it with CoordinateSystem first");
         state_.ctm[0] = it->second[0];
         state_.ctm[1] = it->second[1];
     } else if (word == "ActiveTransform") {
@@ -181,8 +237,7 @@ void Parser::transform(const Location& where, const std::function<Mat4(const Mat
     for (int i = 0; i < 2; ++i) {
         if (!state_.active[i]) continue;
         state_.ctm[i] = f(state_.ctm[i]);
-        if (!inverse(state_.ctm[i]))
-            fail(where, "the transformation becomes singular or infinite here; correct its numbers");
+        if (!inverse(state_.ctm[i])) fail(where, "the transformation becomes singular or infinite here; correct its numbers");
     }
 }
 
@@ -224,8 +279,7 @@ bool Parser::scope(Tokenizer* tokens, const std::string& word, const Location& w
         option(tokens, where);
     } else if (word == "ColorSpace") {
         const std::string name = read_string(tokens, where, word);
-        if (name != "srgb")
-            fail(where, "ColorSpace " + quoted(name) + " is not supported; convert the colours to \"srgb\"");
+        if (name != "srgb") fail(where, "ColorSpace " + quoted(name) + " is not supported; convert the colours to \"srgb\"");
     } else {
         return false;
     }
@@ -233,8 +287,7 @@ bool Parser::scope(Tokenizer* tokens, const std::string& word, const Location& w
 }
 
 void Parser::open_scope(char kind, const Location& where) {
-    if (scopes_.size() >= kMaxScopeDepth)
-        fail(where, "scopes are nested deeper than " + std::to_string(kMaxScopeDepth));
+    if (scopes_.size() >= kMaxScopeDepth) fail(where, "scopes are nested deeper than " + std::to_string(kMaxScopeDepth));
     scopes_.push_back({kind, state_, where});
 }
 
@@ -243,8 +296,8 @@ void Parser::close_scope(char kind, const std::string& word, const Location& whe
         fail(where, word + " does not match any open scope" + (outer_scopes_ > 0 ? " of the imported file" : "") + "; remove it");
     if (scopes_.back().kind != kind) {
         const std::string open = scope_name(scopes_.back().kind);
-        fail(where, word + " does not match the " + open + "Begin at " + scopes_.back().where.text() + "; close that with " +
-                        open + "End first");
+        fail(where, word + " does not match the " + open + "Begin at " + scopes_.back().where.text() + "; close that with " + open +
+                        "End first");
     }
     state_ = std::move(scopes_.back().state);
     scopes_.pop_back();
@@ -255,12 +308,12 @@ void Parser::include(Tokenizer* tokens, const Location& where) {
     const Result<std::string> name = normalise_reference(reference);
     if (!name.ok()) fail(where, name.status().message());
     if (include_depth_ >= kMaxIncludeDepth)
-        fail(where, "Include is nested deeper than " + std::to_string(kMaxIncludeDepth) + " files; does " +
-                        quoted(reference) + " include itself?");
+        fail(where, "Include is nested deeper than " + std::to_string(kMaxIncludeDepth) + " files; does " + quoted(reference) +
+                        " include itself?");
     // Files that include each other several times multiply on every level.
     if (++include_count_ > kMaxIncludes)
-        fail(where, "the scene includes files more than " + std::to_string(kMaxIncludes) +
-                        " times; put repeated content into an object");
+        fail(where,
+             "the scene includes files more than " + std::to_string(kMaxIncludes) + " times; put repeated content into an object");
     ++include_depth_;
     parse_file(*name, where);
     --include_depth_;
@@ -299,8 +352,8 @@ void Parser::require_world(const Location& where, const std::string& word, bool 
     fail(where, word + (wanted ? " must come after WorldBegin" : " must come before WorldBegin"));
 }
 
-ParameterList Parser::parameters(Tokenizer* tokens, const Location& where, const std::string& word,
-                                 const std::string& kind, const std::string& target) {
+ParameterList Parser::parameters(Tokenizer* tokens, const Location& where, const std::string& word, const std::string& kind,
+                                 const std::string& target) {
     ParameterList list = ParameterList::parse(tokens, where, word + " " + quoted(kind));
     if (const auto it = state_.attributes.find(target); it != state_.attributes.end()) list.add_defaults(it->second);
     return list;

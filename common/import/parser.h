@@ -29,8 +29,7 @@ class Parser {
         bool reverse_orientation = false;
         MaterialReference material;
         std::shared_ptr<const AreaLightDefinition> area_light;
-        std::map<std::string, ParameterList>
-            attributes;  ///< Defaults by target: shape, light, material, medium, texture.
+        std::map<std::string, ParameterList> attributes;  ///< Defaults by target: shape, light, material, medium, texture.
     };
     struct Scope {
         char kind;  ///< 'a' AttributeBegin, 't' TransformBegin, 'o' ObjectBegin.

@@ -126,8 +126,7 @@ Status Reader::header_line(const std::vector<std::string_view>& words) {
     const std::string_view key = words[0];
     if (key == "comment" || key == "obj_info") return {};
     if (key == "format") {
-        if (words.size() != 3 || words[2] != "1.0")
-            return invalid_argument("the PLY format line is not \"format KIND 1.0\"");
+        if (words.size() != 3 || words[2] != "1.0") return invalid_argument("the PLY format line is not \"format KIND 1.0\"");
         if (words[1] == "ascii")
             format_ = Format::kAscii;
         else if (words[1] == "binary_little_endian")
@@ -157,8 +156,7 @@ Status Reader::header_line(const std::vector<std::string_view>& words) {
         if (!p.is_list && words.size() != 3) return invalid_argument("a PLY property line is malformed");
         const auto type = scalar_type(words[p.is_list ? 3 : 1]);
         const auto count_type = p.is_list ? scalar_type(words[2]) : Scalar::kUint8;
-        if (!type || !count_type || *count_type >= Scalar::kFloat)
-            return invalid_argument("a PLY property has an unknown type");
+        if (!type || !count_type || *count_type >= Scalar::kFloat) return invalid_argument("a PLY property has an unknown type");
         p.type = *type;
         p.count_type = *count_type;
         p.name = words.back();
@@ -190,8 +188,7 @@ Status Reader::header() {
         if (words.empty()) continue;
         if (words[0] == "end_header") break;
         LL_RETURN_IF_ERROR(header_line(words));
-        if (words[0] != "comment" && ++lines > kMaxProperties)
-            return invalid_argument("the PLY header has more than 256 lines");
+        if (words[0] != "comment" && ++lines > kMaxProperties) return invalid_argument("the PLY header has more than 256 lines");
     }
     pos_ = std::min(pos_ + 1, bytes_.size());
     if (!have_format_) return invalid_argument("the PLY header has no format line");
@@ -206,15 +203,13 @@ Status Reader::check_claims() const {
         for (const Property& p : element.properties)
             record += format_ == Format::kAscii ? 2 : kScalarBytes[size_t(p.is_list ? p.count_type : p.type)];
         if (record == 0) {
-            if (element.count > 0)
-                return invalid_argument("the PLY element " + quoted(element.name) + " has no properties");
+            if (element.count > 0) return invalid_argument("the PLY element " + quoted(element.name) + " has no properties");
             continue;
         }
         // The last ascii value needs no separator.
         if (element.count > (left + 1) / record)
-            return data_loss("the PLY header claims " + std::to_string(element.count) + " elements " +
-                             quoted(element.name) + ", but the file has only " + std::to_string(bytes_.size() - pos_) +
-                             " bytes of data");
+            return data_loss("the PLY header claims " + std::to_string(element.count) + " elements " + quoted(element.name) +
+                             ", but the file has only " + std::to_string(bytes_.size() - pos_) + " bytes of data");
         left -= std::min(left, element.count * record);
     }
     return {};
@@ -250,15 +245,13 @@ bool Reader::value(Scalar type, double* out) {
         pos_ += size;
         return true;
     }
-    while (pos_ < bytes_.size() &&
-           (bytes_[pos_] == ' ' || bytes_[pos_] == '\n' || bytes_[pos_] == '\r' || bytes_[pos_] == '\t'))
+    while (pos_ < bytes_.size() && (bytes_[pos_] == ' ' || bytes_[pos_] == '\n' || bytes_[pos_] == '\r' || bytes_[pos_] == '\t'))
         ++pos_;
     const char* begin = bytes_.data() + pos_;
     const auto [end, error] = std::from_chars(begin, bytes_.data() + bytes_.size(), *out);
     if (error != std::errc()) return false;
     pos_ += size_t(end - begin);
-    return pos_ == bytes_.size() || bytes_[pos_] == ' ' || bytes_[pos_] == '\n' || bytes_[pos_] == '\r' ||
-           bytes_[pos_] == '\t';
+    return pos_ == bytes_.size() || bytes_[pos_] == ' ' || bytes_[pos_] == '\n' || bytes_[pos_] == '\r' || bytes_[pos_] == '\t';
 }
 
 bool Reader::skip_property(const Property& p) {
@@ -338,8 +331,7 @@ Status Reader::faces(const Element& element, PlyMesh* mesh) {
             // Up to the first polygon, every face is the triangle of the same number.
             mesh->has_polygons = mesh->has_polygons || count > 4;
             const bool polygons = count > 3 || !mesh->faces.empty();
-            while (polygons && mesh->faces.size() < mesh->indices.size() / 3)
-                mesh->faces.push_back(uint32_t(mesh->faces.size()));
+            while (polygons && mesh->faces.size() < mesh->indices.size() / 3) mesh->faces.push_back(uint32_t(mesh->faces.size()));
             uint32_t first = 0, previous = 0;
             for (double corner = 0; corner < count; ++corner) {
                 double number = 0;

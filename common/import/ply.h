@@ -12,7 +12,7 @@ struct PlyMesh {
     std::vector<Vec3> positions;
     std::vector<Vec3> normals;  ///< Empty or one per position, as in the file (not normalised); zero where one is not finite.
     size_t finite_normals = 0;
-    std::vector<Vec2> uvs;      ///< Empty or one per position.
+    std::vector<Vec2> uvs;  ///< Empty or one per position.
     std::vector<uint32_t> indices;
     std::vector<uint32_t> faces;                  ///< The face of every triangle; empty if all faces are triangles.
     bool has_polygons = false;                    ///< Faces of more than four vertices.

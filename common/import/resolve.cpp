@@ -81,8 +81,8 @@ void add_shape(Context* context, PendingShape shape) {
     attributes.material = resolve_material_reference(context, shape.material);
     if (attributes.material == kInterfaceMaterial) {
         if (shape.area_light)
-            context->diagnostics.warn(
-                shape.where, "an area light on a shape with the \"interface\" material is ignored, as in pbrt");
+            context->diagnostics.warn(shape.where,
+                                      "an area light on a shape with the \"interface\" material is ignored, as in pbrt");
         return;
     }
     if (!shape.alpha_texture.empty())
@@ -91,15 +91,16 @@ void add_shape(Context* context, PendingShape shape) {
         attributes.alpha = constant_texture(context, Rgb(shape.alpha));
     if (shape.area_light) {
         if (shape.alpha_texture.empty() && shape.alpha == 0)
-            fail(shape.where,
-                 "an emitting shape with alpha 0 (pbrt's invisible light) is not supported; give it a visible alpha");
+            fail(shape.where, "an emitting shape with alpha 0 (pbrt's invisible light) is not supported; give it a visible alpha");
         if (attributes.alpha != kNone)
-            fail(shape.where, "an emitting shape with an alpha is not supported: the light sampled on it would be that of "
-                              "the uncut shape; cut the geometry instead");
+            fail(shape.where,
+                 "an emitting shape with an alpha is not supported: the light sampled on it would be that of "
+                 "the uncut shape; cut the geometry instead");
         const bool powered = area_light_uses_power(*shape.area_light);
         if (powered && shape.is_scaled_quadric)
-            context->diagnostics.warn(shape.where, "the light emits its power from the sphere or disk as it is scaled; pbrt-v4 "
-                                                   "takes the area before the transformation, and warns of the scale");
+            context->diagnostics.warn(shape.where,
+                                      "the light emits its power from the sphere or disk as it is scaled; pbrt-v4 "
+                                      "takes the area before the transformation, and warns of the scale");
         if (powered && mesh) return add_powered_mesh(context, std::move(*mesh), shape);
         const double area = sphere ? 4 * kPiD * double(sphere->radius) * sphere->radius : 0;
         const AreaEmission emission = area_emission(context, *shape.area_light, area);

@@ -46,10 +46,8 @@ TriangleMesh place(Context* context, const ParameterList& parameters, TriangleMe
     const bool identity = state.object_to_world == Mat4();
     for (Vec3& p : mesh.positions) {
         if (!identity) p = state.object_to_world.point(p);
-        if (!is_finite(p))
-            fail(parameters.where(), parameters.what() + ": a vertex is not finite after its transformation");
-        if (!within_bounds(p))
-            fail(parameters.where(), parameters.what() + ": a vertex lies beyond 1e15; scale the scene down");
+        if (!is_finite(p)) fail(parameters.where(), parameters.what() + ": a vertex is not finite after its transformation");
+        if (!within_bounds(p)) fail(parameters.where(), parameters.what() + ": a vertex lies beyond 1e15; scale the scene down");
     }
     mesh.attributes.flip_normal = state.reverse_orientation != state.object_to_world.swaps_handedness();
     std::vector<Vec3> substitutes;
@@ -75,8 +73,7 @@ std::vector<Vec3> points(const ParameterList& parameters, std::string_view type,
     std::vector<Vec3> out;
     if (const std::vector<double>* v = parameters.numbers(type, name, 3)) {
         out.reserve(v->size() / 3);
-        for (size_t i = 0; i < v->size(); i += 3)
-            out.push_back({float((*v)[i]), float((*v)[i + 1]), float((*v)[i + 2])});
+        for (size_t i = 0; i < v->size(); i += 3) out.push_back({float((*v)[i]), float((*v)[i + 1]), float((*v)[i + 2])});
     }
     return out;
 }
@@ -100,9 +97,8 @@ TriangleMesh read_mesh(const ParameterList& parameters, size_t corners) {
         mesh.indices.reserve(indices->size());
         for (const double index : *indices) {
             if (index < 0 || index >= double(mesh.positions.size()))
-                fail(parameters.where(), what + ": the index " + std::to_string(int64_t(index)) +
-                                             " is out of range; there are " + std::to_string(mesh.positions.size()) +
-                                             " points");
+                fail(parameters.where(), what + ": the index " + std::to_string(int64_t(index)) + " is out of range; there are " +
+                                             std::to_string(mesh.positions.size()) + " points");
             mesh.indices.push_back(uint32_t(index));
         }
     } else if (mesh.positions.size() == corners) {
@@ -121,8 +117,7 @@ TriangleMesh triangle_mesh(Context* context, const ParameterList& parameters, co
     return place(context, parameters, std::move(mesh), state);
 }
 
-TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const ShapeState& state,
-                      std::vector<uint32_t>* faces) {
+TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const ShapeState& state, std::vector<uint32_t>* faces) {
     parameters.refuse("displacement", "displacement changes the geometry; bake it into the mesh");
     parameters.ignore(&context->diagnostics, "edgelength", "it only matters together with displacement");
     const std::string reference = parameters.one_string("filename", "");
@@ -136,11 +131,11 @@ TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const S
     Result<PlyMesh> ply = read_ply(bytes);
     if (!ply.ok()) fail(parameters.where(), quoted(reference) + ": " + ply.status().message());
     for (const std::string& name : ply->ignored_properties)
-        context->diagnostics.warn(parameters.where(),
-                                  "the PLY property " + quoted(name) + " is ignored: nothing here uses it");
+        context->diagnostics.warn(parameters.where(), "the PLY property " + quoted(name) + " is ignored: nothing here uses it");
     if (ply->has_polygons)
-        context->diagnostics.warn(parameters.where(), quoted(reference) + ": faces of more than four vertices become fans of "
-                                                                          "triangles; pbrt leaves them out");
+        context->diagnostics.warn(parameters.where(), quoted(reference) +
+                                                          ": faces of more than four vertices become fans of "
+                                                          "triangles; pbrt leaves them out");
     TriangleMesh mesh;
     mesh.positions = std::move(ply->positions);
     mesh.normals = std::move(ply->normals);
@@ -174,15 +169,14 @@ std::variant<TriangleMesh, Sphere> sphere(Context* context, const ParameterList&
     if (!(radius > 0)) fail(parameters.where(), parameters.what() + ": the radius must be positive");
     if (parameters.one_float("zmin", -radius) > -radius || parameters.one_float("zmax", radius) < radius)
         fail(parameters.where(),
-             parameters.what() +
-                 ": zmin or zmax cut the sphere; partial spheres are not supported, use a triangle mesh");
+             parameters.what() + ": zmin or zmax cut the sphere; partial spheres are not supported, use a triangle mesh");
     require_full_turn(parameters);
     checked_inverse(parameters, state.object_to_world);
     const std::optional<double> scale = similarity_scale(state.object_to_world);
     if (!scale) {
-        context->diagnostics.warn(parameters.where(),
-                                  parameters.what() + ": its transformation is not a similarity, so it becomes " +
-                                      std::to_string(kEllipsoidTriangles) + " triangles with smooth normals");
+        context->diagnostics.warn(parameters.where(), parameters.what() +
+                                                          ": its transformation is not a similarity, so it becomes " +
+                                                          std::to_string(kEllipsoidTriangles) + " triangles with smooth normals");
         TriangleMesh mesh = tessellate_sphere(radius);
         join(mesh, faces);
         return place(context, parameters, std::move(mesh), quadric(state));
@@ -204,8 +198,7 @@ std::variant<TriangleMesh, Sphere> sphere(Context* context, const ParameterList&
     return s;
 }
 
-TriangleMesh disk(Context* context, const ParameterList& parameters, const ShapeState& state,
-                  std::vector<uint32_t>* faces) {
+TriangleMesh disk(Context* context, const ParameterList& parameters, const ShapeState& state, std::vector<uint32_t>* faces) {
     const float radius = parameters.one_float("radius", 1), inner = parameters.one_float("innerradius", 0);
     const float height = parameters.one_float("height", 0);
     if (!(radius > 0) || !(inner >= 0) || !(inner < radius))
@@ -226,26 +219,23 @@ TriangleMesh bilinear_mesh(Context* context, const ParameterList& parameters, co
     bool curved = false;
     TriangleMesh mesh = tessellate_patches(read_mesh(parameters, 4), &curved, faces);
     if (curved)
-        context->diagnostics.warn(parameters.where(), parameters.what() +
-                                                          ": a patch that is no parallelogram becomes a grid of " +
-                                                          std::to_string(kPatchSteps) + " x " +
-                                                          std::to_string(kPatchSteps) + " quadrilaterals");
+        context->diagnostics.warn(parameters.where(), parameters.what() + ": a patch that is no parallelogram becomes a grid of " +
+                                                          std::to_string(kPatchSteps) + " x " + std::to_string(kPatchSteps) +
+                                                          " quadrilaterals");
     return place(context, parameters, std::move(mesh), state);
 }
 
 }  // namespace
 
-std::variant<TriangleMesh, Sphere> make_shape(Context* context, const std::string& kind,
-                                              const ParameterList& parameters, const ShapeState& state,
-                                              std::vector<uint32_t>* faces) {
+std::variant<TriangleMesh, Sphere> make_shape(Context* context, const std::string& kind, const ParameterList& parameters,
+                                              const ShapeState& state, std::vector<uint32_t>* faces) {
     faces->clear();
     if (kind == "trianglemesh") return triangle_mesh(context, parameters, state);
     if (kind == "plymesh") return ply_mesh(context, parameters, state, faces);
     if (kind == "sphere") return sphere(context, parameters, state, faces);
     if (kind == "disk") return disk(context, parameters, state, faces);
     if (kind == "bilinearmesh") return bilinear_mesh(context, parameters, state, faces);
-    fail(parameters.where(),
-         parameters.what() + " is not supported; use trianglemesh, plymesh, sphere, disk or bilinearmesh");
+    fail(parameters.where(), parameters.what() + " is not supported; use trianglemesh, plymesh, sphere, disk or bilinearmesh");
 }
 
 }  // namespace lightloom::import

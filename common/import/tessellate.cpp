@@ -90,8 +90,8 @@ TriangleMesh tessellate_patches(const TriangleMesh& patches, bool* curved, std::
             if (!patches.normals.empty()) n[k] = patches.normals[index];
             uv[k] = patches.uvs.empty() ? kCorners[k] : patches.uvs[index];
         }
-        const bool even_uv = patches.uvs.empty() ||
-                             (uv[0].x - uv[1].x - uv[2].x + uv[3].x == 0 && uv[0].y - uv[1].y - uv[2].y + uv[3].y == 0);
+        const bool even_uv =
+            patches.uvs.empty() || (uv[0].x - uv[1].x - uv[2].x + uv[3].x == 0 && uv[0].y - uv[1].y - uv[2].y + uv[3].y == 0);
         const bool flat = is_parallelogram(p) && even_uv && patches.normals.empty();
         *curved = *curved || !flat;
         const uint32_t steps = flat ? 1 : kPatchSteps;

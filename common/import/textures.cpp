@@ -33,15 +33,14 @@ std::string read_spectrum_file(Context* context, const Parameter& p, const std::
 Spectrum read_spectrum(Context* context, const Parameter& p, const std::string& what) {
     if (!p.numbers.empty() && p.strings.empty()) {
         if (auto spectrum = spectrum_from_pairs(p.numbers)) return *spectrum;
-        fail(p.where, what + ": the spectrum " + quoted(p.name) +
-                          " needs pairs of wavelength and value with increasing wavelengths");
+        fail(p.where,
+             what + ": the spectrum " + quoted(p.name) + " needs pairs of wavelength and value with increasing wavelengths");
     }
     if (p.strings.size() != 1 || !p.numbers.empty())
         fail(p.where, what + ": the spectrum " + quoted(p.name) + " needs one name, one file or pairs of numbers");
     const std::string text = read_spectrum_file(context, p, what);
     if (auto spectrum = parse_spectrum_text(text)) return *spectrum;
-    fail(p.where,
-         what + ": " + quoted(p.strings[0]) + " is not a spectrum file (pairs of increasing wavelength and value)");
+    fail(p.where, what + ": " + quoted(p.strings[0]) + " is not a spectrum file (pairs of increasing wavelength and value)");
 }
 
 Rgb colour_of(Context* context, const Parameter& p, const std::string& what, TextureUse use) {
@@ -81,8 +80,8 @@ void read_encoding(const ParameterList& parameters, const std::string& fallback,
     request->srgb = encoding == "sRGB";
     if (encoding == "sRGB" || encoding == "linear") return;
     double gamma = 0;
-    if (encoding.rfind("gamma ", 0) != 0 || !parse_number(std::string_view(encoding).substr(6), &gamma) ||
-        !(gamma > 0) || gamma > 100)
+    if (encoding.rfind("gamma ", 0) != 0 || !parse_number(std::string_view(encoding).substr(6), &gamma) || !(gamma > 0) ||
+        gamma > 100)
         fail(parameters.where(),
              parameters.what() + ": the encoding " + quoted(encoding) + " must be sRGB, linear or \"gamma VALUE\"");
     request->gamma = float(gamma);
@@ -96,8 +95,7 @@ TextureId image_texture(Context* context, const ParameterList& parameters, Textu
     node.invert = parameters.one_bool("invert", false);
     const std::string wrap = parameters.one_choice("wrap", "repeat", {"repeat", "clamp", "black"});
     node.wrap = wrap == "repeat" ? WrapMode::kRepeat : wrap == "clamp" ? WrapMode::kClamp : WrapMode::kBlack;
-    const std::string filter =
-        parameters.one_choice("filter", "bilinear", {"point", "bilinear", "trilinear", "EWA", "ewa"});
+    const std::string filter = parameters.one_choice("filter", "bilinear", {"point", "bilinear", "trilinear", "EWA", "ewa"});
     node.nearest = filter == "point";
     if (filter != "point" && filter != "bilinear")
         context->diagnostics.warn(parameters.where(), parameters.what() + ": the filter " + quoted(filter) +
@@ -151,13 +149,10 @@ TextureId make_texture(Context* context, const Definition& definition, TextureUs
         node.amount = operand(context, parameters, "amount", TextureUse::kFloat, 0.5f);
         return add_node(context, node);
     }
-    fail(parameters.where(),
-         parameters.what() + " is not supported; use constant, scale, mix, checkerboard or imagemap");
+    fail(parameters.where(), parameters.what() + " is not supported; use constant, scale, mix, checkerboard or imagemap");
 }
 
-TextureRange hull(const TextureRange& a, const TextureRange& b) {
-    return {std::fmin(a.least, b.least), std::fmax(a.most, b.most)};
-}
+TextureRange hull(const TextureRange& a, const TextureRange& b) { return {std::fmin(a.least, b.least), std::fmax(a.most, b.most)}; }
 
 TextureRange product(const TextureRange& a, const TextureRange& b) {
     const double corners[] = {a.least * b.least, a.least * b.most, a.most * b.least, a.most * b.most};
@@ -219,9 +214,8 @@ TextureId named_texture(Context* context, const Location& where, const std::stri
     }
     const auto it = definitions.find(name);
     if (it == definitions.end()) {
-        fail(where,
-             "no " + type + " texture is named " + quoted(name) +
-                 (others.count(name) ? "; the texture of this name has the other type" : "; define it with Texture"));
+        fail(where, "no " + type + " texture is named " + quoted(name) +
+                        (others.count(name) ? "; the texture of this name has the other type" : "; define it with Texture"));
     }
     if (resolved.size() > 300000) fail(where, "the scene has more than 300000 textures");
     resolved[{name, use}] = kInProgress;
@@ -231,8 +225,7 @@ TextureId named_texture(Context* context, const Location& where, const std::stri
     const TextureCost cost = context->texture_costs[size_t(id)];
     if (cost.levels > kMaxNesting) fail(where, "textures refer to one another more than 31 levels deep");
     if (cost.visits > kMaxVisits)
-        fail(where,
-             "the texture " + quoted(name) + " needs more than 4096 look-ups; use fewer textures in one another");
+        fail(where, "the texture " + quoted(name) + " needs more than 4096 look-ups; use fewer textures in one another");
     it->second.parameters.finish();
     resolved[{name, use}] = id;
     return id;
@@ -264,19 +257,16 @@ TextureId constant_texture(Context* context, const Rgb& value) {
 
 TextureId float_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name) {
     if (const Parameter* p = parameters.find("texture", name)) {
-        if (p->strings.size() != 1)
-            fail(p->where, parameters.what() + ": " + quoted(p->name) + " needs one texture name");
+        if (p->strings.size() != 1) fail(p->where, parameters.what() + ": " + quoted(p->name) + " needs one texture name");
         return named_texture(context, p->where, p->strings[0], TextureUse::kFloat);
     }
     if (!parameters.find("float", name)) return kNone;
     return constant_texture(context, Rgb(parameters.one_float(name, 0)));
 }
 
-TextureId spectrum_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name,
-                                     TextureUse use) {
+TextureId spectrum_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name, TextureUse use) {
     if (const Parameter* p = parameters.find("texture", name)) {
-        if (p->strings.size() != 1)
-            fail(p->where, parameters.what() + ": " + quoted(p->name) + " needs one texture name");
+        if (p->strings.size() != 1) fail(p->where, parameters.what() + ": " + quoted(p->name) + " needs one texture name");
         return named_texture(context, p->where, p->strings[0], use);
     }
     for (const std::string_view type : {"rgb", "spectrum"})

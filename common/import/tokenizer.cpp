@@ -46,8 +46,8 @@ void Tokenizer::scan() {
         scan_string();
     } else {
         const size_t begin = pos_;
-        while (pos_ < text_.size() && !is_space(text_[pos_]) && text_[pos_] != '"' && text_[pos_] != '[' &&
-               text_[pos_] != ']' && text_[pos_] != '#')
+        while (pos_ < text_.size() && !is_space(text_[pos_]) && text_[pos_] != '"' && text_[pos_] != '[' && text_[pos_] != ']' &&
+               text_[pos_] != '#')
             ++pos_;
         token_.kind = TokenKind::kWord;
         token_.text = text_.substr(begin, pos_ - begin);

@@ -142,8 +142,7 @@ Rgb next_event(const Scene& scene, const PathVertex* z, int t, const NextEventSa
 
 /// 2 <= s, 2 <= t: connects y_{s-1} and z_{t-1}.
 template <ViewDetail detail = ViewDetail::kFull>
-Rgb connect(const Scene& scene, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view,
-                   WalkCounters* counters) {
+Rgb connect(const Scene& scene, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view, WalkCounters* counters) {
     const PathVertex &a = y[s - 1], &b = z[t - 1];
     const Vec3 d = a.p - b.p;
     const float d2 = length_squared(d);

@@ -48,8 +48,8 @@ inline bool start_light_path(const Scene& scene, LightSampler& sampler, PathVert
 
 /// Traces a light sub-path into `path` (room for `max_vertices`); returns the number of vertices, y_0 included. Vertices
 /// whose own event was a Dirac lobe are kept (marked) because later vertices need them.
-inline int trace_light_path(const Scene& scene, LightSampler& sampler, int max_vertices, const RouletteRule& rule,
-                            PathVertex* path, WalkCounters* counters) {
+inline int trace_light_path(const Scene& scene, LightSampler& sampler, int max_vertices, const RouletteRule& rule, PathVertex* path,
+                            WalkCounters* counters) {
     WalkRay ray;
     if (max_vertices < 1 || !start_light_path(scene, sampler, &path[0], &ray)) return 0;
     const bool area = scene.emitters()[uint32_t(path[0].emitter)].is_area();

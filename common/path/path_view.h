@@ -29,7 +29,7 @@ struct PathView {
     double light_throughput[kMaxEdges + 1];
     uint16_t light_label[kMaxEdges + 1];  ///< * Light subspace of the prefix x_0 .. x_{s-1}.
     uint16_t eye_label[kMaxEdges + 1];    ///< * Eye subspace of the suffix x_s .. x_k.
-    double primary_distance2 = 0;  ///< * |x_k - x_{k-1}|^2; see view_footprint().
+    double primary_distance2 = 0;         ///< * |x_k - x_{k-1}|^2; see view_footprint().
     enum class Source : uint8_t { kArea, kDirection, kDiscrete } source = Source::kArea;  ///< * Measure of fwd[0].
     /// Density of x_0 under next event estimation from x_1, native measure, pmf included.
     double next_event = 0;

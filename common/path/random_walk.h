@@ -12,7 +12,7 @@
 namespace lightloom {
 
 struct RouletteRule {
-    int first_vertex = 4;                 ///< Sub-path vertices with a smaller index always go on.
+    int first_vertex = 4;  ///< Sub-path vertices with a smaller index always go on.
     float min_survival = 0.5f, max_survival = 0.95f;
 };
 
@@ -25,8 +25,8 @@ struct ScatterSample {
 /// State of a walk between two vertices.
 struct WalkRay {
     Vec3 origin, direction;
-    Rgb alpha;                  ///< Throughput carried along the ray.
-    double pdf = 0;             ///< Density of the direction, solid angle; for an infinite light: area on its disc.
+    Rgb alpha;       ///< Throughput carried along the ray.
+    double pdf = 0;  ///< Density of the direction, solid angle; for an infinite light: area on its disc.
     bool from_infinite = false;
     bool previous_hittable = true;  ///< False leaving a light that cannot be hit: its reverse density is zero.
     float survival = 1;             ///< See PathVertex.
@@ -60,9 +60,7 @@ void arrive(const WalkRay& ray, const Vec3& previous_p, const Vec3& previous_ng,
     } else {
         const float inv_d2 = 1 / length_squared(point.p - previous_p);
         v->fwd = ray.pdf * (cosine * inv_d2);
-        v->to_previous = !ray.previous_hittable    ? 0
-                         : previous_on_surface ? abs_dot(previous_ng, v->wo) * inv_d2
-                                               : inv_d2;
+        v->to_previous = !ray.previous_hittable ? 0 : previous_on_surface ? abs_dot(previous_ng, v->wo) * inv_d2 : inv_d2;
     }
     v->adjoint = mode == TransportMode::kImportance ? std::fabs(v->wo_local.z) / cosine : 1.0f;
 }

@@ -11,22 +11,22 @@ namespace lightloom {
 inline constexpr uint16_t kNoLabel = 0xffff;
 
 struct PathVertex {
-    Vec3 p, ng;                ///< Position; geometric normal (at an infinite light's y_0: the direction of travel).
+    Vec3 p, ng;  ///< Position; geometric normal (at an infinite light's y_0: the direction of travel).
     Frame shading;
-    Vec3 wo;                   ///< Unit, towards the predecessor.
-    Vec3 wo_local;             ///< The same in the shading frame.
+    Vec3 wo;        ///< Unit, towards the predecessor.
+    Vec3 wo_local;  ///< The same in the shading frame.
     Bsdf bsdf;
-    Rgb alpha;                 ///< Throughput of the sub-path up to here, before this vertex scatters.
-    double fwd = 0;            ///< Density of this vertex as traced; area, or native measure at y_0.
-    double rev = 0;            ///< Density of this vertex as traced from its successor's far side; set when both exist.
-    float to_previous = 0;     ///< Turns a solid-angle density at this vertex towards the predecessor into the predecessor's
-                               ///< density: |cos| / d^2, 1 for an infinite light, 0 for a light that cannot be hit.
+    Rgb alpha;              ///< Throughput of the sub-path up to here, before this vertex scatters.
+    double fwd = 0;         ///< Density of this vertex as traced; area, or native measure at y_0.
+    double rev = 0;         ///< Density of this vertex as traced from its successor's far side; set when both exist.
+    float to_previous = 0;  ///< Turns a solid-angle density at this vertex towards the predecessor into the predecessor's
+                            ///< density: |cos| / d^2, 1 for an infinite light, 0 for a light that cannot be hit.
     /// Light sub-paths: |wo.ns| / |wo.ng|, the part of the adjoint correction that belongs to the incoming direction
     /// [Veach 1997, 5.3]. Camera sub-paths: 1.
     float adjoint = 1;
-    int32_t emitter = kNone;   ///< Emitter that this vertex lies on.
-    float reach = 0;           ///< SurfacePoint::reach.
-    bool delta = false;        ///< The sub-path went on through a Dirac lobe.
+    int32_t emitter = kNone;  ///< Emitter that this vertex lies on.
+    float reach = 0;          ///< SurfacePoint::reach.
+    bool delta = false;       ///< The sub-path went on through a Dirac lobe.
     /// Light subspace of the prefix, or eye subspace of the suffix, that ends here as traced; and of the other kind, seen from
     /// the successor. kNoLabel until a method with tables asks for them.
     uint16_t label = kNoLabel, reverse_label = kNoLabel;

@@ -22,7 +22,10 @@ class WalkSampler {
   protected:
     /// `scramble` names the sequence and `index` the place in it; `scattering` is the point that scattering() takes.
     WalkSampler(const RngKey& key, uint64_t scramble, uint32_t index, uint64_t scattering)
-        : rng_(key), scramble_(scramble), scattering_(scattering), index_(index) {}
+        : rng_(key),
+          scramble_(scramble),
+          scattering_(scattering),
+          index_(index) {}
 
     /// The points of one place are independent of one another.
     Vec2 point(uint64_t number) const { return low_discrepancy_point(index_, scramble_ + number); }

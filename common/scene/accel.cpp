@@ -47,8 +47,8 @@ void commit(RTCScene scene) {
 struct GeometryUser {
     const void* opacity_user = nullptr;
     Accel::Opacity opacity = nullptr;
-    int32_t object = -1;        // -1: the world, otherwise index into SceneDescription::objects
-    uint32_t geometry = 0;      // index of the mesh in its object
+    int32_t object = -1;    // -1: the world, otherwise index into SceneDescription::objects
+    uint32_t geometry = 0;  // index of the mesh in its object
 };
 
 struct SphereUser {
@@ -58,9 +58,7 @@ struct SphereUser {
 
 /// Uniform in [0, 1) from the bits of a ray and a primitive.
 float ray_hash(float ox, float oy, float oz, float dx, float dy, float dz, uint64_t primitive) {
-    const auto bits = [](float a, float b) {
-        return (uint64_t(std::bit_cast<uint32_t>(a)) << 32) | std::bit_cast<uint32_t>(b);
-    };
+    const auto bits = [](float a, float b) { return (uint64_t(std::bit_cast<uint32_t>(a)) << 32) | std::bit_cast<uint32_t>(b); };
     uint64_t h = mix64(bits(ox, oy) + 0x9e3779b97f4a7c15ull);
     h = mix64(h ^ bits(oz, dx));
     h = mix64(h ^ bits(dy, dz));
@@ -188,8 +186,8 @@ struct Accel::Impl {
             RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
             rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.positions.data(), 0, sizeof(Vec3),
                                        mesh.positions.size() - 1);  // the last one is padding
-            rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices.data(), 0,
-                                       3 * sizeof(uint32_t), mesh.indices.size() / 3);
+            rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices.data(), 0, 3 * sizeof(uint32_t),
+                                       mesh.indices.size() / 3);
             if (mesh.attributes.alpha != kNone) {
                 geometry_users.push_back(std::make_unique<GeometryUser>(GeometryUser{user, opacity, object, i}));
                 rtcSetGeometryUserData(g, geometry_users.back().get());
@@ -203,7 +201,7 @@ struct Accel::Impl {
     }
 
     void add_spheres(RTCScene scene, const std::vector<Sphere>& spheres, uint32_t id, int32_t object, Opacity opacity,
-                         const void* user) {
+                     const void* user) {
         if (spheres.empty()) return;
         bool any_alpha = false;
         for (const Sphere& s : spheres) any_alpha |= s.attributes.alpha != kNone;

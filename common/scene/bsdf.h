@@ -41,11 +41,11 @@ struct BsdfEval {
 };
 
 struct BsdfSample {
-    Vec3 wi;              ///< Local, unit.
-    Rgb weight;           ///< f |cos(wi)| / pdf; for a delta lobe its albedo / lobe pmf. Never negative.
-    float pdf_fwd = 0;    ///< Solid angle over all non-delta lobes; for a delta lobe the discrete lobe pmf.
-    float pdf_rev = 0;    ///< The same for the reversed event.
-    bool delta = false;   ///< The lobe chosen is a Dirac distribution: this vertex's event is not connectible.
+    Vec3 wi;             ///< Local, unit.
+    Rgb weight;          ///< f |cos(wi)| / pdf; for a delta lobe its albedo / lobe pmf. Never negative.
+    float pdf_fwd = 0;   ///< Solid angle over all non-delta lobes; for a delta lobe the discrete lobe pmf.
+    float pdf_rev = 0;   ///< The same for the reversed event.
+    bool delta = false;  ///< The lobe chosen is a Dirac distribution: this vertex's event is not connectible.
 };
 
 /// A function of |cos| at one roughness: two neighbouring rows of a table (bsdf_tables.h) and where between them to look.
@@ -57,19 +57,19 @@ struct TableRows {
 
 struct Bsdf {
     BsdfKind kind = BsdfKind::kNull;
-    bool black = true;                 ///< No light leaves: nothing to sample or to connect to.
-    float eta = 1;                     ///< Relative index: below the surface (z < 0) over above; a coat's over outside.
-    float alpha_x = 0, alpha_y = 0;    ///< GGX alpha of the interface (of the coat for coated kinds); 0 is smooth (delta).
-    Rgb reflectance;                   ///< Diffuse albedo; conductor: eta; kCoatedDiffuse: see base_weight.
-    Rgb transmittance;                 ///< Diffuse transmission albedo; conductor: k.
-    float reflect_pmf = 0;             ///< kDiffuseTransmission: probability of the reflected lobe.
+    bool black = true;                         ///< No light leaves: nothing to sample or to connect to.
+    float eta = 1;                             ///< Relative index: below the surface (z < 0) over above; a coat's over outside.
+    float alpha_x = 0, alpha_y = 0;            ///< GGX alpha of the interface (of the coat for coated kinds); 0 is smooth (delta).
+    Rgb reflectance;                           ///< Diffuse albedo; conductor: eta; kCoatedDiffuse: see base_weight.
+    Rgb transmittance;                         ///< Diffuse transmission albedo; conductor: k.
+    float reflect_pmf = 0;                     ///< kDiffuseTransmission: probability of the reflected lobe.
     float base_alpha_x = 0, base_alpha_y = 0;  ///< kCoatedConductor: the base's alpha, widened by a rough coat.
-    TableRows coat_transmission;       ///< Share of light that a rough coat lets down to its base.
-    TableRows trapped;                 ///< kCoatedConductor: see bsdf_coated.cpp.
-    float thickness = 0;               ///< Optical thickness of a coat.
-    float base_weight = 0;             ///< Scalar albedo of what is under the coat, for choosing lobes.
-    Rgb trapped_reflectance;           ///< kCoatedConductor: albedo of the internally scattered light ...
-    float trapped_norm = 0;            ///< ... and the normalisation of its lobe.
+    TableRows coat_transmission;               ///< Share of light that a rough coat lets down to its base.
+    TableRows trapped;                         ///< kCoatedConductor: see bsdf_coated.cpp.
+    float thickness = 0;                       ///< Optical thickness of a coat.
+    float base_weight = 0;                     ///< Scalar albedo of what is under the coat, for choosing lobes.
+    Rgb trapped_reflectance;                   ///< kCoatedConductor: albedo of the internally scattered light ...
+    float trapped_norm = 0;                    ///< ... and the normalisation of its lobe.
 
     /// True if some lobe is not a Dirac delta, so that the vertex can be connected to.
     bool has_smooth_lobe() const;
@@ -104,8 +104,8 @@ Bsdf make_thin_dielectric(float eta);
 /// `base_bounces` reflections at the base; 0 means all of them.
 Bsdf make_coated_diffuse(const Rgb& reflectance, float eta, float thickness, float alpha_x, float alpha_y, int base_bounces = 0);
 /// Dielectric coat over a conductor whose complex index is given against vacuum.
-Bsdf make_coated_conductor(const Rgb& conductor_eta, const Rgb& conductor_k, float base_alpha_x, float base_alpha_y,
-                           float eta, float thickness, float alpha_x, float alpha_y);
+Bsdf make_coated_conductor(const Rgb& conductor_eta, const Rgb& conductor_k, float base_alpha_x, float base_alpha_y, float eta,
+                           float thickness, float alpha_x, float alpha_y);
 
 // The Lambertian case inline: in an interior it is most of the work.
 

@@ -120,8 +120,8 @@ Bsdf make_coated_diffuse(const Rgb& reflectance, float eta, float thickness, flo
     return b;
 }
 
-Bsdf make_coated_conductor(const Rgb& conductor_eta, const Rgb& conductor_k, float base_alpha_x, float base_alpha_y,
-                           float eta, float thickness, float alpha_x, float alpha_y) {
+Bsdf make_coated_conductor(const Rgb& conductor_eta, const Rgb& conductor_k, float base_alpha_x, float base_alpha_y, float eta,
+                           float thickness, float alpha_x, float alpha_y) {
     Bsdf b;
     b.kind = BsdfKind::kCoatedConductor;
     const float r = make_coat(&b, eta, thickness, alpha_x, alpha_y);
@@ -153,8 +153,7 @@ BsdfEval eval_coated_diffuse(const Bsdf& b, Vec3 wo, Vec3 wi) {
     if (!to_upper_side(&wo, &wi)) return {};
     const CoatSide o = coat_side(b, wo.z), i = coat_side(b, wi.z);
     const float pmf_o = diffuse_coat_pmf(b, o), pmf_i = diffuse_coat_pmf(b, i);
-    BsdfEval e{b.reflectance * (o.transmitted * i.transmitted * kInvPi), (1 - pmf_o) * wi.z * kInvPi,
-               (1 - pmf_i) * wo.z * kInvPi};
+    BsdfEval e{b.reflectance * (o.transmitted * i.transmitted * kInvPi), (1 - pmf_o) * wi.z * kInvPi, (1 - pmf_i) * wo.z * kInvPi};
     if (b.alpha_x > 0) add_coat_lobe(b, wo, wi, pmf_o, pmf_i, &e);
     return e;
 }
@@ -218,8 +217,7 @@ bool sample_coated_conductor(const Bsdf& b, Vec3 wo, float lobe, Vec2 u, BsdfSam
     const ConductorSide o = conductor_side(b, wo);
     Vec3 wi;
     if (lobe < o.coat_pmf) {
-        if (b.alpha_x == 0)
-            return finish_delta({-wo.x, -wo.y, side * wo.z}, Rgb(o.coat.reflected / o.coat_pmf), o.coat_pmf, out);
+        if (b.alpha_x == 0) return finish_delta({-wo.x, -wo.y, side * wo.z}, Rgb(o.coat.reflected / o.coat_pmf), o.coat_pmf, out);
         wi = mirrored(wo, Ggx{b.alpha_x, b.alpha_y}.sample_visible_normal(wo, u));
     } else if (lobe < o.coat_pmf + o.base_pmf) {
         const Vec3 inner = refracted(wo, b.eta);

@@ -19,8 +19,8 @@ inline float fresnel_from_cosines(float cos_i, float cos_t, float eta) {
 
 struct DielectricFresnel {
     float reflectance = 1;
-    float cos_t = 0;     ///< Positive; 0 for total internal reflection.
-    float eta = 1;       ///< Index on the transmitted side over that on the incident side.
+    float cos_t = 0;  ///< Positive; 0 for total internal reflection.
+    float eta = 1;    ///< Index on the transmitted side over that on the incident side.
 };
 
 /// `cos_i` is signed: positive above the interface. `eta`: index below over above. Reflectance 1 at grazing incidence, for

@@ -48,7 +48,7 @@ struct MicrofacetReflection {
     float value = 0;    ///< D G2 / (4 cos cos): the BRDF without Fresnel.
     float pdf_fwd = 0;  ///< Solid-angle density of wi: visible normal at wo, then mirrored.
     float pdf_rev = 0;
-    float cos_h = 0;    ///< Cosine between either direction and the half vector.
+    float cos_h = 0;  ///< Cosine between either direction and the half vector.
 };
 
 inline MicrofacetReflection microfacet_reflection(const Ggx& ggx, const Vec3& wo, const Vec3& wi) {

@@ -48,9 +48,7 @@ class TableCache {
 };
 
 float knot_cosine(int i) { return sqr(float(i) / (DirectionalTable::kCosines - 1)); }
-float knot_alpha(int i) {
-    return sqr(sqr(lerp(float(i) / (DirectionalTable::kAlphas - 1), DirectionalTable::kFirstRoot, 1.0f)));
-}
+float knot_alpha(int i) { return sqr(sqr(lerp(float(i) / (DirectionalTable::kAlphas - 1), DirectionalTable::kFirstRoot, 1.0f))); }
 
 /// Integrates one microfacet event over visible normals: the mean of weight(wo.m, m, &wi) G2 / G1 for light that arrives along
 /// `wo` in the xz plane and goes on along wi. The azimuth runs over half a turn, since the lobe of an isotropic interface is
@@ -113,10 +111,11 @@ void build_coat(float eta, float thickness, DirectionalTable* table) {
         double returned = 0;
         for (int c = 0; c < kInner; ++c) {
             const Vec3 wo = at_cosine(std::sqrt((float(c) + 0.5f) / kInner));
-            returned += slab_transmittance(thickness, wo.z) * event(alpha, wo, [&](float cos_h, const Vec3& m, Vec3* wi) {
-                *wi = 2 * cos_h * m - wo;
-                return wi->z > 0 ? fresnel_dielectric(cos_h, 1 / eta).reflectance * slab_transmittance(thickness, wi->z) : 0.0f;
-            });
+            returned +=
+                slab_transmittance(thickness, wo.z) * event(alpha, wo, [&](float cos_h, const Vec3& m, Vec3* wi) {
+                    *wi = 2 * cos_h * m - wo;
+                    return wi->z > 0 ? fresnel_dielectric(cos_h, 1 / eta).reflectance * slab_transmittance(thickness, wi->z) : 0.0f;
+                });
         }
         table->per_alpha[a] = float(returned / kInner);
     }

@@ -15,7 +15,7 @@ class Camera {
     static Result<Camera> create(const PerspectiveCamera& camera, int width, int height);
 
     struct CameraRay {
-        Vec3 origin, direction;  ///< World; unit direction.
+        Vec3 origin, direction;     ///< World; unit direction.
         float pdf_solid_angle = 0;  ///< Of the direction, for one pixel, 1/sr.
     };
     /// `film` in pixels (x right, y down, continuous), `lens` uniform in [0, 1)^2.
@@ -37,8 +37,8 @@ class Camera {
   private:
     Vec3 right_, up_, forward_, position_;  // unit, orthogonal
     int width_ = 0, height_ = 0;
-    float x0_ = 0, y1_ = 0;              // film plane at distance 1: left edge, top edge
-    float pixel_w_ = 0, pixel_h_ = 0;    // size of a pixel there
+    float x0_ = 0, y1_ = 0;            // film plane at distance 1: left edge, top edge
+    float pixel_w_ = 0, pixel_h_ = 0;  // size of a pixel there
     float inv_pixel_area_ = 0;
     float lens_radius_ = 0, focal_distance_ = 1;
 };

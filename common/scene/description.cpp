@@ -20,11 +20,11 @@ struct Checker {
         if (a.material < 0 || size_t(a.material) >= d.materials.size()) return invalid_argument(at(a) + ": no such material");
         if (a.emission != kNone && (a.emission < 0 || size_t(a.emission) >= d.emissions.size()))
             return invalid_argument(at(a) + ": no such area emission");
-        if (a.emission != kNone && !may_emit)
-            return invalid_argument(at(a) + ": a shape inside an object definition may not emit");
+        if (a.emission != kNone && !may_emit) return invalid_argument(at(a) + ": a shape inside an object definition may not emit");
         if (a.emission != kNone && a.alpha != kNone && !d.emissions[size_t(a.emission)].radiance.is_black())
-            return invalid_argument(at(a) + ": a shape that emits may not have an alpha, because the light sampled on it "
-                                            "would be that of the uncut shape; cut the geometry instead");
+            return invalid_argument(at(a) +
+                                    ": a shape that emits may not have an alpha, because the light sampled on it "
+                                    "would be that of the uncut shape; cut the geometry instead");
         if (a.alpha != kNone && (a.alpha < 0 || size_t(a.alpha) >= d.textures.size()))
             return invalid_argument(at(a) + ": no such alpha texture");
         return {};

@@ -23,14 +23,14 @@ enum class WrapMode : uint8_t { kRepeat, kClamp, kBlack };
 
 struct TextureNode {
     TextureKind kind = TextureKind::kConstant;
-    Rgb value{0.0f};                   ///< kConstant. A float texture has three equal components.
-    TextureId a = kNone, b = kNone;    ///< kScale: a * b. kMix: (1-amount) a + amount b. kCheckerboard: the two colours.
-    TextureId amount = kNone;          ///< kMix only.
-    int32_t image = kNone;             ///< kImage: index into SceneDescription::images.
+    Rgb value{0.0f};                 ///< kConstant. A float texture has three equal components.
+    TextureId a = kNone, b = kNone;  ///< kScale: a * b. kMix: (1-amount) a + amount b. kCheckerboard: the two colours.
+    TextureId amount = kNone;        ///< kMix only.
+    int32_t image = kNone;           ///< kImage: index into SceneDescription::images.
     WrapMode wrap = WrapMode::kRepeat;
-    bool nearest = false;              ///< kImage: point lookup; bilinear otherwise.
-    float scale = 1;                   ///< kImage: multiplies the looked-up value.
-    bool invert = false;               ///< kImage: 1 - the scaled value (pbrt's order); below zero is zero.
+    bool nearest = false;  ///< kImage: point lookup; bilinear otherwise.
+    float scale = 1;       ///< kImage: multiplies the looked-up value.
+    bool invert = false;   ///< kImage: 1 - the scaled value (pbrt's order); below zero is zero.
     // (u, v) mapping: s = su * u + du, t = sv * v + dv.
     float su = 1, sv = 1, du = 0, dv = 0;
 };
@@ -49,11 +49,11 @@ enum class MaterialKind : uint8_t {
 /// A material before texture evaluation. Unused slots stay kNone.
 struct Material {
     MaterialKind kind = MaterialKind::kDiffuse;
-    std::string name;                         ///< As in the scene file; empty for anonymous ones.
-    TextureId reflectance = kNone;            ///< kDiffuse, kDiffuseTransmission, kCoatedDiffuse (base), or a conductor's F0.
-    TextureId transmittance = kNone;          ///< kDiffuseTransmission.
-    TextureId eta = kNone, k = kNone;         ///< kConductor (used when reflectance is kNone); base of kCoatedConductor.
-    TextureId roughness_u = kNone, roughness_v = kNone;  ///< GGX roughness (of the coat for coated kinds).
+    std::string name;                  ///< As in the scene file; empty for anonymous ones.
+    TextureId reflectance = kNone;     ///< kDiffuse, kDiffuseTransmission, kCoatedDiffuse (base), or a conductor's F0.
+    TextureId transmittance = kNone;   ///< kDiffuseTransmission.
+    TextureId eta = kNone, k = kNone;  ///< kConductor (used when reflectance is kNone); base of kCoatedConductor.
+    TextureId roughness_u = kNone, roughness_v = kNone;            ///< GGX roughness (of the coat for coated kinds).
     TextureId base_roughness_u = kNone, base_roughness_v = kNone;  ///< kCoatedConductor's conductor.
     bool remap_roughness = true;              ///< pbrt: alpha = sqrt(roughness) if true, alpha = roughness otherwise.
     float ior = 1.5f;                         ///< Relative index of (thin) dielectric or of the coat.
@@ -73,11 +73,11 @@ struct AreaEmission {
 /// What all shapes share.
 struct ShapeAttributes {
     MaterialId material = kNone;
-    int32_t emission = kNone;     ///< Index into SceneDescription::emissions.
-    TextureId alpha = kNone;      ///< Cut-out opacity in [0, 1]; kNone is opaque.
-    bool flip_normal = false;     ///< Reverses the geometric normal cross(p1 - p0, p2 - p0) (pbrt: ReverseOrientation xor
-                                  ///< a handedness-swapping transformation).
-    std::string source;           ///< "file:line" of the shape, for messages.
+    int32_t emission = kNone;  ///< Index into SceneDescription::emissions.
+    TextureId alpha = kNone;   ///< Cut-out opacity in [0, 1]; kNone is opaque.
+    bool flip_normal = false;  ///< Reverses the geometric normal cross(p1 - p0, p2 - p0) (pbrt: ReverseOrientation xor
+                               ///< a handedness-swapping transformation).
+    std::string source;        ///< "file:line" of the shape, for messages.
 };
 
 struct TriangleMesh {
@@ -118,8 +118,8 @@ struct PointLight {
 
 struct SpotLight {
     Vec3 position;
-    Frame axes;            ///< axes.n is the direction of the axis, away from the light.
-    Rgb intensity;         ///< On the axis, W / sr.
+    Frame axes;     ///< axes.n is the direction of the axis, away from the light.
+    Rgb intensity;  ///< On the axis, W / sr.
     // 1 - cosine of an angle, which has the digits that the cosine of a narrow cone has lost.
     float total_height = 0;    ///< Of the angle beyond which the light is dark.
     float falloff_height = 0;  ///< Of the angle within which it has full intensity; smoothstep between.
@@ -133,20 +133,20 @@ struct DistantLight {
 };
 
 struct InfiniteLight {
-    Mat4 light_to_world;   ///< Rotation (and reflection) part is used.
-    Rgb radiance{1.0f};    ///< Multiplies the image, or is the constant radiance when there is none.
-    int32_t image = kNone; ///< Equal-area octahedral square map, index into images.
+    Mat4 light_to_world;    ///< Rotation (and reflection) part is used.
+    Rgb radiance{1.0f};     ///< Multiplies the image, or is the constant radiance when there is none.
+    int32_t image = kNone;  ///< Equal-area octahedral square map, index into images.
     std::string source = {};
 };
 
 struct PerspectiveCamera {
-    Mat4 camera_to_world;            ///< Camera looks along +z, +y up, +x right; may mirror.
-    float fov_degrees = 90;          ///< Of the shorter image side.
+    Mat4 camera_to_world;    ///< Camera looks along +z, +y up, +x right; may mirror.
+    float fov_degrees = 90;  ///< Of the shorter image side.
     /// pbrt's screen window; when unset (`has_screen_window` false) it follows the film's aspect ratio.
     bool has_screen_window = false;
     float screen_window[4] = {-1, 1, -1, 1};  ///< x0, x1, y0, y1.
-    float frame_aspect_ratio = 0;    ///< 0: width / height.
-    float lens_radius = 0;           ///< 0 is a pinhole.
+    float frame_aspect_ratio = 0;             ///< 0: width / height.
+    float lens_radius = 0;                    ///< 0 is a pinhole.
     float focal_distance = 1e6f;
 };
 
@@ -154,8 +154,8 @@ struct FilmDescription {
     int width = 1280, height = 720;
     /// Crop window in pixels, half open: x0, x1, y0, y1; all -1 means the whole frame.
     int crop[4] = {-1, -1, -1, -1};
-    float exposure_scale = 1;          ///< iso * exposure time / 100: multiplies the image.
-    std::string file_name;             ///< As in the scene file; where pictures go is the command line's to say.
+    float exposure_scale = 1;  ///< iso * exposure time / 100: multiplies the image.
+    std::string file_name;     ///< As in the scene file; where pictures go is the command line's to say.
 };
 
 struct SceneDescription {

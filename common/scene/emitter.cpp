@@ -32,7 +32,10 @@ bool samples_cone(const Emitter& e, float d2) { return !e.inward && d2 > e.radiu
 }  // namespace
 
 EmitterSet::EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius)
-    : emitters_(std::move(emitters)), environment_(std::move(environment)), centre_(centre), scene_radius_(radius) {
+    : emitters_(std::move(emitters)),
+      environment_(std::move(environment)),
+      centre_(centre),
+      scene_radius_(radius) {
     disc_pdf_ = 1 / (kPi * radius * radius);
     std::vector<double> powers;
     for (size_t i = 0; i < emitters_.size(); ++i) {
@@ -49,8 +52,7 @@ double EmitterSet::power(const Emitter& e) const {
         case EmitterKind::kTriangle:
         case EmitterKind::kSphere: return kPiD * scalar_of(e.radiance) / e.inv_area * (e.two_sided ? 2 : 1);
         case EmitterKind::kPoint: return 4 * kPiD * scalar_of(e.radiance);
-        case EmitterKind::kSpot:
-            return kPiD * scalar_of(e.radiance) * (double(e.falloff_height) + double(e.total_height));
+        case EmitterKind::kSpot: return kPiD * scalar_of(e.radiance) * (double(e.falloff_height) + double(e.total_height));
         case EmitterKind::kDistant: return scalar_of(e.radiance) * disc;
         case EmitterKind::kEnvironment: return environment_.integrated_radiance() * disc;
     }

@@ -19,17 +19,17 @@ enum class EmitterKind : uint8_t { kTriangle, kSphere, kPoint, kSpot, kDistant, 
 struct Emitter {
     EmitterKind kind = EmitterKind::kTriangle;
     bool two_sided = false;
-    float pmf = 0;              ///< Of being selected, for light sub-paths and for next event alike (by power).
-    Rgb radiance;               ///< Radiance; intensity for point and spot; irradiance for distant; unused for environment.
-    Vec3 position;              ///< First corner, centre, or light position.
-    Vec3 edge1, edge2;          ///< kTriangle.
-    Vec3 normal;                ///< Unit; side that emits. Spot: axis. Distant: direction of travel.
-    float radius = 0;           ///< kSphere; negative-free. `inward` flips its emitting side.
+    float pmf = 0;      ///< Of being selected, for light sub-paths and for next event alike (by power).
+    Rgb radiance;       ///< Radiance; intensity for point and spot; irradiance for distant; unused for environment.
+    Vec3 position;      ///< First corner, centre, or light position.
+    Vec3 edge1, edge2;  ///< kTriangle.
+    Vec3 normal;        ///< Unit; side that emits. Spot: axis. Distant: direction of travel.
+    float radius = 0;   ///< kSphere; negative-free. `inward` flips its emitting side.
     bool inward = false;
     float inv_area = 0;
     float total_height = 0, falloff_height = 0;  ///< kSpot; see SpotLight.
-    float reach = 0;            ///< Area lights: largest coordinate magnitude; see offset_origin().
-    int32_t light = 0;          ///< Group for reports: the area-light shape or light source it came from.
+    float reach = 0;                             ///< Area lights: largest coordinate magnitude; see offset_origin().
+    int32_t light = 0;                           ///< Group for reports: the area-light shape or light source it came from.
 
     bool is_area() const { return kind == EmitterKind::kTriangle || kind == EmitterKind::kSphere; }
     bool is_infinite() const { return kind == EmitterKind::kDistant || kind == EmitterKind::kEnvironment; }
@@ -40,24 +40,24 @@ struct Emitter {
 /// Start of a light sub-path: x_0 and the ray towards x_1.
 struct EmissionSample {
     uint32_t emitter = 0;
-    Vec3 position;             ///< x_0 for finite lights; ray origin outside the scene for infinite ones.
-    Vec3 normal;               ///< Geometric normal at x_0 on the emitting side; for infinite lights the ray direction.
-    Vec3 direction;            ///< Unit, along the light's travel.
-    Rgb alpha;                 ///< Emitted throughput: L |cos| / (pdf_position * pdf_direction).
-    float pdf_position = 0;    ///< pmf included; native measure of x_0.
-    float pdf_direction = 0;   ///< Solid angle for finite lights; area on the disc facing the scene, m^-2, for infinite ones.
+    Vec3 position;            ///< x_0 for finite lights; ray origin outside the scene for infinite ones.
+    Vec3 normal;              ///< Geometric normal at x_0 on the emitting side; for infinite lights the ray direction.
+    Vec3 direction;           ///< Unit, along the light's travel.
+    Rgb alpha;                ///< Emitted throughput: L |cos| / (pdf_position * pdf_direction).
+    float pdf_position = 0;   ///< pmf included; native measure of x_0.
+    float pdf_direction = 0;  ///< Solid angle for finite lights; area on the disc facing the scene, m^-2, for infinite ones.
 };
 
 /// x_0 chosen from a reference point.
 struct NextEventSample {
     uint32_t emitter = 0;
-    Vec3 position;             ///< Point on a finite light; for infinite ones a point beyond the scene to test visibility to.
-    Vec3 normal;               ///< At x_0, geometric; for infinite lights the direction of travel.
-    Vec3 wi;                   ///< Unit, from the reference point to the light.
-    Rgb radiance;              ///< Emitted towards the reference point (intensity for point and spot, irradiance for distant).
-    float geometry = 0;        ///< Converts a solid-angle density at the reference point to the native measure: |cos| / d^2 for
-                               ///< area lights, 1 / d^2 for point and spot, 1 for infinite.
-    float pdf = 0;             ///< Native measure, pmf included.
+    Vec3 position;       ///< Point on a finite light; for infinite ones a point beyond the scene to test visibility to.
+    Vec3 normal;         ///< At x_0, geometric; for infinite lights the direction of travel.
+    Vec3 wi;             ///< Unit, from the reference point to the light.
+    Rgb radiance;        ///< Emitted towards the reference point (intensity for point and spot, irradiance for distant).
+    float geometry = 0;  ///< Converts a solid-angle density at the reference point to the native measure: |cos| / d^2 for
+                         ///< area lights, 1 / d^2 for point and spot, 1 for infinite.
+    float pdf = 0;       ///< Native measure, pmf included.
 };
 
 class EmitterSet {

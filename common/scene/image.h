@@ -12,11 +12,11 @@ namespace lightloom {
 
 struct Image {
     int width = 0, height = 0;
-    int channels = 3;                      ///< 1 or 3 (an alpha channel of the file becomes an Image of its own if used).
-    std::vector<uint8_t> bytes;            ///< width * height * channels when 8-bit, row 0 at the top; empty otherwise.
-    std::array<float, 256> decode{};       ///< 8-bit code to linear value.
-    std::vector<float> floats;             ///< The same layout when not 8-bit.
-    std::string name;                      ///< File it came from, for messages.
+    int channels = 3;                 ///< 1 or 3 (an alpha channel of the file becomes an Image of its own if used).
+    std::vector<uint8_t> bytes;       ///< width * height * channels when 8-bit, row 0 at the top; empty otherwise.
+    std::array<float, 256> decode{};  ///< 8-bit code to linear value.
+    std::vector<float> floats;        ///< The same layout when not 8-bit.
+    std::string name;                 ///< File it came from, for messages.
 
     bool empty() const { return width == 0 || height == 0; }
     size_t memory_bytes() const { return bytes.size() + floats.size() * sizeof(float); }

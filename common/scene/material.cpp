@@ -71,10 +71,9 @@ Bsdf resolve_material(const TextureTables& tables, MaterialId material, Vec2 uv,
                                            (m.layer_events + 1) / 2);
             case MaterialKind::kCoatedConductor: {
                 const ConductorIndex index = conductor_index(tables, m, uv);
-                return make_coated_conductor(index.eta, index.k,
-                                             alpha(tables, m.base_roughness_u, uv, m.remap_roughness),
-                                             alpha(tables, m.base_roughness_v, uv, m.remap_roughness), ior, m.thickness,
-                                             alpha_x, alpha_y);
+                return make_coated_conductor(index.eta, index.k, alpha(tables, m.base_roughness_u, uv, m.remap_roughness),
+                                             alpha(tables, m.base_roughness_v, uv, m.remap_roughness), ior, m.thickness, alpha_x,
+                                             alpha_y);
             }
             default: return {};
         }

@@ -11,11 +11,11 @@ namespace lightloom {
 
 /// What the acceleration structure reports.
 struct RawHit {
-    float t = 0;                      ///< In units of the ray's direction length.
-    uint32_t geometry = 0;            ///< Index of the mesh in its object (or world); the number of meshes means: its spheres.
-    uint32_t primitive = 0;           ///< Triangle or sphere index.
-    int32_t instance = -1;            ///< Index of the instance, or -1.
-    float u = 0, v = 0;               ///< Barycentric weights of the second and third vertex.
+    float t = 0;             ///< In units of the ray's direction length.
+    uint32_t geometry = 0;   ///< Index of the mesh in its object (or world); the number of meshes means: its spheres.
+    uint32_t primitive = 0;  ///< Triangle or sphere index.
+    int32_t instance = -1;   ///< Index of the instance, or -1.
+    float u = 0, v = 0;      ///< Barycentric weights of the second and third vertex.
 };
 
 /// `p` moved off its surface to the side that `direction` points to, by a distance that is a few hundred units in the last

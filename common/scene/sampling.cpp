@@ -4,9 +4,7 @@
 
 namespace lightloom {
 
-AliasTable::AliasTable(std::span<const double> weights) : entries_(weights.size()) {
-    make_alias(weights, entries_.data());
-}
+AliasTable::AliasTable(std::span<const double> weights) : entries_(weights.size()) { make_alias(weights, entries_.data()); }
 
 void make_alias(std::span<const double> weights, AliasEntry* entries) {
     const size_t n = weights.size();

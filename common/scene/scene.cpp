@@ -91,8 +91,8 @@ bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out) const {
         out->p = m.point(out->p);
         float reach = 0;
         for (const auto& row : m.m)
-            reach = std::max(
-                reach, float((std::fabs(row[0]) + std::fabs(row[1]) + std::fabs(row[2])) * out->reach + std::fabs(row[3])));
+            reach = std::max(reach,
+                             float((std::fabs(row[0]) + std::fabs(row[1]) + std::fabs(row[2])) * out->reach + std::fabs(row[3])));
         out->reach = reach;
         out->ng = normalize(inv.normal_by_inverse(out->ng));
         const Vec3 n = normalize(inv.normal_by_inverse(out->shading.n));

@@ -25,15 +25,15 @@ Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions
 
 /// What `lightloom inspect` prints.
 struct SceneSummary {
-    uint64_t triangle_count = 0;           ///< As stored (an instanced object counts once).
-    uint64_t instanced_triangle_count = 0; ///< As seen (every instance counts).
+    uint64_t triangle_count = 0;            ///< As stored (an instanced object counts once).
+    uint64_t instanced_triangle_count = 0;  ///< As seen (every instance counts).
     uint64_t sphere_count = 0, instance_count = 0, emissive_triangle_count = 0;
     uint64_t texture_count = 0, image_bytes = 0, geometry_bytes = 0, acceleration_bytes = 0;
     double build_seconds = 0;
     struct Light {
-        std::string kind;      ///< area, point, spot, distant, infinite
-        std::string where;     ///< file:line where known
-        double power = 0;      ///< Flux, W, as luminance within 0.1 %; in these proportions lights are selected.
+        std::string kind;   ///< area, point, spot, distant, infinite
+        std::string where;  ///< file:line where known
+        double power = 0;   ///< Flux, W, as luminance within 0.1 %; in these proportions lights are selected.
         uint64_t primitives = 0;
     };
     std::vector<Light> lights;
@@ -42,8 +42,8 @@ struct SceneSummary {
 /// A point on a surface, in world space.
 struct SurfacePoint {
     Vec3 p;
-    Vec3 ng;             ///< Geometric normal, unit; outside as the scene defines it.
-    Frame shading;       ///< Shading frame, n in the hemisphere of ng (but for emitters whose normals point inwards).
+    Vec3 ng;        ///< Geometric normal, unit; outside as the scene defines it.
+    Frame shading;  ///< Shading frame, n in the hemisphere of ng (but for emitters whose normals point inwards).
     Vec2 uv;
     MaterialId material = kNone;
     int32_t emitter = kNone;
@@ -85,10 +85,10 @@ class Scene {
     SceneDescription description_;
     TextureTables tables_;
     std::unique_ptr<Accel> accel_;
-    std::vector<int32_t> mesh_first_emitter_;    // per world mesh, kNone where it does not emit
-    std::vector<int32_t> sphere_emitter_;        // per world sphere
+    std::vector<int32_t> mesh_first_emitter_;  // per world mesh, kNone where it does not emit
+    std::vector<int32_t> sphere_emitter_;      // per world sphere
     std::vector<Mat4> instance_inverse_;
-    std::vector<std::string> light_sources_;     // where each light group came from
+    std::vector<std::string> light_sources_;  // where each light group came from
     EmitterSet emitters_;
     Camera camera_;
     /// Largest coordinate magnitude in the whole scene, at most 1/4: in a scene of ordinary size small primitives keep the

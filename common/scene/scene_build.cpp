@@ -31,8 +31,8 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
         return int32_t(light_sources_.size()) - 1;
     };
     for (const TriangleMesh& mesh : description_.meshes) {
-        const bool emits = mesh.attributes.emission != kNone &&
-                           !description_.emissions[size_t(mesh.attributes.emission)].radiance.is_black();
+        const bool emits =
+            mesh.attributes.emission != kNone && !description_.emissions[size_t(mesh.attributes.emission)].radiance.is_black();
         mesh_first_emitter_.push_back(emits ? int32_t(emitters->size()) : kNone);
         if (!emits) continue;
         const AreaEmission& emission = description_.emissions[size_t(mesh.attributes.emission)];
@@ -136,13 +136,9 @@ Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions
     frame.crop = {0, 0, frame.width, frame.height};
     if (film.crop[0] >= 0) {
         // The crop scales with an overridden resolution, rounded outwards.
-        const auto scaled = [](int v, int from, int to, bool up) {
-            return int((int64_t(v) * to + (up ? from - 1 : 0)) / from);
-        };
-        frame.crop = {scaled(film.crop[0], film.width, frame.width, false),
-                      scaled(film.crop[2], film.height, frame.height, false),
-                      scaled(film.crop[1], film.width, frame.width, true),
-                      scaled(film.crop[3], film.height, frame.height, true)};
+        const auto scaled = [](int v, int from, int to, bool up) { return int((int64_t(v) * to + (up ? from - 1 : 0)) / from); };
+        frame.crop = {scaled(film.crop[0], film.width, frame.width, false), scaled(film.crop[2], film.height, frame.height, false),
+                      scaled(film.crop[1], film.width, frame.width, true), scaled(film.crop[3], film.height, frame.height, true)};
         if (frame.crop.empty() || frame.crop.x1 > frame.width || frame.crop.y1 > frame.height)
             return invalid_argument("the film's crop window is empty or outside of the frame");
     }
@@ -203,8 +199,8 @@ void Scene::summarise() {
         uint64_t triangles = 0;
         for (const TriangleMesh& m : meshes) {
             triangles += m.indices.size() / 3;
-            s.geometry_bytes += m.positions.size() * sizeof(Vec3) + m.normals.size() * sizeof(Vec3) +
-                                m.uvs.size() * sizeof(Vec2) + m.indices.size() * sizeof(uint32_t);
+            s.geometry_bytes += m.positions.size() * sizeof(Vec3) + m.normals.size() * sizeof(Vec3) + m.uvs.size() * sizeof(Vec2) +
+                                m.indices.size() * sizeof(uint32_t);
         }
         return triangles;
     };

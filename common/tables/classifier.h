@@ -32,7 +32,7 @@ class SubspaceTree {
     /// By axis; room for any four bits, because a descent may look at a leaf's before it knows that it is one.
     using Scalars = std::array<float, 16>;
     static Scalars scalars_of(const SubPathEnd& e) {
-        return {e.position.x, e.position.y,  e.position.z,  e.normal.x, e.normal.y,
+        return {e.position.x, e.position.y,  e.position.z,  e.normal.x,   e.normal.y,
                 e.normal.z,   e.direction.x, e.direction.y, e.direction.z};
     }
 

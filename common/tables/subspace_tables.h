@@ -34,7 +34,7 @@ struct SubspaceTables {
 
     static constexpr uint32_t kMaxSubspaces = 16384;  ///< Labels are 16 bit and one value is reserved.
 
-    static constexpr uint16_t kMaxWindow = 32;        ///< A unit traces so many caches at most.
+    static constexpr uint16_t kMaxWindow = 32;  ///< A unit traces so many caches at most.
 
     const float* column(uint32_t eye) const { return &gamma[size_t(eye) * light_count]; }
     uint32_t light_label(const SubPathEnd& end) const { return light_tree.label(end); }

@@ -129,8 +129,7 @@ void measure_energy(const TrainingData& d, const EmitterSet& emitters, const Tra
         const TrainingVertex* v = &d.vertices[p.first_vertex];
         for (uint32_t i = 0; i < p.vertex_count; ++i) {
             if (!(v[i].density > 0)) continue;
-            const uint32_t label =
-                i == 0 ? source_label(t->division, emitters, v[0]) : t->light_label(end_between(v[i], v[i - 1]));
+            const uint32_t label = i == 0 ? source_label(t->division, emitters, v[0]) : t->light_label(end_between(v[i], v[i - 1]));
             sum[label] += double(v[i].density);
             count[label] += 1;
             vertices += 1;
@@ -174,8 +173,8 @@ GammaDataset gamma_dataset(const TrainingData& d, const std::vector<double>& bri
         for (uint32_t s = 1; s + 1 < p.vertex_count; ++s) {
             if (!(v[s].density > 0)) continue;
             GammaNode node;
-            node.light = uint16_t(s == 1 ? source_label(t.division, emitters, v[0])
-                                         : t.light_label(end_between(v[s - 1], v[s - 2])));
+            node.light =
+                uint16_t(s == 1 ? source_label(t.division, emitters, v[0]) : t.light_label(end_between(v[s - 1], v[s - 2])));
             node.eye = uint16_t(t.eye_label(end_between(v[s], v[s + 1])));
             node.g = float(o.connections * double(v[s].density) / double(t.energy[node.light]));
             if (node.g > 0 && std::isfinite(node.g)) out.nodes.push_back(node);

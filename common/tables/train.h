@@ -19,14 +19,14 @@ namespace lightloom {
 
 struct TrainingOptions {
     uint32_t light_subspaces = 1000, eye_subspaces = 1000;  ///< N_L, N_E: upper bounds.
-    double source_share = 0.2;      ///< Of the light subspaces, for points on lights.
-    double direction_weight = 0.05; ///< k_d.
-    double mix = 0.1;               ///< Conservative share of Gamma.
+    double source_share = 0.2;                              ///< Of the light subspaces, for points on lights.
+    double direction_weight = 0.05;                         ///< k_d.
+    double mix = 0.1;                                       ///< Conservative share of Gamma.
     GammaTrainer trainer = GammaTrainer::kMm;
-    int connections = 3;            ///< N that rendering will use.
-    double reuse_target = 200;      ///< M0: prefixes that a subspace should hold.
-    int reuse_windows = 1;          ///< J_max.
-    double nominal_paths = 1;       ///< Light paths of the smallest cache that rendering will make.
+    int connections = 3;        ///< N that rendering will use.
+    double reuse_target = 200;  ///< M0: prefixes that a subspace should hold.
+    int reuse_windows = 1;      ///< J_max.
+    double nominal_paths = 1;   ///< Light paths of the smallest cache that rendering will make.
     uint64_t seed = 0;
 };
 

@@ -42,7 +42,7 @@ struct Space {
         scale = {inv_sigma, inv_sigma, inv_sigma, normal, normal, normal, direction, direction, direction};
     }
     static Point raw(const SubPathEnd& e) {
-        return {e.position.x, e.position.y, e.position.z, e.normal.x,   e.normal.y,
+        return {e.position.x, e.position.y,  e.position.z,  e.normal.x,   e.normal.y,
                 e.normal.z,   e.direction.x, e.direction.y, e.direction.z};
     }
     Point point(const SubPathEnd& e) const {
@@ -103,8 +103,7 @@ void order_centroids(std::vector<Point>& c, size_t begin, size_t end) {
     const size_t axis = bounds.widest();
     const size_t middle = begin + (end - begin) / 2;
     const auto less = [axis](const Point& a, const Point& b) { return a[axis] != b[axis] ? a[axis] < b[axis] : a < b; };
-    std::nth_element(c.begin() + std::ptrdiff_t(begin), c.begin() + std::ptrdiff_t(middle), c.begin() + std::ptrdiff_t(end),
-                     less);
+    std::nth_element(c.begin() + std::ptrdiff_t(begin), c.begin() + std::ptrdiff_t(middle), c.begin() + std::ptrdiff_t(end), less);
     order_centroids(c, begin, middle);
     order_centroids(c, middle, end);
 }
@@ -139,7 +138,11 @@ class TreeBuilder {
   public:
     TreeBuilder(const std::vector<WeightedEnd>& ends, const Space& space, std::vector<uint32_t> labels, uint32_t label_count,
                 uint32_t first_label)
-        : ends_(ends), space_(space), labels_(std::move(labels)), votes_(label_count, 0.0), first_label_(first_label),
+        : ends_(ends),
+          space_(space),
+          labels_(std::move(labels)),
+          votes_(label_count, 0.0),
+          first_label_(first_label),
           node_budget_(size_t(kNodesPerSubspace) * label_count) {}
 
     SubspaceTree build(const std::stop_token& stop) {

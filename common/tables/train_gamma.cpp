@@ -18,8 +18,11 @@ struct Level {
     uint32_t bits, source_count, coarse_sources, light_count, eye_count;
 
     Level(const GammaDataset& d, uint32_t level_bits)
-        : bits(level_bits), source_count(d.source_count), coarse_sources(up(d.source_count)),
-          light_count(coarse_sources + up(d.light_count - d.source_count)), eye_count(up(d.eye_count)) {}
+        : bits(level_bits),
+          source_count(d.source_count),
+          coarse_sources(up(d.source_count)),
+          light_count(coarse_sources + up(d.light_count - d.source_count)),
+          eye_count(up(d.eye_count)) {}
     uint32_t up(uint32_t n) const { return (n + (1u << bits) - 1) >> bits; }
     uint32_t light(uint32_t i) const { return i < source_count ? i >> bits : coarse_sources + ((i - source_count) >> bits); }
     uint32_t eye(uint32_t j) const { return j >> bits; }

@@ -46,7 +46,7 @@ struct GammaOptions {
     double mix = 0.1;
     double held_out = 0.2;  ///< Share of the batches that only judge (mm); of the paths where there are few batches.
     uint64_t seed = 0;
-    std::stop_token stop;   ///< Requested: returns soon, with a matrix of no use.
+    std::stop_token stop;                  ///< Requested: returns soon, with a matrix of no use.
     std::function<void(double)> progress;  ///< Optional; called now and then with the share of the work that is done.
 };
 

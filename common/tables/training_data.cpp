@@ -59,16 +59,15 @@ Status TrainingData::validate(size_t emitter_count) const {
     if (light_paths.size() > light_samples) return data_loss("training data with more light sub-paths than were traced");
     for (const std::vector<TrainingPath>* list : {&paths, &light_paths}) {
         for (const TrainingPath& p : *list) {
-            if (p.vertex_count < 1 || uint64_t(p.first_vertex) + p.vertex_count > vertices.size() ||
-                p.block >= block_sum.size() || vertices[p.first_vertex].emitter >= emitter_count)
+            if (p.vertex_count < 1 || uint64_t(p.first_vertex) + p.vertex_count > vertices.size() || p.block >= block_sum.size() ||
+                vertices[p.first_vertex].emitter >= emitter_count)
                 return data_loss("training data with a malformed path");
         }
     }
     // Classifiers sort by these: an order needs numbers.
     const auto finite = [](const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
     for (const TrainingVertex& v : vertices)
-        if (!finite(v.position) || !finite(v.normal))
-            return data_loss("training data with a vertex that is nowhere");
+        if (!finite(v.position) || !finite(v.normal)) return data_loss("training data with a vertex that is nowhere");
     return {};
 }
 
@@ -105,7 +104,8 @@ Result<TrainingData> parse_training_data(std::string_view bytes) {
     const uint64_t limit = bytes.size();
     if (blocks > limit || header.path_count > limit || header.light_path_count > limit || header.vertex_count > limit ||
         blocks * sizeof(double) + (header.path_count + header.light_path_count) * sizeof(TrainingPath) +
-                header.vertex_count * sizeof(TrainingVertex) != limit)
+                header.vertex_count * sizeof(TrainingVertex) !=
+            limit)
         return data_loss("training data of the wrong size");
     TrainingData d;
     d.blocks_x = header.blocks_x, d.blocks_y = header.blocks_y;

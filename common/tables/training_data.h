@@ -24,9 +24,9 @@ namespace lightloom {
 
 struct TrainingVertex {
     Vec3 position;
-    Vec3 normal;             ///< Geometric; x_0 of an infinite light: direction of travel. The lens has none.
-    float density = 0;       ///< Paths: see above. Light sub-paths: scalar throughput; 0 where not connectible.
-    uint32_t emitter = 0;    ///< x_0 only.
+    Vec3 normal;           ///< Geometric; x_0 of an infinite light: direction of travel. The lens has none.
+    float density = 0;     ///< Paths: see above. Light sub-paths: scalar throughput; 0 where not connectible.
+    uint32_t emitter = 0;  ///< x_0 only.
 };
 
 /// Lengths of camera sub-paths that are told apart, and paths that a camera sample keeps of each.
@@ -44,12 +44,12 @@ struct TrainingPath {
 
 struct TrainingData {
     int32_t blocks_x = 0, blocks_y = 0;
-    std::vector<double> block_sum;   ///< Of all estimates, kept or not; blocks_x * blocks_y.
-    uint64_t samples = 0;            ///< D: camera samples traced, uniform over the frame.
-    uint64_t light_samples = 0;      ///< M': light sub-paths traced to measure Q, those included that left nothing to keep.
+    std::vector<double> block_sum;  ///< Of all estimates, kept or not; blocks_x * blocks_y.
+    uint64_t samples = 0;           ///< D: camera samples traced, uniform over the frame.
+    uint64_t light_samples = 0;     ///< M': light sub-paths traced to measure Q, those included that left nothing to keep.
     std::vector<TrainingPath> paths;
     std::vector<TrainingPath> light_paths;
-    std::vector<uint32_t> part_ends; ///< In `paths`, of what append() has joined; not serialized.
+    std::vector<uint32_t> part_ends;  ///< In `paths`, of what append() has joined; not serialized.
     std::vector<TrainingVertex> vertices;
 
     static constexpr uint64_t kMaxVertices = UINT32_MAX;  ///< TrainingPath::first_vertex has 32 bits.

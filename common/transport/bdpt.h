@@ -41,7 +41,8 @@ void trace_bdpt_sample(SampleContext& context, LightDone&& light_done, Contribut
     light_done(y, n);
     const auto from_light = [&](const Rgb& value, int s, int t, Vec2 film) {
         contribute(PathContribution{value, 1, s, t, y, z, y[0].p, y[0].ng, uint32_t(y[0].emitter), film,
-                                    y[s - 1].survival * z[t - 1].survival}, view);
+                                    y[s - 1].survival * z[t - 1].survival},
+                   view);
     };
     for (int s = 2; s <= n; ++s) {
         if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
@@ -62,12 +63,21 @@ void trace_bdpt_sample(SampleContext& context, LightDone&& light_done, Contribut
         const double pick = sampler.rng().uniform_double();
         if (scene.emitters().sample_next_event(v.p, pick, sampler.next_event(t), &light))
             if (const Rgb c = next_event<detail>(scene, z, t, light, &view, &context.counters); !c.is_black())
-                contribute(PathContribution{c, float(view.fwd[0] / view.next_event), 1, t, y, z, light.position, light.normal,
-                                            light.emitter, {}, v.survival}, view);
+                contribute(PathContribution{c,
+                                            float(view.fwd[0] / view.next_event),
+                                            1,
+                                            t,
+                                            y,
+                                            z,
+                                            light.position,
+                                            light.normal,
+                                            light.emitter,
+                                            {},
+                                            v.survival},
+                           view);
         for (int s = 2; s <= n && s + t - 1 <= context.max_edges; ++s) {
             if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
-            if (const Rgb c = connect<detail>(scene, y, s, z, t, &view, &context.counters); !c.is_black())
-                from_light(c, s, t, {});
+            if (const Rgb c = connect<detail>(scene, y, s, z, t, &view, &context.counters); !c.is_black()) from_light(c, s, t, {});
         }
     };
     const auto escape = [&](int t, const WalkRay& ray) {
@@ -75,8 +85,18 @@ void trace_bdpt_sample(SampleContext& context, LightDone&& light_done, Contribut
         const Rgb c = environment_hit<detail>(scene, z, t, ray, &view);
         if (c.is_black()) return;
         const EmitterSet& emitters = scene.emitters();
-        contribute(PathContribution{c, 1, 0, t, y, z, emitters.outside(ray.origin, ray.direction), -ray.direction,
-                                    uint32_t(emitters.environment_index()), {}, ray.survival}, view);
+        contribute(PathContribution{c,
+                                    1,
+                                    0,
+                                    t,
+                                    y,
+                                    z,
+                                    emitters.outside(ray.origin, ray.direction),
+                                    -ray.direction,
+                                    uint32_t(emitters.environment_index()),
+                                    {},
+                                    ray.survival},
+                   view);
     };
     trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters, visit,
                       escape);

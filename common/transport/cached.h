@@ -54,11 +54,12 @@ struct CachedAlgorithm {
             const Rgb c = connect_to_camera(scene, y, s, z0.p, &film, &view, &chunk.counters);
             if (c.is_black()) return;
             method.complete(scene, y, s, &z0, 1, normalize(y[s - 1].p - z0.p), &view);
-            contribute(PathContribution{c, 1, s, 1, y, &z0, y[0].p, y[0].ng, uint32_t(y[0].emitter), film, y[s - 1].survival},
-                       view, m, chunk);
+            contribute(PathContribution{c, 1, s, 1, y, &z0, y[0].p, y[0].ng, uint32_t(y[0].emitter), film, y[s - 1].survival}, view,
+                       m, chunk);
         };
-        state.cache = trace_light_cache(scope, window * method.windows(), preparation,
-                                        [&](PathVertex* y, int n) { method.label_light_path(scene, y, n); }, splat);
+        state.cache = trace_light_cache(
+            scope, window * method.windows(), preparation, [&](PathVertex* y, int n) { method.label_light_path(scene, y, n); },
+            splat);
         if (!scope.stop.stop_requested()) state.index = method.index(state.cache, window);
         state.cache.prefixes = {};
         return state;
@@ -88,8 +89,9 @@ struct CachedAlgorithm {
             method.label_camera_vertex(scene, &v);
             LightPick picks[kMaxConnections];
             // Low-discrepancy at the first vertex, over the iterations of the pixel.
-            const int count = method.draw(state.cache, state.index, v, [&] { return sampler.next_event(t); }, sampler.rng(),
-                                          context.max_edges + 1 - t, picks);
+            const int count = method.draw(
+                state.cache, state.index, v, [&] { return sampler.next_event(t); }, sampler.rng(), context.max_edges + 1 - t,
+                picks);
             for (int n = 0; n < count; ++n) {
                 const LightPick& pick = picks[n];
                 const int s = pick.s;
@@ -101,8 +103,10 @@ struct CachedAlgorithm {
                 const float scale = method.inverse_density(pick);
                 // Where a light sub-path from an infinite light began says nothing about this one: x_0 is a direction.
                 const Vec3 x0 = direction ? scene.emitters().outside(v.p, -end.ng) : start.p;
-                contribute(PathContribution{c * scale, scale, s, t, pick.y, z, x0, start.ng, uint32_t(start.emitter), {},
-                                            end.survival * v.survival}, view);
+                contribute(
+                    PathContribution{
+                        c * scale, scale, s, t, pick.y, z, x0, start.ng, uint32_t(start.emitter), {}, end.survival * v.survival},
+                    view);
             }
         };
         const auto escape = [&](int t, const WalkRay& ray) {
@@ -111,11 +115,21 @@ struct CachedAlgorithm {
             if (c.is_black()) return;
             if (view.k >= 2) method.complete(scene, nullptr, 0, z, t, ray.direction, &view);
             const EmitterSet& emitters = scene.emitters();
-            contribute(PathContribution{c, 1, 0, t, nullptr, z, emitters.outside(ray.origin, ray.direction), -ray.direction,
-                                        uint32_t(emitters.environment_index()), {}, ray.survival}, view);
+            contribute(PathContribution{c,
+                                        1,
+                                        0,
+                                        t,
+                                        nullptr,
+                                        z,
+                                        emitters.outside(ray.origin, ray.direction),
+                                        -ray.direction,
+                                        uint32_t(emitters.environment_index()),
+                                        {},
+                                        ray.survival},
+                       view);
         };
-        trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
-                          visit, escape);
+        trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters, visit,
+                          escape);
     }
 
     Rgb sample(SampleContext& context, const State& state) const {

@@ -7,38 +7,63 @@
 namespace lightloom {
 namespace {
 
-constexpr ParameterInfo kRouletteStart{"rr-start", 4, 2, 256, true,
+constexpr ParameterInfo kRouletteStart{"rr-start",
+                                       4,
+                                       2,
+                                       256,
+                                       true,
                                        "sub-path vertices below this index never end by Russian roulette "
                                        "[Pharr, Jakob and Humphreys 2023, 2.2.4]"};
 // The weights know a typical survival at best, so that a technique whose sub-path rarely survives is trusted too much: at 0.05,
 // door needs 1.4 (spcbpt), 1.7 (bdpt) and 2.5 (path) times the processor time for the same relMSE; at 1 the walks cost more than
 // they save.
-constexpr ParameterInfo kRouletteMin{"rr-min", 0.5, 0.01, 1, false,
+constexpr ParameterInfo kRouletteMin{"rr-min",
+                                     0.5,
+                                     0.01,
+                                     1,
+                                     false,
                                      "smallest survival probability of Russian roulette; 1 switches roulette off "
                                      "[measured: best of 0.05 to 1]"};
 constexpr std::string_view kHeuristics[] = {"balance", "power", "maximum"};
 constexpr std::string_view kTrainers[] = {"mm", "adam", "contribution"};
 constexpr std::string_view kSwitch[] = {"off", "on"};
 
-constexpr ParameterInfo kHeuristic{"heuristic", 0, 0, 2, true,
-                                   "balance [Veach 1997, eq. 9.8], power with exponent 2, or maximum", kHeuristics};
-constexpr ParameterInfo kLightPaths{"light-paths", 0.3, 0.001, 64, false,
+constexpr ParameterInfo kHeuristic{"heuristic", 0, 0, 2, true, "balance [Veach 1997, eq. 9.8], power with exponent 2, or maximum",
+                                   kHeuristics};
+constexpr ParameterInfo kLightPaths{"light-paths",
+                                    0.3,
+                                    0.001,
+                                    64,
+                                    false,
                                     "N1 and M: light sub-paths per pixel and iteration; all of them splat and fill the cache "
                                     "[Su et al. 2022, section 8.1: 1e5 per iteration, 0.05 per pixel]"};
-constexpr ParameterInfo kCache{"cache", 20000, 1, 1e8, true,
+constexpr ParameterInfo kCache{"cache",
+                               20000,
+                               1,
+                               1e8,
+                               true,
                                "smallest number of light sub-paths in a unit's cache, however few camera samples it has "
                                "[Davidovic et al. 2014 fill one per image]"};
-constexpr ParameterInfo kConnections{"connections", 3, 1, 64, true,
-                                     "N: connections per camera vertex [Su et al. 2022, table 3]"};
+constexpr ParameterInfo kConnections{"connections", 3, 1, 64, true, "N: connections per camera vertex [Su et al. 2022, table 3]"};
 
 constexpr ParameterInfo kWalk[] = {kRouletteStart, kRouletteMin};
 constexpr ParameterInfo kWeighted[] = {kRouletteStart, kRouletteMin, kHeuristic};
 constexpr ParameterInfo kUniformCache[] = {
-    kRouletteStart, kRouletteMin, kHeuristic, kLightPaths, kCache, kConnections,
+    kRouletteStart,
+    kRouletteMin,
+    kHeuristic,
+    kLightPaths,
+    kCache,
+    kConnections,
     {"training-paths", 20000, 1, 1e8, true, "light sub-paths that count the vertices per path before rendering"},
 };
 constexpr ParameterInfo kSubspaces[] = {
-    kRouletteStart, kRouletteMin, kHeuristic, kLightPaths, kCache, kConnections,
+    kRouletteStart,
+    kRouletteMin,
+    kHeuristic,
+    kLightPaths,
+    kCache,
+    kConnections,
     {"light-subspaces", 1000, 1, 16384, true, "N_L: upper bound of the light subspaces [Su et al. 2022, section 8.1]"},
     {"eye-subspaces", 1000, 1, 16384, true, "N_E: upper bound of the eye subspaces [Su et al. 2022, section 8.1]"},
     {"source-share", 0.2, 0, 1, false, "share of N_L that divides the lights themselves [Su et al. 2022, section 7.2.1]"},
@@ -49,19 +74,25 @@ constexpr ParameterInfo kSubspaces[] = {
     {"pilot", 0.2, 0, 1, false,
      "share of the training set that is traced first, to guide the tracing of the rest; 0: no second round [own; measured]"},
     {"direction-weight", 0.05, 0, 10, false, "k_d: weight of directions in the distance of sub-paths [Su et al. 2022, eq. 18]"},
-    {"mix", 0.1, 0.001, 1, false, "share of Gamma that is not learned: half uniform, half in proportion to Q "
+    {"mix", 0.1, 0.001, 1, false,
+     "share of Gamma that is not learned: half uniform, half in proportion to Q "
      "[Su et al. 2022, section 7.3: uniform alone]"},
     {"trainer", 0, 0, 2, true,
      "of Gamma: mm (majorise-minimise with a held-out prior; own), adam "
-     "[Su et al. 2022, section 7.3], contribution (their figure 6)", kTrainers},
-    {"windows", 1, 1, 32, true, "J_max: light-only windows that rarely hit subspaces may keep "
+     "[Su et al. 2022, section 7.3], contribution (their figure 6)",
+     kTrainers},
+    {"windows", 1, 1, 32, true,
+     "J_max: light-only windows that rarely hit subspaces may keep "
      "[in place of the reuse of Su et al. 2022, section 7.4]"},
-    {"reuse-target", 200, 1, 1e6, false, "M0: light prefixes that a subspace should hold, as far as windows allow "
+    {"reuse-target", 200, 1, 1e6, false,
+     "M0: light prefixes that a subspace should hold, as far as windows allow "
      "[Su et al. 2022, section 7.4]"},
     {"correlation-aware", 1, 0, 1, true,
      "weights know that the N connections of a vertex share its camera sub-path [Grittmann et al. 2021]", kSwitch},
-    {"ris-aware", 0, 0, 1, true, "weights know that a cache of M paths limits what a subspace can deliver "
-     "[Nabata et al. 2020, eq. 9]", kSwitch},
+    {"ris-aware", 0, 0, 1, true,
+     "weights know that a cache of M paths limits what a subspace can deliver "
+     "[Nabata et al. 2020, eq. 9]",
+     kSwitch},
 };
 
 constexpr AlgorithmInfo kCatalog[] = {
@@ -72,8 +103,7 @@ constexpr AlgorithmInfo kCatalog[] = {
     {"bdpt", "bidirectional path tracing, every camera sample paired with one light sub-path", "Veach 1997, chapter 10",
      "unbiased; misses specular-diffuse-specular paths from lights that cannot be hit", kWeighted, true},
     {"lvcbpt", "bidirectional path tracing with a light-vertex cache, vertices drawn uniformly",
-     "Davidovic, Krivanek, Hasan and Slusallek 2014, section 4.1", "unbiased; misses what bdpt misses", kUniformCache, true,
-     true},
+     "Davidovic, Krivanek, Hasan and Slusallek 2014, section 4.1", "unbiased; misses what bdpt misses", kUniformCache, true, true},
     {"spcbpt", "subspace-based probabilistic connections: learns which light sub-paths matter to which camera sub-paths",
      "Su, Li and Wang 2022", "unbiased; misses what bdpt misses", kSubspaces, true, true},
 };

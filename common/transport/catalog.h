@@ -26,9 +26,9 @@ struct ParameterInfo {
 
 struct AlgorithmInfo {
     std::string_view name;
-    std::string_view summary;   ///< One line.
-    std::string_view source;    ///< Paper or book, with equation numbers.
-    std::string_view bias;      ///< "unbiased", or what is biased or missing.
+    std::string_view summary;  ///< One line.
+    std::string_view source;   ///< Paper or book, with equation numbers.
+    std::string_view bias;     ///< "unbiased", or what is biased or missing.
     std::span<const ParameterInfo> parameters;
     bool splats;                ///< Traces light paths that land anywhere on the frame.
     bool needs_tables = false;  ///< Reads tables that training units make first (common/tables).

@@ -1,7 +1,7 @@
 #include "common/transport/first_hit.h"
 
-#include "common/path/camera_walk.h"
 #include "common/core/fork_join.h"
+#include "common/path/camera_walk.h"
 
 namespace lightloom {
 

@@ -17,15 +17,15 @@ inline constexpr uint64_t kTrainingUnitSamples = uint64_t(1) << 14;
 struct TransportParameters {
     RouletteRule roulette;
     Heuristic heuristic = Heuristic::kBalance;
-    double light_paths = 0;       ///< N1, per pixel and iteration; 0 for algorithms that splat nothing.
+    double light_paths = 0;  ///< N1, per pixel and iteration; 0 for algorithms that splat nothing.
     bool needs_tables = false;
     // Algorithms with a cache.
-    int connections = 1;          ///< N
-    uint64_t minimum_paths = 1;   ///< Of a unit's cache.
+    int connections = 1;         ///< N
+    uint64_t minimum_paths = 1;  ///< Of a unit's cache.
     bool ris_aware = false, correlation_aware = false;
     uint64_t training_samples = 0;
-    double energy_paths = 1;      ///< M' / D: light sub-paths that measure Q, per training sample.
-    uint64_t pilot_samples = 0;   ///< The first of them, traced without a guide; 0: all.
+    double energy_paths = 1;     ///< M' / D: light sub-paths that measure Q, per training sample.
+    uint64_t pilot_samples = 0;  ///< The first of them, traced without a guide; 0: all.
     TrainingOptions training;
 
     /// How many light sub-paths the training samples before number `sample` measure Q with.

@@ -47,8 +47,8 @@ struct PathAlgorithm {
         const auto escape = [&](int t, const WalkRay& ray) {
             if (t <= context.max_edges) add(environment_hit<kDetail>(scene, z, t, ray, &view), 0);
         };
-        trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
-                          visit, escape);
+        trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters, visit,
+                          escape);
         return sum;
     }
 };

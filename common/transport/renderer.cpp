@@ -15,7 +15,10 @@ template <class A>
 class UnitRenderer final : public Renderer {
   public:
     UnitRenderer(std::shared_ptr<const Scene> scene, RenderSettings settings, RouletteRule roulette, A algorithm)
-        : scene_(std::move(scene)), settings_(std::move(settings)), roulette_(roulette), algorithm_(std::move(algorithm)) {}
+        : scene_(std::move(scene)),
+          settings_(std::move(settings)),
+          roulette_(roulette),
+          algorithm_(std::move(algorithm)) {}
 
     Result<Partial> render(const UnitWork& work, std::stop_token stop) const override {
         return render_unit(algorithm_, *scene_, settings_, roulette_, work, stop);

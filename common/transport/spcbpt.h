@@ -21,9 +21,9 @@
 #include <span>
 #include <utility>
 
+#include "common/core/inverse_cdf.h"
 #include "common/path/correlation.h"
 #include "common/path/survival.h"
-#include "common/core/inverse_cdf.h"
 #include "common/scene/sampling.h"
 #include "common/transport/cached.h"
 #include "common/transport/parameters.h"
@@ -34,9 +34,9 @@ namespace lightloom {
 /// The tables and what every unit derives from them once.
 struct PreparedTables {
     SubspaceTables tables;
-    InverseCdfTable draws;           ///< Gamma(. | j)
-    std::vector<float> inv_energy;   ///< 1 / Q
-    int windows = 1;                 ///< Largest J.
+    InverseCdfTable draws;          ///< Gamma(. | j)
+    std::vector<float> inv_energy;  ///< 1 / Q
+    int windows = 1;                ///< Largest J.
 
     explicit PreparedTables(SubspaceTables t) : tables(std::move(t)), draws(tables.light_count, tables.eye_count) {
         for (uint32_t j = 0; j < tables.eye_count; ++j) draws.set(j, {tables.column(j), tables.light_count});
@@ -62,8 +62,8 @@ struct SubspaceSelection {
         if (s == view.k) return light_paths_per_iteration * survival(s);
         const uint32_t i = view.light_label[s];
         const double count = correlation_aware ? connections * correlation_factor(view, s, connections) : connections;
-        const double target = count * double(prepared->tables.column(view.eye_label[s])[i]) *
-                              double(prepared->inv_energy[i]) * view.light_throughput[s];
+        const double target = count * double(prepared->tables.column(view.eye_label[s])[i]) * double(prepared->inv_energy[i]) *
+                              view.light_throughput[s];
         const bool limited = cache_paths > 0 && target > 0;
         return camera_paths * (limited ? 1 / (1 / target + 1 / (cache_paths * survival(s))) : target);
     }
@@ -100,8 +100,7 @@ struct SubspaceConnections {
     SubspaceLabeller labeller(const Scene& scene) const { return {selection.prepared->tables, scene.emitters()}; }
     void label_light_path(const Scene& scene, PathVertex* y, int n) const { labeller(scene).label_light_path(y, n); }
     void label_camera_vertex(const Scene& scene, PathVertex* v) const { labeller(scene).label_camera_vertex(v); }
-    void complete(const Scene& scene, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards,
-                  PathView* view) const {
+    void complete(const Scene& scene, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
         labeller(scene).complete(y, s, z, t, towards, view);
     }
     float inverse_density(const LightPick& pick) const { return pick.scale / scalar_of(pick.y[pick.s - 1].alpha); }
@@ -196,9 +195,9 @@ using SpcbptAlgorithm = CachedAlgorithm<SubspaceConnections<Selection>>;
 /// `light_paths_per_iteration`: N1 |crop|.
 inline SpcbptAlgorithm<> make_spcbpt(const TransportParameters& p, std::shared_ptr<const PreparedTables> prepared,
                                      double light_paths_per_iteration) {
-    SubspaceSelection selection{std::move(prepared), light_paths_per_iteration, double(p.connections),
-                                p.ris_aware ? double(p.minimum_paths) : 0, p.correlation_aware,
-                                TypicalSurvival(p.roulette)};
+    SubspaceSelection selection{std::move(prepared),   light_paths_per_iteration,
+                                double(p.connections), p.ris_aware ? double(p.minimum_paths) : 0,
+                                p.correlation_aware,   TypicalSurvival(p.roulette)};
     return {{std::move(selection), p.connections}, p.heuristic, p.minimum_paths};
 }
 

@@ -31,8 +31,8 @@ struct RenderCounts {
 class Reservoir {
   public:
     /// `weight`, of the generator's techniques; `scale` of what it found. Returns the estimate.
-    double offer(const PathContribution& c, PathView& view, double weight, double scale, uint32_t block,
-                 const RenderCounts& render, Rng& rng) {
+    double offer(const PathContribution& c, PathView& view, double weight, double scale, uint32_t block, const RenderCounts& render,
+                 Rng& rng) {
         const double contribution = double(scalar_of(c.value)) * scale, estimate = weight * contribution;
         if (!(estimate > 0) || !std::isfinite(estimate)) return 0;
         const int k = view.k;
@@ -54,12 +54,11 @@ class Reservoir {
         const double inverse_own = double(c.inverse_density) * scale / double(c.survival);
         const auto keep = [&](int s, double ratio) {
             if (!can_connect(view, s)) return;
-            const double density = ratio * inverse_own *
-                                   render.survival(s == k ? k : k + 1 - s) *
-                                   (s == 0   ? 1
-                                    : s == k ? render.light_paths_per_iteration
-                                             : view.light_throughput[s] *
-                                                   correlation_factor(view, s, render.correlated_connections));
+            const double density =
+                ratio * inverse_own * render.survival(s == k ? k : k + 1 - s) *
+                (s == 0   ? 1
+                 : s == k ? render.light_paths_per_iteration
+                          : view.light_throughput[s] * correlation_factor(view, s, render.correlated_connections));
             vertices_[s == k ? 0 : size_t(s)].density += single(density);
         };
         keep(c.s, 1);
@@ -161,7 +160,10 @@ Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const Re
 class TrainingGenerator::Unit {
   public:
     Unit(const TrainingGenerator& generator, const TrainingWork& work, std::stop_token stop)
-        : generator_(generator), work_(work), stop_(std::move(stop)), blocks_(crop(), work.total_samples) {}
+        : generator_(generator),
+          work_(work),
+          stop_(std::move(stop)),
+          blocks_(crop(), work.total_samples) {}
 
     Rect crop() const { return generator_.scene_->frame().crop; }
     double pixels() const { return double(crop().area()); }
@@ -267,8 +269,7 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
                 const uint32_t block = splat ? unit.blocks().at(int(found.film.x), int(found.film.y)) : camera_block;
                 const double weight = mis_weight(view, {TechniqueKind::kConnect, found.s}, generator);
                 data.block_sum[block] += (splat ? from_light : from_camera.of(found))
-                                             .offer(found, view, weight, splat ? 1 / unit.pixels() : 1, block,
-                                                    render, rng);
+                                             .offer(found, view, weight, splat ? 1 / unit.pixels() : 1, block, render, rng);
             });
         from_camera.move_to(&data);
         from_light.move_to(&data);
@@ -286,12 +287,12 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
     };
     std::vector<FromLight> from_light(work.light_path_count);
     UnitPreparation preparation;
-    const auto state = generator.prepare(
-        unit.scope(work), &preparation, [&](const PathContribution& found, PathView& view, uint64_t m, auto&) {
+    const auto state =
+        generator.prepare(unit.scope(work), &preparation, [&](const PathContribution& found, PathView& view, uint64_t m, auto&) {
             Rng rng({seed_, Stage::kTraining, 1 + uint64_t(found.s), work.first_light_path + m});
             const uint32_t block = unit.blocks().at(int(found.film.x), int(found.film.y));
-            const double estimate = from_light[m].reservoir.offer(found, view, generator.weight(view, found.s),
-                                                                  1 / unit.pixels(), block, render, rng);
+            const double estimate =
+                from_light[m].reservoir.offer(found, view, generator.weight(view, found.s), 1 / unit.pixels(), block, render, rng);
             from_light[m].estimates.push_back({block, estimate});
         });
     TrainingData data = unit.empty();
@@ -334,8 +335,7 @@ Result<SubspaceTables> make_tables(const Scene& scene, const RenderSettings& set
         if (!generator.ok()) return generator.status();
         TrainingData data;
         for (; first < end; first += std::min(kTrainingUnitSamples, end - first)) {
-            const Result<TrainingData> unit =
-                generator->trace({first, std::min(kTrainingUnitSamples, end - first), samples}, stop);
+            const Result<TrainingData> unit = generator->trace({first, std::min(kTrainingUnitSamples, end - first), samples}, stop);
             if (!unit.ok()) return unit.status();
             LL_RETURN_IF_ERROR(data.append(*unit));
         }

@@ -7,9 +7,9 @@
 #include <stop_token>
 #include <vector>
 
+#include "common/core/fork_join.h"
 #include "common/film/partial.h"
 #include "common/path/light_walk.h"
-#include "common/core/fork_join.h"
 #include "common/transport/renderer.h"
 
 namespace lightloom {
@@ -26,12 +26,12 @@ struct SampleContext {
     uint64_t seed;
     int max_edges;
     RouletteRule roulette;
-    uint64_t iteration = 0;     ///< Global number.
-    uint32_t pixel = 0;         ///< Row-major in the crop.
-    int px = 0, py = 0;         ///< Full-frame coordinates.
-    uint64_t group_iteration = 0;  ///< First iteration of the group: keys the light paths together with...
-    uint64_t light_path = 0;       ///< ...the number of this sample's light path within the group.
-    PathVertex* camera_path;    ///< Room for max_edges + 2.
+    uint64_t iteration = 0;           ///< Global number.
+    uint32_t pixel = 0;               ///< Row-major in the crop.
+    int px = 0, py = 0;               ///< Full-frame coordinates.
+    uint64_t group_iteration = 0;     ///< First iteration of the group: keys the light paths together with...
+    uint64_t light_path = 0;          ///< ...the number of this sample's light path within the group.
+    PathVertex* camera_path;          ///< Room for max_edges + 2.
     PathVertex* light_path_vertices;  ///< Room for max_edges + 1.
     std::vector<Splat>* splats;
     WalkCounters counters;
@@ -74,9 +74,10 @@ concept PreparedAlgorithm = requires(const A& a, const UnitScope& scope, UnitPre
 
 /// Sums one unit. See UnitWork for what the numbers mean.
 template <class A>
-    requires UnitAlgorithm<A> || PreparedAlgorithm<A>
-Result<Partial> render_unit(const A& algorithm, const Scene& scene, const RenderSettings& settings, const RouletteRule& roulette,
-                            const UnitWork& work, std::stop_token stop) {
+requires UnitAlgorithm<A> || PreparedAlgorithm<A> Result<Partial> render_unit(const A& algorithm, const Scene& scene,
+                                                                              const RenderSettings& settings,
+                                                                              const RouletteRule& roulette, const UnitWork& work,
+                                                                              std::stop_token stop) {
     const Rect& crop = scene.frame().crop;
     const Rect& tile = work.tile;
     if (tile.empty() || tile.x0 < crop.x0 || tile.y0 < crop.y0 || tile.x1 > crop.x1 || tile.y1 > crop.y1)

@@ -83,15 +83,14 @@ Result<AssetManifest> AssetManifest::parse(std::string_view text) {
             return bad_line(number, "paths are not in ascending order");
         manifest.entries.push_back(std::move(entry));
     }
-    const bool has_main = std::any_of(manifest.entries.begin(), manifest.entries.end(),
-                                      [&](const AssetEntry& e) { return e.path == manifest.main; });
+    const bool has_main =
+        std::any_of(manifest.entries.begin(), manifest.entries.end(), [&](const AssetEntry& e) { return e.path == manifest.main; });
     if (!has_main) return bad_line(2, "the main file is not in the list");
     if (manifest.canonical_text() != whole) return invalid_argument("the scene file list is not in canonical form");
     return manifest;
 }
 
-Result<AssetManifest> AssetManifest::of_files(const std::filesystem::path& directory,
-                                              const std::vector<std::string>& files) {
+Result<AssetManifest> AssetManifest::of_files(const std::filesystem::path& directory, const std::vector<std::string>& files) {
     if (files.empty()) return invalid_argument("a scene needs at least one file");
     AssetManifest manifest;
     manifest.main = files.front();

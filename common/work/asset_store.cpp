@@ -55,7 +55,8 @@ Result<Digest> digest_file(const fs::path& path) {
 }
 
 AssetStore::AssetStore(fs::path directory, uint64_t max_asset_bytes)
-    : directory_(std::move(directory)), max_asset_bytes_(max_asset_bytes) {
+    : directory_(std::move(directory)),
+      max_asset_bytes_(max_asset_bytes) {
     std::error_code ignored;  // a directory that cannot be made shows as an error of the first write
     fs::create_directories(directory_ / "incoming", ignored);
 }
@@ -110,9 +111,8 @@ void AssetStore::trim(uint64_t max_bytes, const Digest& newest) const {
     std::error_code error;
     for (fs::directory_iterator item(directory_, error), end; item != end; item.increment(error))
         if (item->is_directory(error)) directories.push_back(item->path());
-    trim_cache(directories, max_bytes, path_of(newest), [&](const fs::path& path) {
-        return path.parent_path() == incoming ? CacheFile::kUnfinished : CacheFile::kEntry;
-    });
+    trim_cache(directories, max_bytes, path_of(newest),
+               [&](const fs::path& path) { return path.parent_path() == incoming ? CacheFile::kUnfinished : CacheFile::kEntry; });
 }
 
 size_t AssetStore::remove_all_that_begin_with(std::string_view prefix) {
@@ -132,8 +132,8 @@ size_t AssetStore::remove_all_that_begin_with(std::string_view prefix) {
 
 Result<AssetStore::Upload> AssetStore::begin_upload(const Digest& digest, uint64_t size_bytes) {
     if (size_bytes > max_asset_bytes_)
-        return Status(StatusCode::kResourceExhausted, "asset of " + std::to_string(size_bytes) +
-                                                          " bytes; the limit is " + std::to_string(max_asset_bytes_));
+        return Status(StatusCode::kResourceExhausted,
+                      "asset of " + std::to_string(size_bytes) + " bytes; the limit is " + std::to_string(max_asset_bytes_));
     {
         const std::lock_guard lock(mutex_);
         if (!uploading_.insert(digest).second)
@@ -145,7 +145,8 @@ Result<AssetStore::Upload> AssetStore::begin_upload(const Digest& digest, uint64
     Upload upload(this, digest, size_bytes, 0, file);
     if (file < 0) return io_error(path, error);
     // Another process may share the directory; and it may have published or removed this very file between our open and our lock.
-    struct stat ours {}, named {};
+    struct stat ours {
+    }, named{};
     if (::flock(file, LOCK_EX | LOCK_NB) != 0 || contains(digest) || ::fstat(file, &ours) != 0 ||
         ::stat(path.c_str(), &named) != 0 || ours.st_ino != named.st_ino)
         return Status(StatusCode::kAborted, "asset " + digest.hex() + " is being stored by another process");
@@ -159,10 +160,18 @@ Result<AssetStore::Upload> AssetStore::begin_upload(const Digest& digest, uint64
 }
 
 AssetStore::Upload::Upload(AssetStore* store, const Digest& digest, uint64_t size, uint64_t offset, int file)
-    : store_(store), digest_(digest), size_(size), offset_(offset), file_(file) {}
+    : store_(store),
+      digest_(digest),
+      size_(size),
+      offset_(offset),
+      file_(file) {}
 
 AssetStore::Upload::Upload(Upload&& other) noexcept
-    : store_(other.store_), digest_(other.digest_), size_(other.size_), offset_(other.offset_), file_(other.file_) {
+    : store_(other.store_),
+      digest_(other.digest_),
+      size_(other.size_),
+      offset_(other.offset_),
+      file_(other.file_) {
     other.store_ = nullptr;
     other.file_ = -1;
 }

@@ -70,16 +70,15 @@ struct GoldenBuilder {
 SceneDescription golden_scene() {
     GoldenBuilder g;
     const TextureId white = g.constant(Rgb(0.75f)), red = g.constant({0.7f, 0.2f, 0.15f});
-    const TextureId checks = g.texture(
-        {.kind = TextureKind::kCheckerboard, .a = white, .b = g.constant({0.1f, 0.3f, 0.6f}), .su = 4, .sv = 4});
+    const TextureId checks =
+        g.texture({.kind = TextureKind::kCheckerboard, .a = white, .b = g.constant({0.1f, 0.3f, 0.6f}), .su = 4, .sv = 4});
     const TextureId rough = g.constant(Rgb(0.3f)), half = g.constant(Rgb(0.4f));
 
     const MaterialId wall = g.material({.kind = MaterialKind::kDiffuse, .reflectance = white});
     const MaterialId floor = g.material({.kind = MaterialKind::kDiffuse, .reflectance = checks});
-    const MaterialId curtain =
-        g.material({.kind = MaterialKind::kDiffuseTransmission, .reflectance = red, .transmittance = half});
-    const MaterialId metal = g.material(
-        {.kind = MaterialKind::kConductor, .reflectance = white, .roughness_u = rough, .roughness_v = rough});
+    const MaterialId curtain = g.material({.kind = MaterialKind::kDiffuseTransmission, .reflectance = red, .transmittance = half});
+    const MaterialId metal =
+        g.material({.kind = MaterialKind::kConductor, .reflectance = white, .roughness_u = rough, .roughness_v = rough});
     const MaterialId glass = g.material({.kind = MaterialKind::kDielectric, .ior = 1.5f});
 
     g.scene.emissions.push_back({.radiance = {12, 11, 9}});
@@ -115,14 +114,21 @@ SceneDescription golden_courtyard() {
     const TextureId shade = g.texture({.kind = TextureKind::kScale, .a = blend, .b = white});
 
     const MaterialId ground = g.material({.kind = MaterialKind::kDiffuse, .reflectance = shade});
-    const MaterialId lacquer = g.material({.kind = MaterialKind::kCoatedDiffuse, .reflectance = picture, .roughness_u = third,
-                                           .roughness_v = tenth});
-    const MaterialId varnish = g.material({.kind = MaterialKind::kCoatedConductor, .eta = g.constant({0.2f, 0.9f, 1.1f}),
-                                           .k = g.constant({3.9f, 2.4f, 2.2f}), .roughness_u = tenth, .roughness_v = tenth,
-                                           .base_roughness_u = third, .base_roughness_v = tenth});
+    const MaterialId lacquer =
+        g.material({.kind = MaterialKind::kCoatedDiffuse, .reflectance = picture, .roughness_u = third, .roughness_v = tenth});
+    const MaterialId varnish = g.material({.kind = MaterialKind::kCoatedConductor,
+                                           .eta = g.constant({0.2f, 0.9f, 1.1f}),
+                                           .k = g.constant({3.9f, 2.4f, 2.2f}),
+                                           .roughness_u = tenth,
+                                           .roughness_v = tenth,
+                                           .base_roughness_u = third,
+                                           .base_roughness_v = tenth});
     const MaterialId poster = g.material({.kind = MaterialKind::kDiffuse, .reflectance = label});
-    const MaterialId copper = g.material({.kind = MaterialKind::kConductor, .eta = g.constant({0.2f, 0.9f, 1.1f}),
-                                          .k = g.constant({3.9f, 2.4f, 2.2f}), .roughness_u = third, .roughness_v = tenth,
+    const MaterialId copper = g.material({.kind = MaterialKind::kConductor,
+                                          .eta = g.constant({0.2f, 0.9f, 1.1f}),
+                                          .k = g.constant({3.9f, 2.4f, 2.2f}),
+                                          .roughness_u = third,
+                                          .roughness_v = tenth,
                                           .remap_roughness = false});
     const MaterialId frosted =
         g.material({.kind = MaterialKind::kDielectric, .roughness_u = tenth, .roughness_v = tenth, .ior = 1.4f});
@@ -198,8 +204,7 @@ Status hash_units(SceneDescription description, Sha256& hash) {
         const auto renderer = Renderer::create(scene, settings, tables);
         if (!renderer.ok()) return renderer.status();
         const Rect tile{0, 0, kGoldenSize, kGoldenSize};
-        const std::vector<WorkUnit> units =
-            split_group({0, 0, 4}, {tile}, light_paths_per_pixel(algorithm, *parameters));
+        const std::vector<WorkUnit> units = split_group({0, 0, 4}, {tile}, light_paths_per_pixel(algorithm, *parameters));
         const auto partial = (*renderer)->render(unit_work(units.front()), {});
         if (!partial.ok()) return partial.status();
         const auto encoded = encode_partial(*partial, scene->frame());

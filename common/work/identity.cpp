@@ -4,9 +4,7 @@
 
 namespace lightloom {
 
-std::string math_profile() {
-    return std::string(kTools) + " isa=avx2 x86-64-v3 contract=off";
-}
+std::string math_profile() { return std::string(kTools) + " isa=avx2 x86-64-v3 contract=off"; }
 
 Result<BuildIdentity> build_identity() {
     const auto digest = golden_unit_digest();

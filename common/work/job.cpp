@@ -22,8 +22,7 @@ Digest JobSpec::image_digest() const {
     put(text, "seed", std::to_string(seed));
     put(text, "max_depth", std::to_string(max_depth));
     put(text, "scene_root", scene_root.hex());
-    const int32_t numbers[] = {frame.width,   frame.height,  frame.crop.x0,
-                               frame.crop.y0, frame.crop.x1, frame.crop.y1};
+    const int32_t numbers[] = {frame.width, frame.height, frame.crop.x0, frame.crop.y0, frame.crop.x1, frame.crop.y1};
     for (const int32_t n : numbers) put(text, "frame", std::to_string(n));
     put(text, "layers", first_hit_layers ? "first-hit" : "none");
     return sha256(text);

@@ -20,8 +20,7 @@ std::vector<Rect> make_tiles(const Rect& crop, bool whole_frame) {
     std::vector<Rect> tiles;
     for (int j = 0; j < rows; ++j) {
         for (int i = 0; i < columns; ++i) {
-            tiles.push_back({crop.x0 + int(int64_t(crop.width()) * i / columns),
-                             crop.y0 + int(int64_t(crop.height()) * j / rows),
+            tiles.push_back({crop.x0 + int(int64_t(crop.width()) * i / columns), crop.y0 + int(int64_t(crop.height()) * j / rows),
                              crop.x0 + int(int64_t(crop.width()) * (i + 1) / columns),
                              crop.y0 + int(int64_t(crop.height()) * (j + 1) / rows)});
         }
@@ -30,9 +29,7 @@ std::vector<Rect> make_tiles(const Rect& crop, bool whole_frame) {
 }
 
 /// Iterations of the group that follows `done` iterations.
-uint32_t group_size(uint64_t done, uint32_t cap) {
-    return uint32_t(std::clamp<uint64_t>(done / 20, 1, cap));
-}
+uint32_t group_size(uint64_t done, uint32_t cap) { return uint32_t(std::clamp<uint64_t>(done / 20, 1, cap)); }
 
 }  // namespace
 
@@ -51,7 +48,7 @@ std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& t
     uint64_t first = 0;
     for (uint32_t t = 0; t < tiles.size(); ++t) {
         pixels += tiles[t].area();
-        const uint64_t last = uint64_t((unsigned __int128)(total) * uint64_t(pixels) / uint64_t(area));
+        const uint64_t last = uint64_t((unsigned __int128)(total)*uint64_t(pixels) / uint64_t(area));
         units.push_back({.key = {group.index, t},
                          .first_iteration = group.first_iteration,
                          .iteration_count = group.iteration_count,
@@ -64,7 +61,8 @@ std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& t
 }
 
 Plan::Plan(const FrameLayout& frame, double light_paths_per_pixel, bool whole_frame)
-    : light_paths_per_pixel_(light_paths_per_pixel), tiles_(make_tiles(frame.crop, whole_frame)) {
+    : light_paths_per_pixel_(light_paths_per_pixel),
+      tiles_(make_tiles(frame.crop, whole_frame)) {
     int64_t largest = 1;
     for (const Rect& tile : tiles_) largest = std::max(largest, tile.area());
     max_group_iterations_ = uint32_t(std::max<int64_t>(1, kUnitSamples / largest));

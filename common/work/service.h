@@ -146,11 +146,9 @@ class WorkerPort {
     virtual ~WorkerPort() = default;
     virtual Result<WorkerGrant> register_worker(const WorkerHello& hello) = 0;
     /// At most one unit; empty after `wait_seconds` without work, or soon after a stop request.
-    virtual Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds,
-                                                       std::stop_token stop) = 0;
+    virtual Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds, std::stop_token stop) = 0;
     /// Returns the units whose results are not wanted any more.
-    virtual Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id,
-                                                         const std::vector<RunningUnit>& running) = 0;
+    virtual Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running) = 0;
     virtual Result<SubmitAck> submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial,
                                             double render_seconds) = 0;
     /// The serialized training data of a unit of any kind but kRender.
@@ -159,8 +157,7 @@ class WorkerPort {
     virtual Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why) = 0;
     virtual Status goodbye(const std::string& worker_id) = 0;
     /// Streams the asset from `offset` to its end into `sink`; stops with the sink's error.
-    virtual Status read_asset(const Digest& digest, uint64_t offset,
-                              const std::function<Status(std::string_view)>& sink) = 0;
+    virtual Status read_asset(const Digest& digest, uint64_t offset, const std::function<Status(std::string_view)>& sink) = 0;
 };
 
 }  // namespace lightloom

@@ -73,8 +73,7 @@ void run() {
     std::printf("%-26s %9s %9s %9s   (ns)\n", "kind", "eval", "sample", "make");
     for (const auto& row : rows) {
         const Bsdf b = row.make();
-        const std::vector<Inputs> inputs =
-            make_inputs(b.kind == BsdfKind::kDielectric || b.kind == BsdfKind::kDiffuseTransmission);
+        const std::vector<Inputs> inputs = make_inputs(b.kind == BsdfKind::kDielectric || b.kind == BsdfKind::kDiffuseTransmission);
         const double eval = nanoseconds(inputs, [&](const Inputs& in) {
             const BsdfEval e = b.eval(in.wo, in.wi, TransportMode::kRadiance);
             return e.f.r + e.pdf_fwd + e.pdf_rev;

@@ -120,11 +120,11 @@ int main(int argc, char** argv) {
                     const Class wanted = Class(c);
                     if (name == "bdpt") return render(ClassOfBdpt{{frame_paths}, wanted});
                     if (name == "lvcbpt") {
-                        const LvcbptAlgorithm<> whole{{{frame_paths, parameters.connections / tables.vertices_per_path,
-                                                        TypicalSurvival(parameters.roulette)},
-                                                       parameters.connections},
-                                                      parameters.heuristic,
-                                                      parameters.minimum_paths};
+                        const LvcbptAlgorithm<> whole{
+                            {{frame_paths, parameters.connections / tables.vertices_per_path, TypicalSurvival(parameters.roulette)},
+                             parameters.connections},
+                            parameters.heuristic,
+                            parameters.minimum_paths};
                         return render(ClassOfCached<LvcbptAlgorithm<>>{whole, wanted});
                     }
                     if (name != "spcbpt") return invalid_argument("no shares of techniques for '" + name + "'");
@@ -152,8 +152,8 @@ int main(int argc, char** argv) {
         }
         const double all_light = std::accumulate(light.begin(), light.end(), 0.0);
         const double all_noise = std::accumulate(noise.begin(), noise.end(), 0.0);
-        std::printf("%s, %u x %u iterations: relative variance of a pixel per iteration %.3g\n", name.c_str(), seeds,
-                    iterations, all_noise);
+        std::printf("%s, %u x %u iterations: relative variance of a pixel per iteration %.3g\n", name.c_str(), seeds, iterations,
+                    all_noise);
         std::printf("  %-14s %9s %9s\n", "", "light", "noise");
         for (size_t c = 0; c < kClasses; ++c)
             std::printf("  %-14s %8.2f%% %8.2f%%\n", kNames[c], 100 * light[c] / all_light, 100 * noise[c] / all_noise);

@@ -46,8 +46,8 @@ int main(int argc, char** argv) {
     for (int rep = 0; rep < repetitions; ++rep)
         for (Row& row : rows) {
             const auto start = std::chrono::steady_clock::now();
-            auto partial = row.renderer->render({uint64_t(rep) * uint64_t(iterations), uint32_t(iterations), 0, crop, 0,
-                                                 uint64_t(samples)}, {});
+            auto partial = row.renderer->render(
+                {uint64_t(rep) * uint64_t(iterations), uint32_t(iterations), 0, crop, 0, uint64_t(samples)}, {});
             const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
             if (!partial.ok()) return std::fprintf(stderr, "%s\n", partial.status().message().c_str()), 1;
             row.samples.push_back(samples / seconds);

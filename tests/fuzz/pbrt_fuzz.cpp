@@ -19,16 +19,15 @@ const char kTga[] = "\0\0\2\0\0\0\0\0\0\0\0\0\1\0\1\0\30\0\1\2\3";
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const std::string text(reinterpret_cast<const char*>(data), size);
-    lightloom::import::MemorySource files(
-        std::map<std::string, std::string>{{"scene.pbrt", text},
-                                           {"self.pbrt", text},
-                                           {"self.png", text},
-                                           {"self.hdr", text},
-                                           {"self.exr", text},
-                                           {"self.gz", text},
-                                           {"a.ply", kPly},
-                                           {"a.tga", std::string(kTga, sizeof kTga - 1)},
-                                           {"a.spd", "400 1\n700 0.5\n"}});
+    lightloom::import::MemorySource files(std::map<std::string, std::string>{{"scene.pbrt", text},
+                                                                             {"self.pbrt", text},
+                                                                             {"self.png", text},
+                                                                             {"self.hdr", text},
+                                                                             {"self.exr", text},
+                                                                             {"self.gz", text},
+                                                                             {"a.ply", kPly},
+                                                                             {"a.tga", std::string(kTga, sizeof kTga - 1)},
+                                                                             {"a.spd", "400 1\n700 0.5\n"}});
     lightloom::ImportOptions options;
     options.max_file_bytes = 16 << 20;
     const auto scene = lightloom::import::import_from(&files, "scene.pbrt", options);

@@ -9,8 +9,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const auto mesh = lightloom::import::read_ply({reinterpret_cast<const char*>(data), size});
     if (!mesh.ok()) {
-        if (mesh.status().message().empty() || mesh.status().message().find('\n') != std::string::npos)
-            __builtin_trap();
+        if (mesh.status().message().empty() || mesh.status().message().find('\n') != std::string::npos) __builtin_trap();
         return 0;
     }
     for (const uint32_t index : mesh->indices)

@@ -30,7 +30,9 @@ class Bench : public ::testing::Test {
     std::string output() const { return *read_file(path("log")); }
     void make_reference() {
         ASSERT_EQ(run({"reference", kScene, "-o", path("ref.exr"), "--algorithm", "bdpt", "--spp", "48", "--resolution", "32x32",
-                       "--threads", "2", "-q"}), 0) << output();
+                       "--threads", "2", "-q"}),
+                  0)
+            << output();
     }
     std::vector<Json> lines(const std::string& name) const {
         std::vector<Json> result;
@@ -45,9 +47,8 @@ class Bench : public ::testing::Test {
 
 TEST_F(Bench, AReferenceIsTheRenderWithAsManySamples) {
     make_reference();
-    ASSERT_EQ(run({"render", kScene, "-o", path("render.exr"), "--algorithm", "bdpt", "--spp", "48", "--resolution",
-                   "32x32", "-q"}),
-              0)
+    ASSERT_EQ(
+        run({"render", kScene, "-o", path("render.exr"), "--algorithm", "bdpt", "--spp", "48", "--resolution", "32x32", "-q"}), 0)
         << output();
     EXPECT_EQ(*digest_file(path("ref.exr")), *digest_file(path("render.exr")));
     const Json json = Json::parse(*read_file(path("ref.json")));
@@ -62,8 +63,9 @@ TEST_F(Bench, AReferenceIsTheRenderWithAsManySamples) {
 }
 
 TEST_F(Bench, ACrossCheckIsStoredBesideTheReference) {
-    const std::vector<std::string> arguments{"reference", kScene, "-o", path("ref.exr"), "--algorithm", "bdpt", "--spp", "32",
-                                             "--resolution", "24x24", "--max-depth", "3", "--cross-time", "0.3"};
+    const std::vector<std::string> arguments{"reference",    kScene, "-o",           path("ref.exr"), "--algorithm", "bdpt",
+                                             "--spp",        "32",   "--resolution", "24x24",         "--max-depth", "3",
+                                             "--cross-time", "0.3"};
     std::vector<std::string> agree = arguments, same = arguments;
     agree.insert(agree.end(), {"--cross-check", "path:rr-start=6"});
     ASSERT_EQ(run(agree), 0) << output();
@@ -137,9 +139,9 @@ TEST_F(Bench, RunsAreLoggedAndResumed) {
 
 TEST_F(Bench, TwoDoNotWriteToOneFile) {
     make_reference();
-    const std::vector<std::string> arguments{"bench",       kScene, "--reference", path("ref.exr"),    "--algorithms", "path",
-                                             "--threads",   "1",    "--seeds",     "1",                "--time",       "60",
-                                             "--threshold", "20",   "--out",       path("runs.jsonl"), "--resume"};
+    const std::vector<std::string> arguments{
+        "bench", kScene,   "--reference", path("ref.exr"), "--algorithms", "path",  "--threads",        "1",       "--seeds",
+        "1",     "--time", "60",          "--threshold",   "20",           "--out", path("runs.jsonl"), "--resume"};
     const Process first("lightloom", arguments, path("first.log"));
     const auto size = [&] {
         std::error_code none;

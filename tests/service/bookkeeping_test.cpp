@@ -297,8 +297,8 @@ TEST(Coordinator, DroppedSamplesOfGroupsBeyondTheImageDoNotCount) {
         for (int d = 0; d <= i; ++d) partial.dropped.push_back({lease.unit.first_iteration, uint32_t(d), false});
         const auto encoded = encode_partial(partial, lease.spec.frame);
         ASSERT_TRUE(encoded.ok()) << encoded.status().message();
-        const auto ack = service.coordinator->submit_payload(held[size_t(i)].first, lease.reference(),
-                                                             encoded->descriptor, encoded->payload);
+        const auto ack =
+            service.coordinator->submit_payload(held[size_t(i)].first, lease.reference(), encoded->descriptor, encoded->payload);
         ASSERT_TRUE(ack.ok());
         EXPECT_EQ(ack->outcome, SubmitOutcome::kAccepted) << ack->reason;
     }

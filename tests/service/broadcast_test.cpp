@@ -88,8 +88,7 @@ TEST(Broadcast, ShortenedTablesAreFetchedAgain) {
     // The coordinator's copy, over the wire: what came of it is no use later, but does not stand in the way either.
     const auto server = GrpcServer::start(*service.coordinator, "127.0.0.1:0");
     ASSERT_TRUE(server.ok()) << server.status().message();
-    GrpcWorkerPort wire(
-        grpc::CreateChannel("127.0.0.1:" + std::to_string((*server)->port()), grpc::InsecureChannelCredentials()));
+    GrpcWorkerPort wire(grpc::CreateChannel("127.0.0.1:" + std::to_string((*server)->port()), grpc::InsecureChannelCredentials()));
     std::filesystem::resize_file(assets.path_of(asset.digest), bytes.size() / 2);
     SceneFetcher other(wire, elsewhere.path);
     const Status lost = other.tables(asset, {}).status();
@@ -156,8 +155,9 @@ JobInfo run(int workers, bool over_grpc, const std::function<JobSpec(const Table
     LightCrew crew;
     const auto add = [&] {
         if (over_grpc) {
-            crew.add(std::make_unique<GrpcWorkerPort>(grpc::CreateChannel("127.0.0.1:" + std::to_string(server->port()),
-                                                                          grpc::InsecureChannelCredentials())), service.identity);
+            crew.add(std::make_unique<GrpcWorkerPort>(
+                         grpc::CreateChannel("127.0.0.1:" + std::to_string(server->port()), grpc::InsecureChannelCredentials())),
+                     service.identity);
         } else {
             crew.add(std::make_unique<LocalWorkerPort>(*service.coordinator), service.identity);
         }

@@ -83,8 +83,8 @@ TEST(Outputs, NeverTakeThePlaceOfAnInput) {
         return client::check_outputs(options, client::beside_image(options, AfterFetch::kImageGoes), &scene).message();
     };
     EXPECT_EQ(check("scene/out.exr", "out.png", "out.json"), "");
-    EXPECT_EQ(check("scene/sky.exr", "out.png", "out.json"), path("scene/sky.exr") +
-                                                                 ": is an input, which would be lost; give another file name");
+    EXPECT_EQ(check("scene/sky.exr", "out.png", "out.json"),
+              path("scene/sky.exr") + ": is an input, which would be lost; give another file name");
     EXPECT_NE(check("out.exr", "link/../scene/./main.pbrt", "out.json"), "");
     EXPECT_NE(check("out.exr", "out.png", "link/inner.pbrt"), "");
     EXPECT_NE(check("out.exr", "out.exr", "out.json").find("another output"), std::string::npos);

@@ -172,8 +172,7 @@ TEST(Coordinator, DifferentBytesForAMergedUnitAreAnAlarm) {
     Partial partial = testing::fake_partial(unit_work(lease.unit), lease.spec.frame);
     partial.camera[5] += 1;
     const auto encoded = encode_partial(partial, lease.spec.frame);
-    const auto ack =
-        service.coordinator->submit_payload(worker, lease.reference(), encoded->descriptor, encoded->payload);
+    const auto ack = service.coordinator->submit_payload(worker, lease.reference(), encoded->descriptor, encoded->payload);
     ASSERT_TRUE(ack.ok());
     EXPECT_EQ(ack->outcome, SubmitOutcome::kDuplicateDifferent);
     EXPECT_EQ(service.coordinator->get_job(id)->duplicates_different, 1u);
@@ -186,8 +185,7 @@ TEST(Coordinator, CorruptPartialsAreRejectedAndTheUnitIsLeasedAgain) {
     const UnitLease lease = service.lease(worker).at(0);
     auto encoded = encode_partial(testing::fake_partial(unit_work(lease.unit), lease.spec.frame), lease.spec.frame);
     encoded->payload[encoded->payload.size() / 2] ^= 1;
-    const auto ack =
-        service.coordinator->submit_payload(worker, lease.reference(), encoded->descriptor, encoded->payload);
+    const auto ack = service.coordinator->submit_payload(worker, lease.reference(), encoded->descriptor, encoded->payload);
     ASSERT_TRUE(ack.ok());
     EXPECT_EQ(ack->outcome, SubmitOutcome::kRejected);
     const auto again = service.lease(worker);

@@ -138,8 +138,7 @@ struct FakeService {
     }
     SubmitAck deliver(const std::string& worker, const UnitLease& lease) {
         const auto encoded = encode_partial(fake_partial(unit_work(lease.unit), lease.spec.frame), lease.spec.frame);
-        const auto ack =
-            coordinator->submit_payload(worker, lease.reference(), encoded->descriptor, encoded->payload);
+        const auto ack = coordinator->submit_payload(worker, lease.reference(), encoded->descriptor, encoded->payload);
         EXPECT_TRUE(ack.ok()) << ack.status().message();
         return ack.ok() ? *ack : SubmitAck{SubmitOutcome::kRejected, "error"};
     }

@@ -131,8 +131,7 @@ TEST_F(Images, MayTakeAnyTimeAsLongAsSomethingComes) {
     images.stalls = true;
     const Status silence = jobs.image("job-1", ImageKind::kFinal).status();
     EXPECT_EQ(silence.code(), StatusCode::kDeadlineExceeded);
-    EXPECT_NE(silence.message().find("nothing more has come from the coordinator for 2 s"), std::string::npos)
-        << silence.message();
+    EXPECT_NE(silence.message().find("nothing more has come from the coordinator for 2 s"), std::string::npos) << silence.message();
     server->Shutdown();
     const Status gone = jobs.image("job-1", ImageKind::kFinal).status();
     EXPECT_EQ(gone.code(), StatusCode::kUnavailable);
@@ -182,7 +181,8 @@ TEST(Watch, EndsWhenThereIsNothingButAConnection) {
     std::atomic<bool> done{false};
     Status ended;
     std::jthread watch([&] {
-        ended = jobs.watch_job("job-1", [](const JobInfo&) {}, stop.get_token());
+        ended = jobs.watch_job(
+            "job-1", [](const JobInfo&) {}, stop.get_token());
         done = true;
     });
     testing::wait_until(20, [&] { return done.load(); });

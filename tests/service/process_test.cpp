@@ -26,8 +26,8 @@ const std::string kScene = std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/co
 /// A coordinator and the files around it.
 struct Service {
     explicit Service(std::vector<std::string> more = {}) {
-        std::vector<std::string> arguments{"--listen", "127.0.0.1:0", "--status", "127.0.0.1:0", "--data",
-                                           path("data"), "--port-file", path("ports"), "--lease", "1"};
+        std::vector<std::string> arguments{"--listen",   "127.0.0.1:0", "--status",    "127.0.0.1:0", "--data",
+                                           path("data"), "--port-file", path("ports"), "--lease",     "1"};
         arguments.insert(arguments.end(), more.begin(), more.end());
         server = std::make_unique<Process>("lightloom-server", arguments, path("server.log"));
         EXPECT_TRUE(wait_until(60, [&] { return std::filesystem::exists(path("ports")); })) << log("server");
@@ -49,9 +49,7 @@ struct Service {
         arguments.insert(arguments.end(), more.begin(), more.end());
         return std::make_unique<Process>("lightloom", arguments, path(name + ".log"));
     }
-    GrpcJobPort jobs() const {
-        return GrpcJobPort(grpc::CreateChannel(address(), grpc::InsecureChannelCredentials()));
-    }
+    GrpcJobPort jobs() const { return GrpcJobPort(grpc::CreateChannel(address(), grpc::InsecureChannelCredentials())); }
     Digest digest(const std::string& name) const { return *digest_file(path(name + ".exr")); }
     Json manifest(const std::string& name) const { return Json::parse(*read_file(path(name + ".manifest.json"))); }
 
@@ -64,8 +62,15 @@ const std::vector<std::string> kJob{"--algorithm", "bdpt", "--spp", "24", "--res
 
 Digest embedded(const Service& service, int workers, int threads, const std::vector<std::string>& job) {
     const std::string name = "embedded" + std::to_string(workers) + "x" + std::to_string(threads);
-    std::vector<std::string> arguments{"render", kScene, "-q", "-o", service.path(name + ".exr"), "--workers",
-                                       std::to_string(workers), "--threads", std::to_string(threads)};
+    std::vector<std::string> arguments{"render",
+                                       kScene,
+                                       "-q",
+                                       "-o",
+                                       service.path(name + ".exr"),
+                                       "--workers",
+                                       std::to_string(workers),
+                                       "--threads",
+                                       std::to_string(threads)};
     arguments.insert(arguments.end(), job.begin(), job.end());
     EXPECT_EQ(Process("lightloom", arguments, service.path(name + ".log")).wait(), 0) << service.log(name);
     return service.digest(name);
@@ -92,12 +97,20 @@ TEST(Processes, BytesAreTheSameHoweverAJobIsRun) {
     EXPECT_NE(half, reference);
     const std::string id = service.jobs().list_jobs()->front().job_id;
     ASSERT_EQ(Process("lightloom", {"fetch", id, "--server", service.address(), "--half", "-q", "-o", service.path("half.exr")},
-                      service.path("half.log")).wait(), 0) << service.log("half");
+                      service.path("half.log"))
+                  .wait(),
+              0)
+        << service.log("half");
     EXPECT_EQ(service.digest("half"), half);
     EXPECT_EQ(service.manifest("half")["image"]["sha256"].get<std::string>(), half.hex());
     EXPECT_EQ(service.manifest("half")["image"]["float_sha256"].get<std::string>(), reference.hex());
-    EXPECT_EQ(Process("lightloom", {"fetch", id, "--server", service.address(), "-o", service.path("one.exr"), "--json",
-                                    service.path("one.exr")}, service.path("one.log")).wait(), 2) << "which of the two?";
+    EXPECT_EQ(
+        Process("lightloom",
+                {"fetch", id, "--server", service.address(), "-o", service.path("one.exr"), "--json", service.path("one.exr")},
+                service.path("one.log"))
+            .wait(),
+        2)
+        << "which of the two?";
     EXPECT_FALSE(std::filesystem::exists(service.path("one.exr")));
 }
 
@@ -165,9 +178,14 @@ TEST(Processes, AWorkerKilledMidUnitCostsTimeOnly) {
     EXPECT_GE(manifest["work"]["expired_leases"].get<int>(), 1);
 }
 
-const std::vector<std::string> kTableJob{"--algorithm", "spcbpt", "--spp", "8", "--resolution", "48x36", "--max-depth", "4",
-                                         "--set", "training-paths=150000", "--set", "light-subspaces=40",
-                                         "--set", "eye-subspaces=20", "--set", "cache=500"};
+const std::vector<std::string> kTableJob{"--algorithm",  "spcbpt",
+                                         "--spp",        "8",
+                                         "--resolution", "48x36",
+                                         "--max-depth",  "4",
+                                         "--set",        "training-paths=150000",
+                                         "--set",        "light-subspaces=40",
+                                         "--set",        "eye-subspaces=20",
+                                         "--set",        "cache=500"};
 
 TEST(Processes, TrainingIsSharedOutAndAWorkerKilledDuringItCostsTimeOnly) {
     const Service service({"--table-cache-size", "0"});
@@ -197,8 +215,8 @@ TEST(Processes, TrainingIsSharedOutAndAWorkerKilledDuringItCostsTimeOnly) {
 
 /// The coordinator can do everything alone: learn the tables and render.
 TEST(Processes, ACoordinatorWithThreadsOfItsOwnNeedsNoWorker) {
-    const std::vector<std::string> job{"--algorithm", "spcbpt", "--spp", "4", "--resolution", "32x24", "--max-depth", "4",
-                                       "--set", "training-paths=40000"};
+    const std::vector<std::string> job{"--algorithm", "spcbpt",      "--spp", "4",     "--resolution",
+                                       "32x24",       "--max-depth", "4",     "--set", "training-paths=40000"};
     const Service alone({"--threads", "2"});
     ASSERT_EQ(alone.submit("alone", job)->wait(), 0) << alone.log("alone") << alone.log("server");
     const Json workers = alone.manifest("alone")["workers"];
@@ -209,9 +227,8 @@ TEST(Processes, ACoordinatorWithThreadsOfItsOwnNeedsNoWorker) {
     const auto unfinished = alone.submit("unfinished", {"--algorithm", "path", "--spp", "100000"});
     EXPECT_TRUE(wait_until(60, [&] {
         const auto jobs = alone.jobs().list_jobs();
-        return jobs.ok() && std::any_of(jobs->begin(), jobs->end(), [](const JobInfo& j) {
-                   return j.state == JobState::kRunning && j.unit_done > 0;
-               });
+        return jobs.ok() && std::any_of(jobs->begin(), jobs->end(),
+                                        [](const JobInfo& j) { return j.state == JobState::kRunning && j.unit_done > 0; });
     }));
     alone.server->signal(SIGTERM);
     EXPECT_EQ(alone.server->wait(), 0) << alone.log("server");
@@ -227,12 +244,11 @@ TEST(Processes, TablesAreKeptForTheNextRenderAndCanBeInspected) {
     const Json statistics = Json::parse(*read_file(service.path("statistics.json")));
     EXPECT_TRUE(statistics["tables"]["from_cache"].get<bool>());
     const std::string file = service.path("tables") + "/" + statistics["tables"]["cache_key"].get<std::string>() + ".tables";
-    ASSERT_EQ(
-        Process("lightloom",
-                {"inspect", kScene, "--tables", file, "--draw", service.path("seen"), "--json", service.path("seen.json")},
-                service.path("inspect.log"))
-            .wait(),
-        0)
+    ASSERT_EQ(Process("lightloom",
+                      {"inspect", kScene, "--tables", file, "--draw", service.path("seen"), "--json", service.path("seen.json")},
+                      service.path("inspect.log"))
+                  .wait(),
+              0)
         << service.log("inspect");
     EXPECT_EQ(Json::parse(*read_file(service.path("seen.json")))["tables"]["sha256"], statistics["tables"]["sha256"]);
     for (const char* picture : {"-kappa-eye.png", "-kappa-light.png", "-gamma.png", "-q.png"})
@@ -280,8 +296,12 @@ TEST(Processes, SigtermEndsWorkerAndServerCleanly) {
     EXPECT_EQ(client->wait(), 130) << service.log("image");
     EXPECT_EQ(jobs.list_jobs()->front().state, JobState::kCancelled);
     EXPECT_FALSE(std::filesystem::exists(service.path("image.exr")));
-    EXPECT_EQ(Process("lightloom", {"fetch", jobs.list_jobs()->front().job_id, "--server", service.address(), "-o",
-                                    service.path("no/such/place.exr")}, service.path("fetch.log")).wait(), 130)
+    EXPECT_EQ(
+        Process("lightloom",
+                {"fetch", jobs.list_jobs()->front().job_id, "--server", service.address(), "-o", service.path("no/such/place.exr")},
+                service.path("fetch.log"))
+            .wait(),
+        130)
         << "that it was cancelled matters more";
     service.server->signal(SIGTERM);
     EXPECT_EQ(service.server->wait(), 0) << service.log("server");
@@ -333,7 +353,9 @@ TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
     EXPECT_EQ(serve({"--listen", "0.0.0.0:0"}), 2) << "beyond loopback";
     EXPECT_EQ(serve({"--lease", "nan"}), 2);
     EXPECT_EQ(serve({"--listen", "127.0.0.1:0", "--status", "a.name:0", "--allow-plaintext", "--data",
-                     (directory.path / "data").string()}), 2) << "of a host, not an address";
+                     (directory.path / "data").string()}),
+              2)
+        << "of a host, not an address";
     EXPECT_EQ(serve({"--threads", "02"}), 2);
     EXPECT_EQ(Process("lightloom-worker", {"--threads", "0x2"}, log).wait(), 2);
     EXPECT_EQ(run({"render", kScene, "--resolution", "12"}), 2);

@@ -84,8 +84,7 @@ int run_bodies() {
     arena.execute([&] {
         fork_join(2, [&](size_t, size_t) {
             arrived.fetch_add(1, std::memory_order_relaxed);
-            while (arrived.load(std::memory_order_relaxed) < 2 && std::chrono::steady_clock::now() < end)
-                std::this_thread::yield();
+            while (arrived.load(std::memory_order_relaxed) < 2 && std::chrono::steady_clock::now() < end) std::this_thread::yield();
             for (int round = 0; round < 1000; ++round) racy_plain_store(round);
         });
     });

@@ -74,8 +74,7 @@ TEST(Tables, DamagedTrainingDataAreRefusedAndTheUnitIsLeasedAgain) {
     std::string damaged = traced(lease);
     damaged[damaged.size() / 2] ^= 1;
     EXPECT_EQ(service.give(worker, lease, damaged, sha256(traced(lease))).outcome, SubmitOutcome::kRejected);
-    EXPECT_EQ(service.give(worker, held[1].second, traced(held[2].second)).outcome, SubmitOutcome::kRejected)
-        << "of another size";
+    EXPECT_EQ(service.give(worker, held[1].second, traced(held[2].second)).outcome, SubmitOutcome::kRejected) << "of another size";
     EXPECT_EQ(service.give(worker, lease, "nonsense").outcome, SubmitOutcome::kRejected);
     // A light that the scene does not have shows once the scene is built.
     TrainingData data = *parse_training_data(traced(lease));
@@ -372,10 +371,9 @@ TEST(TableCache, AMalformedReportIsADamagedEntry) {
     };
     EXPECT_TRUE(find_with(with("loss", "1.5")));
     for (const std::string& report :
-         {std::string("null"), std::string("[]"), std::string("{}"), std::string("7"), std::string(),
-          std::string("{\"loss\":"), with("loss", "null"), with("loss", "\"1\""), with("note", "null"), with("note", "5"),
-          with("training_samples", "-1"), with("light_subspaces", "4294967296"), with("eye_subspaces", "1.5"),
-          with("capped_by_time_limit", "0")}) {
+         {std::string("null"), std::string("[]"), std::string("{}"), std::string("7"), std::string(), std::string("{\"loss\":"),
+          with("loss", "null"), with("loss", "\"1\""), with("note", "null"), with("note", "5"), with("training_samples", "-1"),
+          with("light_subspaces", "4294967296"), with("eye_subspaces", "1.5"), with("capped_by_time_limit", "0")}) {
         EXPECT_FALSE(find_with(report)) << report;
         EXPECT_FALSE(std::filesystem::exists(cache.path_of(key))) << report;
     }
@@ -402,7 +400,8 @@ TEST(Tables, TooLittleMemoryFailsTheJobAndNothingElse) {
         const JobInfo info = service.wait_end(id);
         EXPECT_EQ(info.state, JobState::kFailed);
         EXPECT_NE(info.message.find("the coordinator has too little memory to " + std::string(seed == 1 ? "prepare" : "learn")),
-                  std::string::npos) << info.message;
+                  std::string::npos)
+            << info.message;
     }
     EXPECT_EQ(service.coordinator->get_job(train_by_hand(service, service.table_spec()))->state, JobState::kRunning);
 }

@@ -45,8 +45,8 @@ Digest run(uint32_t workers, uint32_t threads, bool over_grpc, std::optional<uin
     if (over_grpc) server = std::move(GrpcServer::start(*service.coordinator, "127.0.0.1:0")).value();
     for (uint32_t i = 0; i < workers; ++i) {
         if (over_grpc) {
-            ports.push_back(std::make_unique<GrpcWorkerPort>(grpc::CreateChannel(
-                "127.0.0.1:" + std::to_string(server->port()), grpc::InsecureChannelCredentials())));
+            ports.push_back(std::make_unique<GrpcWorkerPort>(
+                grpc::CreateChannel("127.0.0.1:" + std::to_string(server->port()), grpc::InsecureChannelCredentials())));
         } else {
             ports.push_back(std::make_unique<LocalWorkerPort>(*service.coordinator));
         }
@@ -125,7 +125,10 @@ TEST(Workers, JobPortOverGrpcDoesAllThatAClientNeeds) {
     EXPECT_EQ(jobs.get_job("nope").status().code(), StatusCode::kNotFound);
     std::stop_source stop;
     stop.request_stop();
-    EXPECT_EQ(jobs.watch_job("nope", [](const JobInfo&) {}, stop.get_token()).code(), StatusCode::kCancelled);
+    EXPECT_EQ(jobs.watch_job(
+                      "nope", [](const JobInfo&) {}, stop.get_token())
+                  .code(),
+              StatusCode::kCancelled);
 }
 
 /// Sends `request` to a loopback port and returns all that comes back before the connection ends.
@@ -150,9 +153,7 @@ TEST(StatusPage, AnswersGetAndSurvivesNonsense) {
     const auto status = std::move(StatusHttp::start(*service.coordinator, "127.0.0.1:0")).value();
     const std::string id = service.submit(service.spec(4));
     service.add_worker();
-    const auto get = [&](const std::string& path) {
-        return http(status->port(), "GET " + path + " HTTP/1.1\r\nHost: x\r\n\r\n");
-    };
+    const auto get = [&](const std::string& path) { return http(status->port(), "GET " + path + " HTTP/1.1\r\nHost: x\r\n\r\n"); };
     EXPECT_NE(get("/healthz").find("200 OK"), std::string::npos);
     const std::string json = get("/api/v1/status");
     EXPECT_NE(json.find(id), std::string::npos);

@@ -16,8 +16,7 @@ constexpr int kSeeds = 32, kMaxLength = 6;
 constexpr uint32_t kSamplesPerPixel = 16;
 
 /// Estimates of the lengths 1 .. kMaxLength, from independent seeds.
-std::vector<RegionMeans> lengths_of(const std::shared_ptr<const Scene>& scene,
-                                    const std::string& algorithm, uint64_t first_seed) {
+std::vector<RegionMeans> lengths_of(const std::shared_ptr<const Scene>& scene, const std::string& algorithm, uint64_t first_seed) {
     if ((*find_algorithm(algorithm))->needs_tables)
         return testing::lengths_with_tables(scene, algorithm, kMaxLength, kSamplesPerPixel / 2, 2 * kSeeds, first_seed);
     std::vector<RegionMeans> lengths(kMaxLength);
@@ -25,8 +24,8 @@ std::vector<RegionMeans> lengths_of(const std::shared_ptr<const Scene>& scene,
     for (int i = 0; i < kSeeds; ++i) {
         std::vector<double> shorter(size_t(crop.area()), 0);
         for (int k = 1; k <= kMaxLength; ++k) {
-            const std::vector<double> all = testing::catalog_image(
-                scene, algorithm, k - 1, kSamplesPerPixel)(first_seed + uint64_t(i));
+            const std::vector<double> all =
+                testing::catalog_image(scene, algorithm, k - 1, kSamplesPerPixel)(first_seed + uint64_t(i));
             std::vector<double> length(all.size());
             for (size_t p = 0; p < all.size(); ++p) length[p] = all[p] - shorter[p];
             lengths[size_t(k - 1)].add(length, crop);
@@ -44,16 +43,14 @@ TEST(Agreement, EveryLengthHasTheSameMeanInEveryAlgorithm) {
         const auto scene = named.make();
         const std::vector<std::string> algorithms = testing::algorithms_of(named.complete);
         std::vector<std::vector<RegionMeans>> estimates;
-        for (size_t a = 0; a < algorithms.size(); ++a)
-            estimates.push_back(lengths_of(scene, algorithms[a], 1000 * (a + 1)));
+        for (size_t a = 0; a < algorithms.size(); ++a) estimates.push_back(lengths_of(scene, algorithms[a], 1000 * (a + 1)));
         for (size_t a = 0; a < algorithms.size(); ++a)
             for (size_t b = a + 1; b < algorithms.size(); ++b)
                 for (size_t k = 1; k <= (named.caustics ? 2 : kMaxLength); ++k) {
-                    const std::string what = std::string(named.name) + ", " + algorithms[a] +
-                                             " and " + algorithms[b] + ", k = " + std::to_string(k);
+                    const std::string what =
+                        std::string(named.name) + ", " + algorithms[a] + " and " + algorithms[b] + ", k = " + std::to_string(k);
                     ++frames;
-                    tested +=
-                        testing::compare(estimates[a][k - 1], estimates[b][k - 1], what, &family);
+                    tested += testing::compare(estimates[a][k - 1], estimates[b][k - 1], what, &family);
                 }
     }
     // Where `path` and `light` meet caustics or mirrors, long paths may stay too noisy for a test;

@@ -20,13 +20,12 @@ constexpr int kSeeds = 32;
 const char* const kAlgorithms[] = {"path", "light", "bdpt", "lvcbpt", "spcbpt"};
 
 /// Tests the frame and every block against one number.
-void expect_constant(const RegionMeans& means, double expected, const std::string& what,
-                     TestFamily* family) {
+void expect_constant(const RegionMeans& means, double expected, const std::string& what, TestFamily* family) {
     for (size_t r = 0; r < means.values.size(); ++r) {
         const testing::Sample sample(means.values[r]);
-        family->add(testing::one_sample_p_value(sample, expected),
-                    what + ", region " + std::to_string(r) + ": " + std::to_string(sample.mean) +
-                        " +- " + std::to_string(sample.standard_error()));
+        family->add(testing::one_sample_p_value(sample, expected), what + ", region " + std::to_string(r) + ": " +
+                                                                       std::to_string(sample.mean) + " +- " +
+                                                                       std::to_string(sample.standard_error()));
     }
 }
 
@@ -50,10 +49,8 @@ TEST(Furnace, BoxTruncatedAtEveryDepth) {
             expected += power;
             power *= albedo;
             const auto image = testing::catalog_image(scene, algorithm, max_depth, 16);
-            expect_constant(
-                testing::replicate(image, scene->frame().crop, kSeeds, 100 * uint64_t(max_depth)),
-                expected, std::string(algorithm) + ", max depth " + std::to_string(max_depth),
-                &family);
+            expect_constant(testing::replicate(image, scene->frame().crop, kSeeds, 100 * uint64_t(max_depth)), expected,
+                            std::string(algorithm) + ", max depth " + std::to_string(max_depth), &family);
         }
     }
     family.check();
@@ -68,14 +65,11 @@ TEST(Furnace, BoxWithAnyTechniqueSubset) {
     for (int mask = 0; mask < 8; ++mask) {
         MaskedSelection subset{testing::bdpt_selection(*scene)};
         subset.min_k = 2;
-        subset.next_event = mask & 1, subset.connections = mask & 2,
-        subset.light_tracing = mask & 4;
+        subset.next_event = mask & 1, subset.connections = mask & 2, subset.light_tracing = mask & 4;
         const double expected = (0.5 - std::pow(0.5, 5)) / (1 - 0.5);
-        const auto image =
-            testing::algorithm_image(scene, BdptAlgorithm<MaskedSelection>{subset}, 4, 32);
-        expect_constant(
-            testing::replicate(image, scene->frame().crop, kSeeds, 5000 + 100 * uint64_t(mask)),
-            expected, "techniques " + std::to_string(mask), &family);
+        const auto image = testing::algorithm_image(scene, BdptAlgorithm<MaskedSelection>{subset}, 4, 32);
+        expect_constant(testing::replicate(image, scene->frame().crop, kSeeds, 5000 + 100 * uint64_t(mask)), expected,
+                        "techniques " + std::to_string(mask), &family);
     }
     family.check();
 }
@@ -90,9 +84,8 @@ TEST(Furnace, WhiteSphereInConstantEnvironment) {
     b.look({0, 0, -4}, {0, 0, 0}, 40);
     const auto scene = b.build();
     for (const char* algorithm : kAlgorithms)
-        expect_constant(testing::replicate(testing::catalog_image(scene, algorithm, 3, 32),
-                                           scene->frame().crop, kSeeds, 7000),
-                        1, algorithm, &family);
+        expect_constant(testing::replicate(testing::catalog_image(scene, algorithm, 3, 32), scene->frame().crop, kSeeds, 7000), 1,
+                        algorithm, &family);
     family.check();
 }
 
@@ -101,8 +94,8 @@ TEST(Furnace, WhiteSphereInConstantEnvironment) {
 double facing_squares(double d) {
     const double x = 1 / d, x1 = 1 + x * x;
     return 2 / (kPiD * x * x) *
-           (std::log(std::sqrt(x1 * x1 / (1 + 2 * x * x))) +
-            2 * x * std::sqrt(x1) * std::atan(x / std::sqrt(x1)) - 2 * x * std::atan(x));
+           (std::log(std::sqrt(x1 * x1 / (1 + 2 * x * x))) + 2 * x * std::sqrt(x1) * std::atan(x / std::sqrt(x1)) -
+            2 * x * std::atan(x));
 }
 
 /// A square lamp facing a white square that fills the frame exactly: its mean radiance is L albedo
@@ -122,13 +115,11 @@ TEST(Analytic, FacingSquares) {
         EXPECT_LT(means.frame().relative_error(), 0.005) << what;
         family.add(testing::one_sample_p_value(means.frame(), expected), what);
     };
-    for (const char* algorithm : kAlgorithms)
-        expect(testing::catalog_image(scene, algorithm, 1, 128), algorithm);
+    for (const char* algorithm : kAlgorithms) expect(testing::catalog_image(scene, algorithm, 1, 128), algorithm);
     for (int s = 0; s <= 2; ++s) {
         MaskedSelection only{testing::bdpt_selection(*scene)};
         only.only_s = s;
-        expect(testing::algorithm_image(scene, BdptAlgorithm<MaskedSelection>{only}, 1, 128),
-               "s = " + std::to_string(s));
+        expect(testing::algorithm_image(scene, BdptAlgorithm<MaskedSelection>{only}, 1, 128), "s = " + std::to_string(s));
     }
     family.check();
 }
@@ -144,8 +135,7 @@ TEST(Analytic, SphereOverPlane) {
     b.quad({-2, 0, -2}, {0, 0, 4}, {4, 0, 0}, b.diffuse(Rgb(0.6f)));
     b.sphere(centre, float(radius), b.diffuse(Rgb(0.0f)), b.emission(Rgb(2.0f)));
     b.description().camera.camera_to_world = *inverse(*look_at({0, 0.5f, 0}, {0, 0, 0}, {0, 0, 1}));
-    b.description().camera.fov_degrees =
-        90;  // sees [-0.5, 0.5]^2 of the plane, from below the sphere
+    b.description().camera.fov_degrees = 90;  // sees [-0.5, 0.5]^2 of the plane, from below the sphere
     const auto scene = b.build();
     // Mean over the square, by the midpoint rule.
     double expected = 0;
@@ -157,8 +147,8 @@ TEST(Analytic, SphereOverPlane) {
             expected += 0.6 * 2 * radius * radius / d2 * centre.y / std::sqrt(d2) / (n * n);
         }
     for (const char* algorithm : kAlgorithms) {
-        const RegionMeans means = testing::replicate(
-            testing::catalog_image(scene, algorithm, 1, 128), scene->frame().crop, kSeeds, 9000);
+        const RegionMeans means =
+            testing::replicate(testing::catalog_image(scene, algorithm, 1, 128), scene->frame().crop, kSeeds, 9000);
         EXPECT_LT(means.frame().relative_error(), 0.005) << algorithm;
         family.add(testing::one_sample_p_value(means.frame(), expected), algorithm);
     }
@@ -170,22 +160,18 @@ TEST(Analytic, SphereOverPlane) {
 TEST(Furnace, SharedScenes) {
     TestFamily family;
     for (const char* name : {"furnace-box", "furnace-sphere"}) {
-        const std::string path =
-            LIGHTLOOM_SOURCE_DIR "/../shared/scenes/" + std::string(name) + "/scene.pbrt";
-        if (!std::filesystem::exists(path))
-            GTEST_SKIP() << "the shared scenes are not beside this source tree";
+        const std::string path = LIGHTLOOM_SOURCE_DIR "/../shared/scenes/" + std::string(name) + "/scene.pbrt";
+        if (!std::filesystem::exists(path)) GTEST_SKIP() << "the shared scenes are not beside this source tree";
         Result<ImportedScene> imported = import_pbrt(path);
         ASSERT_TRUE(imported.ok()) << imported.status().message();
         const int max_depth = imported->description.max_depth;
-        Result<std::unique_ptr<Scene>> built =
-            Scene::build(std::move(imported->description), {16, 16});
+        Result<std::unique_ptr<Scene>> built = Scene::build(std::move(imported->description), {16, 16});
         ASSERT_TRUE(built.ok()) << built.status().message();
         const std::shared_ptr<const Scene> scene = std::move(built).value();
         for (const char* algorithm : kAlgorithms)
             expect_constant(
-                testing::replicate(testing::catalog_image(scene, algorithm, max_depth, 16),
-                                   scene->frame().crop, kSeeds, 100),
-                1, std::string(name) + ", " + algorithm, &family);
+                testing::replicate(testing::catalog_image(scene, algorithm, max_depth, 16), scene->frame().crop, kSeeds, 100), 1,
+                std::string(name) + ", " + algorithm, &family);
     }
     family.check();
 }

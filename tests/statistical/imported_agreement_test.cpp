@@ -40,26 +40,21 @@ TEST(ImportedScenes, HaveTheSameMeanInEveryAlgorithm) {
     testing::TestFamily family;
     int tested = 0, pairs = 0;
     for (const File& file : kFiles) {
-        Result<ImportedScene> imported =
-            import_pbrt(LIGHTLOOM_SOURCE_DIR "/tests/scenes/" + std::string(file.name) + ".pbrt");
+        Result<ImportedScene> imported = import_pbrt(LIGHTLOOM_SOURCE_DIR "/tests/scenes/" + std::string(file.name) + ".pbrt");
         ASSERT_TRUE(imported.ok()) << imported.status().message();
-        Result<std::unique_ptr<Scene>> built =
-            Scene::build(std::move(imported->description), {32, 32});
+        Result<std::unique_ptr<Scene>> built = Scene::build(std::move(imported->description), {32, 32});
         ASSERT_TRUE(built.ok()) << built.status().message();
         const std::shared_ptr<const Scene> scene = std::move(built).value();
         const std::vector<std::string> algorithms = testing::algorithms_of(file.complete);
         std::vector<RegionMeans> estimates;
         for (const std::string& name : algorithms)
-            estimates.push_back(testing::replicate(testing::catalog_image(scene, name, 5, 16),
-                                                   scene->frame().crop, 32,
+            estimates.push_back(testing::replicate(testing::catalog_image(scene, name, 5, 16), scene->frame().crop, 32,
                                                    1000 * (estimates.size() + 1)));
         for (size_t a = 0; a < algorithms.size(); ++a)
             for (size_t b = a + 1; b < algorithms.size(); ++b) {
                 ++pairs;
-                tested += testing::compare(
-                    estimates[a], estimates[b],
-                    std::string(file.name) + ", " + algorithms[a] + " and " + algorithms[b],
-                    &family);
+                tested += testing::compare(estimates[a], estimates[b],
+                                           std::string(file.name) + ", " + algorithms[a] + " and " + algorithms[b], &family);
             }
     }
     EXPECT_GE(tested, pairs * 9 / 10);

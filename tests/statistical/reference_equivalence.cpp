@@ -83,8 +83,11 @@ void print(const std::string& name, const std::string& algorithm, const Outcome&
     const RatioInterval& image = outcome.image;
     std::printf("%-18s %-5s %5llu %6.1f  %.4f [%.4f, %.4f] %c  %.3f %.3f %.3f ", name.c_str(), algorithm.c_str(),
                 static_cast<unsigned long long>(outcome.rendering.iterations), outcome.rendering.seconds, image.ratio, image.low,
-                image.high, image.within(bound) ? '=' : image.excludes(bound) ? '!' : '?', outcome.channel_ratios[0],
-                outcome.channel_ratios[1], outcome.channel_ratios[2]);
+                image.high,
+                image.within(bound)     ? '='
+                : image.excludes(bound) ? '!'
+                                        : '?',
+                outcome.channel_ratios[0], outcome.channel_ratios[1], outcome.channel_ratios[2]);
     for (const RatioInterval& r : outcome.regions) std::printf(" %.3f+-%.3f", r.ratio, r.high - r.ratio);
     std::printf("\n");
     std::fflush(stdout);
@@ -104,7 +107,9 @@ nlohmann::ordered_json json_line(const std::string& name, const std::string& alg
 
 void print_own(const std::string& name, const char* what, const RatioInterval& ratio) {
     std::printf("%-18s %-30s  %.4f [%.4f, %.4f] %s\n", name.c_str(), what, ratio.ratio, ratio.low, ratio.high,
-                ratio.within(0.005) ? "=" : ratio.excludes(0.005) ? "!" : "?");
+                ratio.within(0.005)     ? "="
+                : ratio.excludes(0.005) ? "!"
+                                        : "?");
     std::fflush(stdout);
 }
 

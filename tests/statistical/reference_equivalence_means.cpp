@@ -26,8 +26,8 @@ Result<Rendering> render_groups(const Scene& scene, const RenderGroup& render, d
     Rendering result;
     const auto start = std::chrono::steady_clock::now();
     for (uint32_t group = 0;; ++group) {
-        const UnitWork work{uint64_t(group) * kIterations, kIterations, group, frame.crop, 0,
-                            uint64_t(kIterations) * uint64_t(frame.crop.area())};
+        const UnitWork work{
+            uint64_t(group) * kIterations, kIterations, group, frame.crop, 0, uint64_t(kIterations) * uint64_t(frame.crop.area())};
         auto partial = render(work);
         if (!partial.ok()) return partial.status();
         GroupSum sum(frame);

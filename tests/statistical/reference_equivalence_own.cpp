@@ -46,8 +46,8 @@ struct HitsOnly {
         const auto escape = [&](int t, const WalkRay& ray) {
             if (t <= context.max_edges) add(environment_hit(context.scene, z, t, ray, &view));
         };
-        trace_camera_path(context.scene, sampler, context.px, context.py, context.max_edges, context.roulette, z,
-                          &context.counters, visit, escape);
+        trace_camera_path(context.scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
+                          visit, escape);
         return sum;
     }
 };
@@ -76,8 +76,7 @@ Result<RatioInterval> light_against_bdpt(const Options& options, const LoadedSce
     if (!a.ok()) return a.status();
     BdptAlgorithm<SplattablePaths> bdpt;
     bdpt.selection.light_paths_per_iteration = double(loaded.scene->frame().crop.area());
-    auto b = render_groups(*loaded.scene, group_of(loaded, bdpt, options.seed + 1),
-                           options.seconds * (1 - kLightShare), never);
+    auto b = render_groups(*loaded.scene, group_of(loaded, bdpt, options.seed + 1), options.seconds * (1 - kLightShare), never);
     if (!b.ok()) return b.status();
     (*line)["light_spp"] = a->iterations;
     (*line)["bdpt_spp"] = b->iterations;
@@ -101,8 +100,7 @@ Status print_missing_energy(const Options& options) {
         const auto never = [](const Rendering&) { return false; };
         auto total = render_groups(*as_is->scene, *bdpt, options.seconds / 4, never);
         if (!total.ok()) return total.status();
-        auto hits =
-            render_groups(*hittable->scene, group_of(*hittable, HitsOnly{}, options.seed), options.seconds * 3 / 4, never);
+        auto hits = render_groups(*hittable->scene, group_of(*hittable, HitsOnly{}, options.seed), options.seconds * 3 / 4, never);
         if (!hits.ok()) return hits.status();
         const bool points = !as_is->scene->description().point_lights.empty();
         // Of the whole light: where the lights are points, bdpt's mean lacks what only hits can make.
@@ -111,9 +109,8 @@ Status print_missing_energy(const Options& options) {
         const double only = by_hits.mean;
         const double all = points ? own + only : own;
         const double error = student_quantile(sidak(0.05, int(names.size())), by_hits.degrees) * by_hits.standard_error();
-        std::printf("%-26s %-18s %10.5f %12.6f  %.5f [%.5f, %.5f]\n", name.c_str(),
-                    points ? "points (missing)" : "can be hit", own, only, only / all, (only - error) / all,
-                    (only + error) / all);
+        std::printf("%-26s %-18s %10.5f %12.6f  %.5f [%.5f, %.5f]\n", name.c_str(), points ? "points (missing)" : "can be hit", own,
+                    only, only / all, (only - error) / all, (only + error) / all);
         std::fflush(stdout);
         if (!options.json.empty())
             json << nlohmann::ordered_json{{"scene", name},

@@ -262,8 +262,7 @@ Status print_spectral_ratio(const Options& options, const std::string& name, con
         for (size_t g = 0; g < kGroups; ++g)
             for (size_t r = 0; r < 10; ++r)
                 for (size_t k = 0; k < 3; ++k)
-                    for (size_t c = 0; c < 3; ++c)
-                        spectral[g][r][c] += (*part)[g][r][k] * weights().rgb[size_t(first) + k][c];
+                    for (size_t c = 0; c < 3; ++c) spectral[g][r][c] += (*part)[g][r][k] * weights().rgb[size_t(first) + k][c];
     }
     double of_rgb[10] = {}, of_spectra[10] = {};
     WeightedMean ratios;
@@ -279,9 +278,8 @@ Status print_spectral_ratio(const Options& options, const std::string& name, con
     std::printf("%-18s RGB / spectra %.4f +- %.4f  %.3f %.3f %.3f ", name.c_str(), of_rgb[0] / of_spectra[0],
                 ratios.estimate().standard_error(), channels[0] / channels_spectral[0], channels[1] / channels_spectral[1],
                 channels[2] / channels_spectral[2]);
-    nlohmann::ordered_json line{{"scene", name},
-                                {"rgb_over_spectra", of_rgb[0] / of_spectra[0]},
-                                {"standard_error", ratios.estimate().standard_error()}};
+    nlohmann::ordered_json line{
+        {"scene", name}, {"rgb_over_spectra", of_rgb[0] / of_spectra[0]}, {"standard_error", ratios.estimate().standard_error()}};
     for (int r = 1; r < 10; ++r) {
         std::printf(" %.3f", of_rgb[r] / of_spectra[r]);
         line["regions"].push_back(of_rgb[r] / of_spectra[r]);

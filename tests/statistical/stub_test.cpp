@@ -16,8 +16,7 @@ constexpr int kSeeds = 32, kMaxDepth = 4;
 
 /// Replications of a pool algorithm; each seed traces a pool of its own.
 template <class Selection>
-RegionMeans replicate_pool(const std::shared_ptr<const Scene>& scene,
-                           testing::PoolAlgorithm<Selection> algorithm, int light_paths,
+RegionMeans replicate_pool(const std::shared_ptr<const Scene>& scene, testing::PoolAlgorithm<Selection> algorithm, int light_paths,
                            uint32_t samples_per_pixel, uint64_t first_seed) {
     const auto image = [&](uint64_t seed) {
         const LightPool pool = testing::trace_light_pool(*scene, seed, light_paths, kMaxDepth + 1);
@@ -28,23 +27,19 @@ RegionMeans replicate_pool(const std::shared_ptr<const Scene>& scene,
 }
 
 RegionMeans reference(const std::shared_ptr<const Scene>& scene) {
-    return testing::replicate(testing::catalog_image(scene, "bdpt", kMaxDepth, 16),
-                              scene->frame().crop, kSeeds, 100);
+    return testing::replicate(testing::catalog_image(scene, "bdpt", kMaxDepth, 16), scene->frame().crop, kSeeds, 100);
 }
 
 TEST(Stubs, PairingOverTheFrameHasTheSameMean) {
     testing::TestFamily family;
-    for (const auto make :
-         {testing::diffuse_box, testing::glass_and_mirror, testing::environment_lit}) {
+    for (const auto make : {testing::diffuse_box, testing::glass_and_mirror, testing::environment_lit}) {
         const auto scene = make();
         const RegionMeans bdpt = reference(scene);
         for (const int pairs : {1, 4}) {
             testing::PairingStubSelection selection{testing::bdpt_selection(*scene), double(pairs)};
-            const testing::PoolAlgorithm<testing::PairingStubSelection> algorithm{selection,
-                                                                                  nullptr, pairs};
-            EXPECT_TRUE(testing::compare(
-                bdpt, replicate_pool(scene, algorithm, 1024, 8, 1000 + 100 * uint64_t(pairs)),
-                std::to_string(pairs) + " pairs", &family));
+            const testing::PoolAlgorithm<testing::PairingStubSelection> algorithm{selection, nullptr, pairs};
+            EXPECT_TRUE(testing::compare(bdpt, replicate_pool(scene, algorithm, 1024, 8, 1000 + 100 * uint64_t(pairs)),
+                                         std::to_string(pairs) + " pairs", &family));
         }
     }
     family.check();
@@ -55,16 +50,12 @@ TEST(Stubs, PairingOverTheFrameHasTheSameMean) {
 /// loses at most 2 r L / (3 pi A) of what is merged.
 TEST(Stubs, MergingHasTheMeanUpToItsKernel) {
     const auto scene = testing::diffuse_box();
-    const double radius = 0.03, edges = 6 * 8 + 4 * 0.6 + 2 * 4 * 0.5,
-                 area = 6 * 4 + 0.36 + 2 * 0.25 + 4 * kPiD * 0.16;
+    const double radius = 0.03, edges = 6 * 8 + 4 * 0.6 + 2 * 4 * 0.5, area = 6 * 4 + 0.36 + 2 * 0.25 + 4 * kPiD * 0.16;
     const double kernel_bias = 2 * radius * edges / (3 * kPiD * area);
     const int light_paths = 2048;
-    const testing::MergeStubSelection selection{testing::bdpt_selection(*scene),
-                                                double(light_paths), radius};
-    testing::PoolAlgorithm<testing::MergeStubSelection> algorithm{selection, nullptr, 1,
-                                                                  float(radius)};
-    const testing::Sample bdpt = reference(scene).frame(),
-                          merging = replicate_pool(scene, algorithm, light_paths, 2, 2000).frame();
+    const testing::MergeStubSelection selection{testing::bdpt_selection(*scene), double(light_paths), radius};
+    testing::PoolAlgorithm<testing::MergeStubSelection> algorithm{selection, nullptr, 1, float(radius)};
+    const testing::Sample bdpt = reference(scene).frame(), merging = replicate_pool(scene, algorithm, light_paths, 2, 2000).frame();
     algorithm.add_merges = false;
     const testing::Sample without = replicate_pool(scene, algorithm, light_paths, 2, 2000).frame();
 
@@ -74,8 +65,7 @@ TEST(Stubs, MergingHasTheMeanUpToItsKernel) {
     const double error = std::sqrt(bdpt.variance + merging.variance) / bdpt.mean;
     EXPECT_LT(error, 0.01);
     EXPECT_LT(merging.mean / bdpt.mean - 1, 4 * error);
-    EXPECT_GT(merging.mean / bdpt.mean - 1, -kernel_bias - 4 * error)
-        << "share of merges " << share;
+    EXPECT_GT(merging.mean / bdpt.mean - 1, -kernel_bias - 4 * error) << "share of merges " << share;
 }
 
 }  // namespace

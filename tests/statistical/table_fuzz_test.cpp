@@ -73,18 +73,17 @@ TEST(TableFuzz, RandomTablesKeepTheMean) {
             const SubspaceTables tables = testing::random_tables(scene->emitters(), uint64_t(100 + n), random);
             const std::string what = std::string(c.name) + ", N = " + std::to_string(n);
             ++frames;
-            tested += compare(c, expected,
-                              means(scene, testing::spcbpt_image(scene, tables, options, kMaxDepth, kSamplesPerPixel),
-                                    1000 * uint64_t(n)),
-                              what, &family);
+            tested += compare(
+                c, expected,
+                means(scene, testing::spcbpt_image(scene, tables, options, kMaxDepth, kSamplesPerPixel), 1000 * uint64_t(n)), what,
+                &family);
             if (n % 2 == 0) continue;
             ++frames;
-            tested += compare(c, expected,
-                                       means(scene,
-                                             testing::lvcbpt_image(scene, tables.vertices_per_path, options, kMaxDepth,
-                                                                   kSamplesPerPixel),
-                                             20000 + 1000 * uint64_t(n)),
-                                       what + " of lvcbpt", &family);
+            tested +=
+                compare(c, expected,
+                        means(scene, testing::lvcbpt_image(scene, tables.vertices_per_path, options, kMaxDepth, kSamplesPerPixel),
+                              20000 + 1000 * uint64_t(n)),
+                        what + " of lvcbpt", &family);
         }
     }
     EXPECT_GE(tested, frames * 9 / 10);
@@ -200,8 +199,7 @@ TEST(TableFuzz, EachTechniqueAloneHasTheSameMean) {
                 spc.min_k = spc.max_k = lvc.min_k = lvc.max_k = k;
                 const SpcbptAlgorithm<MaskedCacheSelection<SubspaceSelection>> subspaces{
                     {spc, 3}, Heuristic::kBalance, options.paths};
-                const LvcbptAlgorithm<MaskedCacheSelection<UniformSelection>> uniform{
-                    {lvc, 3}, Heuristic::kBalance, options.paths};
+                const LvcbptAlgorithm<MaskedCacheSelection<UniformSelection>> uniform{{lvc, 3}, Heuristic::kBalance, options.paths};
                 const std::string what = std::string(name) + ", k = " + std::to_string(k) + ", s = " + std::to_string(s);
                 pairs += 2;
                 tested += testing::compare(expected, means(scene, testing::cache_image(scene, subspaces, k - 1, 8, 1), 11000),
@@ -236,8 +234,8 @@ TEST(TableFuzz, FewerTechniquesHaveTheSameMean) {
         };
         testing::MaskedSelection all{testing::bdpt_selection(*scene)};
         all.min_k = 2;
-        const RegionMeans indirect = means(
-            scene, testing::algorithm_image(scene, BdptAlgorithm<testing::MaskedSelection>{all}, kMaxDepth, 16), 20000);
+        const RegionMeans indirect =
+            means(scene, testing::algorithm_image(scene, BdptAlgorithm<testing::MaskedSelection>{all}, kMaxDepth, 16), 20000);
         for (const int mask : {2, 3, 4, 5, 6, 7}) {
             const auto subset = image(
                 [mask](auto& s) { s.hits = mask & 1, s.connections_on = mask & 2, s.light_tracing = mask & 4; }, kMaxDepth, 2);
@@ -249,9 +247,9 @@ TEST(TableFuzz, FewerTechniquesHaveTheSameMean) {
         for (const int vertices : {1, 2, 3, 5}) {
             const auto cut = image([vertices](auto& s) { s.max_light_vertices = vertices; }, 7, 1);
             ++frames;
-            tested += testing::compare(deep, means(scene, cut, 23000 + 100 * uint64_t(vertices)),
-                                       std::string(c.name) + ", light sub-paths of " + std::to_string(vertices) + " vertices",
-                                       &family);
+            tested +=
+                testing::compare(deep, means(scene, cut, 23000 + 100 * uint64_t(vertices)),
+                                 std::string(c.name) + ", light sub-paths of " + std::to_string(vertices) + " vertices", &family);
         }
     }
     EXPECT_GE(tested, frames * 3 / 4) << "of " << frames;
@@ -281,10 +279,9 @@ TEST(TableFuzz, CountedEnergyIsTheExpectedOne) {
                 const TrainingVertex* v = &data->vertices[p.first_vertex];
                 for (uint32_t i = 0; i < p.vertex_count; ++i) {
                     if (!(v[i].density > 0)) continue;
-                    const uint32_t label =
-                        i == 0 ? labeller.source(v[0].emitter, v[0].position, v[0].normal)
-                               : tables.light_label(sub_path_end(v[i].position, v[i].normal,
-                                                                 normalize(v[i - 1].position - v[i].position)));
+                    const uint32_t label = i == 0 ? labeller.source(v[0].emitter, v[0].position, v[0].normal)
+                                                  : tables.light_label(sub_path_end(v[i].position, v[i].normal,
+                                                                                    normalize(v[i - 1].position - v[i].position)));
                     sum[label] += double(v[i].density);
                     sum[n] += double(v[i].density);
                 }
@@ -300,8 +297,7 @@ TEST(TableFuzz, CountedEnergyIsTheExpectedOne) {
         for (int seed = 0; seed < kSeeds; ++seed) {
             const UnitWork work = testing::frame_with_paths(*scene, 1, 0);
             UnitPreparation preparation;
-            const auto state =
-                algorithm.prepare({*scene, uint64_t(31000 + seed), kMaxDepth + 1, {}, work, {}}, &preparation);
+            const auto state = algorithm.prepare({*scene, uint64_t(31000 + seed), kMaxDepth + 1, {}, work, {}}, &preparation);
             ASSERT_EQ(state.index.subspaces.size(), n);
             double total = 0;
             for (uint32_t i = 0; i < n; ++i) {

@@ -17,11 +17,10 @@ using testing::TestFamily;
 
 constexpr int kSeeds = 32;
 
-RegionMeans masked(const std::shared_ptr<const Scene>& scene, const MaskedSelection& selection,
-                   int max_depth, uint32_t spp, uint64_t first_seed) {
+RegionMeans masked(const std::shared_ptr<const Scene>& scene, const MaskedSelection& selection, int max_depth, uint32_t spp,
+                   uint64_t first_seed) {
     const BdptAlgorithm<MaskedSelection> algorithm{selection};
-    return testing::replicate(testing::algorithm_image(scene, algorithm, max_depth, spp),
-                              scene->frame().crop, kSeeds, first_seed);
+    return testing::replicate(testing::algorithm_image(scene, algorithm, max_depth, spp), scene->frame().crop, kSeeds, first_seed);
 }
 
 /// One technique per run: its weight is then one, and the image is f / p of that technique.
@@ -31,8 +30,7 @@ TEST(Techniques, EachAloneHasTheSameMean) {
     const struct {
         const char* name;
         std::shared_ptr<const Scene> (*make)();
-    } scenes[] = {{"apart_with_lamp", testing::apart_with_lamp},
-                  {"apart_with_sky", testing::apart_with_sky}};
+    } scenes[] = {{"apart_with_lamp", testing::apart_with_lamp}, {"apart_with_sky", testing::apart_with_sky}};
     for (const auto& named : scenes) {
         const auto scene = named.make();
         for (int k = 2; k <= 4; ++k) {
@@ -42,16 +40,14 @@ TEST(Techniques, EachAloneHasTheSameMean) {
                 only.only_s = s;
                 only.min_k = only.max_k = k;
                 // Hits of small lamps are rare: more samples make their means normal.
-                estimates.push_back(
-                    masked(scene, only, k - 1, s == 0 ? 64 : 16, 10000 + 1000 * uint64_t(s)));
+                estimates.push_back(masked(scene, only, k - 1, s == 0 ? 64 : 16, 10000 + 1000 * uint64_t(s)));
             }
             for (int s = 0; s <= k; ++s) {
                 if (s == 1) continue;
                 ++pairs;
-                tested += testing::compare(estimates[1], estimates[size_t(s)],
-                                           std::string(named.name) + ", k = " + std::to_string(k) +
-                                               ", s = 1 and s = " + std::to_string(s),
-                                           &family);
+                tested += testing::compare(
+                    estimates[1], estimates[size_t(s)],
+                    std::string(named.name) + ", k = " + std::to_string(k) + ", s = 1 and s = " + std::to_string(s), &family);
             }
         }
     }
@@ -68,8 +64,7 @@ TEST(Techniques, AnySubsetThatSupportsEveryPathHasTheSameMean) {
     const struct {
         const char* name;
         std::shared_ptr<const Scene> (*make)();
-    } scenes[] = {{"diffuse_box", testing::diffuse_box},
-                  {"environment_lit", testing::environment_lit}};
+    } scenes[] = {{"diffuse_box", testing::diffuse_box}, {"environment_lit", testing::environment_lit}};
     for (const auto& named : scenes) {
         const auto scene = named.make();
         MaskedSelection all{testing::bdpt_selection(*scene)};
@@ -77,14 +72,12 @@ TEST(Techniques, AnySubsetThatSupportsEveryPathHasTheSameMean) {
         const RegionMeans reference = masked(scene, all, 4, 16, 20000);
         for (int mask = 1; mask < 15; ++mask) {
             MaskedSelection subset = all;
-            subset.hits = mask & 1, subset.next_event = mask & 2, subset.connections = mask & 4,
-            subset.light_tracing = mask & 8;
+            subset.hits = mask & 1, subset.next_event = mask & 2, subset.connections = mask & 4, subset.light_tracing = mask & 8;
             if (!subset.hits && !subset.next_event && !subset.light_tracing) continue;
             ++subsets;
             tested += testing::compare(
                 reference,
-                masked(scene, subset, 4, subset.next_event || subset.light_tracing ? 16 : 64,
-                       20000 + 1000 * uint64_t(mask)),
+                masked(scene, subset, 4, subset.next_event || subset.light_tracing ? 16 : 64, 20000 + 1000 * uint64_t(mask)),
                 std::string(named.name) + ", techniques " + std::to_string(mask), &family);
         }
     }
@@ -103,9 +96,8 @@ TEST(Techniques, LightSubPathsMayBeCutShort) {
         for (const int vertices : {2, 3, 5}) {
             MaskedSelection cut = all;
             cut.max_light_vertices = vertices;
-            testing::compare(
-                reference, masked(scene, cut, 7, 32, 40000 + 1000 * uint64_t(vertices)),
-                "light sub-paths of " + std::to_string(vertices) + " vertices", &family);
+            testing::compare(reference, masked(scene, cut, 7, 32, 40000 + 1000 * uint64_t(vertices)),
+                             "light sub-paths of " + std::to_string(vertices) + " vertices", &family);
         }
     }
     family.check();
@@ -131,9 +123,8 @@ TEST(Techniques, RouletteAndHeuristicsKeepTheMean) {
             std::string name = algorithm;
             for (const auto& [key, value] : parameters) name += " " + key + "=" + value;
             names.push_back(name);
-            estimates.push_back(
-                testing::replicate(testing::catalog_image(scene, algorithm, 8, 16, parameters),
-                                   crop, kSeeds, 60000 + 1000 * uint64_t(estimates.size())));
+            estimates.push_back(testing::replicate(testing::catalog_image(scene, algorithm, 8, 16, parameters), crop, kSeeds,
+                                                   60000 + 1000 * uint64_t(estimates.size())));
         }
         for (size_t i = 1; i < estimates.size(); ++i)
             testing::compare(estimates[0], estimates[i], names[0] + " and " + names[i], &family);

@@ -22,13 +22,10 @@ inline std::vector<double> develop(const Partial& partial, const Rect& crop) {
     std::vector<double> image(size_t(crop.area()), 0.0);
     const auto scalar = [](const double* v) { return (v[0] + v[1] + v[2]) / 3; };
     for (int64_t i = 0; i < partial.tile.area(); ++i) {
-        const int x = partial.tile.x0 + int(i % partial.tile.width()),
-                  y = partial.tile.y0 + int(i / partial.tile.width());
-        image[size_t(crop.index(x, y))] +=
-            scalar(&partial.camera[size_t(3 * i)]) / partial.samples_per_pixel;
+        const int x = partial.tile.x0 + int(i % partial.tile.width()), y = partial.tile.y0 + int(i / partial.tile.width());
+        image[size_t(crop.index(x, y))] += scalar(&partial.camera[size_t(3 * i)]) / partial.samples_per_pixel;
     }
-    for (const SplatSum& s : partial.splats)
-        image[s.pixel] += scalar(s.rgb.data()) / double(partial.light_paths);
+    for (const SplatSum& s : partial.splats) image[s.pixel] += scalar(s.rgb.data()) / double(partial.light_paths);
     return image;
 }
 
@@ -67,9 +64,8 @@ inline std::vector<std::string> algorithms_of(const std::string& list) {
 using ImageOfSeed = std::function<std::vector<double>(uint64_t seed)>;
 
 /// A production algorithm from the catalog. Every seed makes its own tables.
-inline ImageOfSeed catalog_image(std::shared_ptr<const Scene> scene, const std::string& algorithm,
-                                 int max_depth, uint32_t samples_per_pixel,
-                                 std::map<std::string, std::string> parameters = {}) {
+inline ImageOfSeed catalog_image(std::shared_ptr<const Scene> scene, const std::string& algorithm, int max_depth,
+                                 uint32_t samples_per_pixel, std::map<std::string, std::string> parameters = {}) {
     return [=](uint64_t seed) {
         RenderSettings settings{algorithm, with_small_training(algorithm, parameters), seed, max_depth};
         Result<std::unique_ptr<Renderer>> renderer = create_with_tables(scene, settings, {});
@@ -83,14 +79,12 @@ inline ImageOfSeed catalog_image(std::shared_ptr<const Scene> scene, const std::
 
 /// Any algorithm through the production loop.
 template <UnitAlgorithm A>
-ImageOfSeed algorithm_image(std::shared_ptr<const Scene> scene, const A& algorithm, int max_depth,
-                            uint32_t samples_per_pixel) {
+ImageOfSeed algorithm_image(std::shared_ptr<const Scene> scene, const A& algorithm, int max_depth, uint32_t samples_per_pixel) {
     return [=](uint64_t seed) {
         RenderSettings settings;
         settings.seed = seed;
         settings.max_depth = max_depth;
-        Result<Partial> partial = render_unit(algorithm, *scene, settings, {},
-                                              whole_frame(*scene, samples_per_pixel), {});
+        Result<Partial> partial = render_unit(algorithm, *scene, settings, {}, whole_frame(*scene, samples_per_pixel), {});
         if (!partial.ok()) throw std::runtime_error(partial.status().message());
         EXPECT_EQ(partial->dropped_count, 0u);
         return develop(*partial, scene->frame().crop);
@@ -108,8 +102,7 @@ struct RegionMeans {
         for (int y = 0; y < crop.height(); ++y)
             for (int x = 0; x < crop.width(); ++x) {
                 const double v = image[size_t(y) * size_t(crop.width()) + size_t(x)];
-                const size_t block =
-                    size_t(1 + (y * kGrid / crop.height()) * kGrid + x * kGrid / crop.width());
+                const size_t block = size_t(1 + (y * kGrid / crop.height()) * kGrid + x * kGrid / crop.width());
                 for (const size_t r : {size_t(0), block}) sum[r] += v, count[r] += 1;
             }
         for (size_t r = 0; r < values.size(); ++r) values[r].push_back(sum[r] / count[r]);
@@ -117,8 +110,7 @@ struct RegionMeans {
     Sample frame() const { return Sample(values[0]); }
 };
 
-inline RegionMeans replicate(const ImageOfSeed& image, const Rect& crop, int seeds,
-                             uint64_t first_seed) {
+inline RegionMeans replicate(const ImageOfSeed& image, const Rect& crop, int seeds, uint64_t first_seed) {
     RegionMeans means;
     for (int i = 0; i < seeds; ++i) means.add(image(first_seed + uint64_t(i)), crop);
     return means;
@@ -132,14 +124,12 @@ inline constexpr double kInformative = 0.03;
 
 /// Adds the tests of "a and b have the same mean" for the frame and its regions. False when the
 /// estimates are too noisy for a test of the frame.
-inline bool compare(const RegionMeans& a, const RegionMeans& b, const std::string& what,
-                    TestFamily* family) {
-    const auto add = [&](const std::vector<double>& va, const std::vector<double>& vb,
-                         const std::string& where) {
+inline bool compare(const RegionMeans& a, const RegionMeans& b, const std::string& what, TestFamily* family) {
+    const auto add = [&](const std::vector<double>& va, const std::vector<double>& vb, const std::string& where) {
         const Sample sa(va), sb(vb);
         if (std::max(sa.relative_error(), sb.relative_error()) > kInformative) return false;
-        family->add(welch_p_value(sa, sb), what + ", " + where + ": " + std::to_string(sa.mean) +
-                                               " and " + std::to_string(sb.mean));
+        family->add(welch_p_value(sa, sb),
+                    what + ", " + where + ": " + std::to_string(sa.mean) + " and " + std::to_string(sb.mean));
         return true;
     };
     const bool frame = add(a.values[0], b.values[0], "frame");
@@ -154,20 +144,17 @@ inline bool compare(const RegionMeans& a, const RegionMeans& b, const std::strin
 }
 
 /// Light paths per iteration as production sets it.
-inline BdptSelection bdpt_selection(const Scene& scene) {
-    return {double(scene.frame().crop.area())};
-}
+inline BdptSelection bdpt_selection(const Scene& scene) { return {double(scene.frame().crop.area())}; }
 
 /// bdpt with some of its techniques switched off; the weights of the others sum to one again.
 struct MaskedSelection {
     static constexpr bool kMerges = false;
     BdptSelection all;
     bool hits = true, next_event = true, connections = true,
-         light_tracing = true;         ///< s = 0, s = 1, 2 <= s < k, s = k
-    int min_k = 1, max_k = kMaxEdges;  ///< Lengths that exist.
-    int max_light_vertices =
-        kMaxEdges;    ///< Light sub-paths are cut here: techniques beyond do not exist.
-    int only_s = -1;  ///< Only this technique; -1: all that are on.
+         light_tracing = true;           ///< s = 0, s = 1, 2 <= s < k, s = k
+    int min_k = 1, max_k = kMaxEdges;    ///< Lengths that exist.
+    int max_light_vertices = kMaxEdges;  ///< Light sub-paths are cut here: techniques beyond do not exist.
+    int only_s = -1;                     ///< Only this technique; -1: all that are on.
 
     int s_min(int k) const { return all.s_min(k); }
     int s_max(int k) const { return std::min(all.s_max(k), max_light_vertices); }
@@ -175,9 +162,7 @@ struct MaskedSelection {
         if (k < min_k || k > max_k || s > s_max(k) || (only_s >= 0 && s != only_s)) return false;
         return s == 0 ? hits : s == 1 ? next_event : s == k ? light_tracing : connections;
     }
-    double connect_factor(const PathView& view, int s) const {
-        return enabled(view.k, s) ? all.connect_factor(view, s) : 0;
-    }
+    double connect_factor(const PathView& view, int s) const { return enabled(view.k, s) ? all.connect_factor(view, s) : 0; }
 };
 
 }  // namespace lightloom::testing

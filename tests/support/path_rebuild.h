@@ -14,9 +14,9 @@ namespace lightloom::testing {
 
 /// A full path: x_0 .. x_{k-1} (x_k is the lens point), and for infinite lights the direction of travel.
 struct FullPath {
-    std::vector<PathVertex> x;     ///< k vertices; x[0] may be an emitter endpoint only (its ng and emitter are valid).
+    std::vector<PathVertex> x;  ///< k vertices; x[0] may be an emitter endpoint only (its ng and emitter are valid).
     Vec3 lens;
-    bool infinite = false;         ///< x[0] is a direction: x[0].ng is the direction of travel.
+    bool infinite = false;  ///< x[0] is a direction: x[0].ng is the direction of travel.
     int k() const { return int(x.size()); }
 };
 
@@ -148,14 +148,13 @@ inline std::optional<std::vector<PathVertex>> rebuild_camera(const Scene& scene,
 }
 
 struct Rebuilt {
-    Rgb contribution;   ///< Unweighted.
+    Rgb contribution;  ///< Unweighted.
     PathView view;
 };
 
 /// The path as technique s would have produced it; nothing when that technique cannot. With a labeller: as a method that
 /// selects by subspaces would have, x_0 of s = 1 from a light sub-path, the view with throughput and labels.
-inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, int s,
-                                      const SubspaceLabeller* labeller = nullptr) {
+inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, int s, const SubspaceLabeller* labeller = nullptr) {
     const int k = path.k();
     const Emitter& e = scene.emitters()[uint32_t(path.x[0].emitter)];
     const auto smooth = [&](int i) { return !path.x[size_t(i)].delta && path.x[size_t(i)].bsdf.has_smooth_lobe(); };
@@ -183,9 +182,9 @@ inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, 
         light.position = path.infinite ? ref.p + light.wi * (2 * scene.emitters().scene_radius()) : path.x[0].p;
         light.normal = e.is_area() ? path.x[0].ng : -light.wi;
         light.radiance = scene.emitters().emitted(e, light.normal, -light.wi);
-        light.geometry = e.is_infinite() ? 1.0f
-                                         : (e.is_area() ? abs_dot(light.normal, light.wi) : 1.0f) /
-                                               length_squared(light.position - ref.p);
+        light.geometry = e.is_infinite()
+                             ? 1.0f
+                             : (e.is_area() ? abs_dot(light.normal, light.wi) : 1.0f) / length_squared(light.position - ref.p);
         if (labeller != nullptr) {
             y = rebuild_light(scene, path, 1);
             if (!y) return std::nullopt;

@@ -44,8 +44,7 @@ struct ChiSquare {
 
 /// `expected` holds counts that sum to the number of samples. Cells expecting fewer than five are
 /// pooled in order, as the test's asymptotics ask.
-inline ChiSquare chi_square_test(const std::vector<double>& observed,
-                                 const std::vector<double>& expected) {
+inline ChiSquare chi_square_test(const std::vector<double>& observed, const std::vector<double>& expected) {
     ChiSquare r;
     double pooled_observed = 0, pooled_expected = 0;
     int cells = 0;
@@ -85,13 +84,10 @@ struct Sample {
 
     explicit Sample(const std::vector<double>& values) : count(int(values.size())) {
         for (const double v : values) mean += v / count;
-        for (const double v : values)
-            variance += (v - mean) * (v - mean) / (double(count) * (count - 1));
+        for (const double v : values) variance += (v - mean) * (v - mean) / (double(count) * (count - 1));
     }
     double standard_error() const { return std::sqrt(variance); }
-    double relative_error() const {
-        return mean != 0 ? standard_error() / std::fabs(mean) : (variance > 0 ? HUGE_VAL : 0);
-    }
+    double relative_error() const { return mean != 0 ? standard_error() / std::fabs(mean) : (variance > 0 ? HUGE_VAL : 0); }
 };
 
 /// Renders carry float samples: means that differ by less than this fraction are equal whatever
@@ -102,9 +98,7 @@ inline constexpr double kFloatResolution = 2e-6;
 inline double one_sample_p_value(const Sample& sample, double expected) {
     const double difference = std::fabs(sample.mean - expected);
     if (difference <= kFloatResolution * std::fabs(expected)) return 1;
-    return sample.variance > 0
-               ? student_p_value(difference / sample.standard_error(), sample.count - 1)
-               : 0;
+    return sample.variance > 0 ? student_p_value(difference / sample.standard_error(), sample.count - 1) : 0;
 }
 
 /// Two-sided p-value of "both have the same mean", variances unknown and unequal [Welch 1947].
@@ -113,8 +107,7 @@ inline double welch_p_value(const Sample& a, const Sample& b) {
     if (difference <= kFloatResolution * std::max(std::fabs(a.mean), std::fabs(b.mean))) return 1;
     if (!(variance > 0)) return 0;
     const double degrees =
-        variance * variance /
-        (a.variance * a.variance / (a.count - 1) + b.variance * b.variance / (b.count - 1));
+        variance * variance / (a.variance * a.variance / (a.count - 1) + b.variance * b.variance / (b.count - 1));
     return student_p_value(difference / std::sqrt(variance), degrees);
 }
 
@@ -128,9 +121,8 @@ class TestFamily {
         ASSERT_FALSE(tests_.empty());
         const double each = sidak(level, size());
         for (const Entry& test : tests_)
-            EXPECT_GE(test.p_value, each)
-                << test.what << ": p = " << test.p_value << ", Sidak level " << each << " for "
-                << size() << " tests";
+            EXPECT_GE(test.p_value, each) << test.what << ": p = " << test.p_value << ", Sidak level " << each << " for " << size()
+                                          << " tests";
     }
 
   private:

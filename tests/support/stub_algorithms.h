@@ -15,9 +15,7 @@ struct MergeStubSelection {
 
     int s_min(int k) const { return connections.s_min(k); }
     int s_max(int k) const { return connections.s_max(k); }
-    double connect_factor(const PathView& view, int s) const {
-        return connections.connect_factor(view, s);
-    }
+    double connect_factor(const PathView& view, int s) const { return connections.connect_factor(view, s); }
     double merge_factor(const PathView&, int) const { return light_paths * kPiD * radius * radius; }
 };
 
@@ -45,16 +43,14 @@ inline LightPool trace_light_pool(const Scene& scene, uint64_t seed, int count, 
     for (size_t i = 0; i < pool.size(); ++i) {
         LightSampler sampler({seed, Stage::kLightPool, 0, i});
         pool[i].resize(size_t(max_edges));
-        pool[i].resize(
-            size_t(trace_light_path(scene, sampler, max_edges, {}, pool[i].data(), &counters)));
+        pool[i].resize(size_t(trace_light_path(scene, sampler, max_edges, {}, pool[i].data(), &counters)));
     }
     return pool;
 }
 
 /// The merge of y_{s-1} with z_{t-1}: the unweighted contribution divided by the kernel 1 / (pi
 /// r^2), and the path's view.
-inline Rgb merge(const Scene& scene, const PathVertex* y, int s, const PathVertex* z, int t,
-                 PathView* view) {
+inline Rgb merge(const Scene& scene, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view) {
     const PathVertex &a = y[s - 1], &b = z[t - 1];
     const BsdfEval e = b.bsdf.eval(b.wo_local, b.shading.to_local(a.wo), TransportMode::kRadiance);
     const Rgb contribution = b.alpha * e.f * a.alpha;
@@ -80,9 +76,8 @@ struct PoolAlgorithm {
     Selection selection;
     const LightPool* pool;
     int pairs = 1;
-    float radius = 0;  ///< 0: no merges.
-    bool add_merges =
-        true;  ///< False: they keep their share of the weights, but their light is left out.
+    float radius = 0;        ///< 0: no merges.
+    bool add_merges = true;  ///< False: they keep their share of the weights, but their light is left out.
 
     Rgb sample(SampleContext& context) const {
         const Scene& scene = context.scene;
@@ -92,8 +87,7 @@ struct PoolAlgorithm {
             return contribution * float(mis_weight(view, {TechniqueKind::kConnect, s}, selection));
         };
         LightSampler light_sampler({context.seed, Stage::kLight, context.group_iteration, context.light_path});
-        const int n = trace_light_path(scene, light_sampler, context.max_edges, context.roulette, own,
-                                       &context.counters);
+        const int n = trace_light_path(scene, light_sampler, context.max_edges, context.roulette, own, &context.counters);
         for (int s = 2; s <= n; ++s) {
             if (!own[s - 1].bsdf.has_smooth_lobe()) continue;
             Vec2 film;
@@ -108,15 +102,12 @@ struct PoolAlgorithm {
         const auto visit = [&](int t) {
             const PathVertex& v = z[t - 1];
             if (v.emitter != kNone)
-                if (const Rgb c = emitter_hit(scene, z, t, &view); !c.is_black())
-                    sum += connected(c, 0);
+                if (const Rgb c = emitter_hit(scene, z, t, &view); !c.is_black()) sum += connected(c, 0);
             if (t > context.max_edges || !v.bsdf.has_smooth_lobe()) return;
             NextEventSample light;
             const double pick = sampler.rng().uniform_double();
             if (scene.emitters().sample_next_event(v.p, pick, sampler.next_event(t), &light))
-                if (const Rgb c = next_event(scene, z, t, light, &view, &context.counters);
-                    !c.is_black())
-                    sum += connected(c, 1);
+                if (const Rgb c = next_event(scene, z, t, light, &view, &context.counters); !c.is_black()) sum += connected(c, 1);
             for (int q = 0; q < pairs; ++q) {
                 const std::vector<PathVertex>& y = (*pool)[choice.below(uint32_t(pool->size()))];
                 for (int s = 2; s <= int(y.size()) && s + t - 1 <= context.max_edges; ++s) {
@@ -131,11 +122,10 @@ struct PoolAlgorithm {
         };
         const auto escape = [&](int t, const WalkRay& ray) {
             if (t > context.max_edges) return;
-            if (const Rgb c = environment_hit(scene, z, t, ray, &view); !c.is_black())
-                sum += connected(c, 0);
+            if (const Rgb c = environment_hit(scene, z, t, ray, &view); !c.is_black()) sum += connected(c, 0);
         };
-        trace_camera_path(scene, sampler, context.px, context.py, context.max_edges,
-                          context.roulette, z, &context.counters, visit, escape);
+        trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters, visit,
+                          escape);
         return sum;
     }
 
@@ -146,11 +136,9 @@ struct PoolAlgorithm {
         for (const std::vector<PathVertex>& y : *pool)
             for (int s = 2; s <= int(y.size()) && s + t - 2 <= context.max_edges; ++s) {
                 const PathVertex& photon = y[size_t(s - 1)];
-                if (length_squared(photon.p - v.p) > radius * radius || dot(photon.ng, v.ng) < 0.7f)
-                    continue;
+                if (length_squared(photon.p - v.p) > radius * radius || dot(photon.ng, v.ng) < 0.7f) continue;
                 const Rgb c = merge(context.scene, y.data(), s, z, t, &view);
-                if (!c.is_black())
-                    sum += c * float(mis_weight(view, {TechniqueKind::kMerge, s - 1}, selection));
+                if (!c.is_black()) sum += c * float(mis_weight(view, {TechniqueKind::kMerge, s - 1}, selection));
             }
         return sum / (float(pool->size()) * kPi * radius * radius);
     }

@@ -11,9 +11,9 @@ namespace lightloom::testing {
 
 /// What a render is made with besides its tables.
 struct CacheOptions {
-    int connections = 3;         ///< N
-    uint64_t paths = 1000;       ///< M
-    double light_paths = 1;      ///< N1 per pixel and iteration.
+    int connections = 3;     ///< N
+    uint64_t paths = 1000;   ///< M
+    double light_paths = 1;  ///< N1 per pixel and iteration.
     bool ris_aware = false, correlation_aware = false;
 };
 
@@ -56,8 +56,8 @@ ImageOfSeed cache_image(std::shared_ptr<const Scene> scene, const A& algorithm, 
         RenderSettings settings;
         settings.seed = seed;
         settings.max_depth = max_depth;
-        const Result<Partial> partial = render_unit(algorithm, *scene, settings, {},
-                                                    frame_with_paths(*scene, samples_per_pixel, light_paths), {});
+        const Result<Partial> partial =
+            render_unit(algorithm, *scene, settings, {}, frame_with_paths(*scene, samples_per_pixel, light_paths), {});
         if (!partial.ok()) throw std::runtime_error(partial.status().message());
         EXPECT_EQ(partial->dropped_count, 0u);
         return develop(*partial, scene->frame().crop);

@@ -50,8 +50,7 @@ inline std::shared_ptr<const Scene> rough_and_coated() {
 
 inline std::shared_ptr<const Scene> delta_lights() {
     SceneBuilder b = cornell_builder();
-    b.description().meshes.erase(b.description().meshes.begin() +
-                                 1);  // open the ceiling to the distant light
+    b.description().meshes.erase(b.description().meshes.begin() + 1);  // open the ceiling to the distant light
     b.description().point_lights.push_back({{0.5f, 1.5f, -0.5f}, {1, 2, 3}});
     SpotLight spot;
     spot.position = {-0.5f, 1.8f, 0};
@@ -70,8 +69,7 @@ inline std::shared_ptr<const Scene> environment_lit() {
     b.sphere({0, 0.5f, 0}, 0.5f, white);
     Image map;
     map.width = map.height = 8;
-    for (int i = 0; i < 64; ++i)
-        map.floats.insert(map.floats.end(), {0.1f * float(i % 7), 0.3f, float(i == 20) * 30});
+    for (int i = 0; i < 64; ++i) map.floats.insert(map.floats.end(), {0.1f * float(i % 7), 0.3f, float(i == 20) * 30});
     b.description().images.push_back(map);
     InfiniteLight image_light, constant_light;
     image_light.image = 0;
@@ -87,11 +85,7 @@ inline std::shared_ptr<const Scene> smooth_normals_and_lens() {
     SceneBuilder b = cornell_builder();
     // A coarse pyramid with normals far from the geometric ones, one side of it emitting.
     TriangleMesh mesh;
-    mesh.positions = {{-0.3f, 0.01f, -0.3f},
-                      {0.3f, 0.01f, -0.3f},
-                      {0.3f, 0.01f, 0.3f},
-                      {-0.3f, 0.01f, 0.3f},
-                      {0, 0.6f, 0}};
+    mesh.positions = {{-0.3f, 0.01f, -0.3f}, {0.3f, 0.01f, -0.3f}, {0.3f, 0.01f, 0.3f}, {-0.3f, 0.01f, 0.3f}, {0, 0.6f, 0}};
     for (const Vec3& p : mesh.positions) mesh.normals.push_back(normalize(p - Vec3{0, -0.1f, 0}));
     mesh.indices = {1, 0, 4, 2, 1, 4, 3, 2, 4, 0, 3, 4};
     mesh.attributes = {b.diffuse({0.4f, 0.6f, 0.8f}), kNone, kNone, false, "pyramid"};
@@ -145,12 +139,10 @@ inline std::shared_ptr<const Scene> textured_and_two_sided() {
     b.description().meshes[0].attributes.material = b.add(tiles);
     Material paper;
     paper.kind = MaterialKind::kDiffuseTransmission;
-    paper.reflectance = b.constant({0.3f, 0.4f, 0.3f}),
-    paper.transmittance = b.constant({0.5f, 0.3f, 0.4f});
+    paper.reflectance = b.constant({0.3f, 0.4f, 0.3f}), paper.transmittance = b.constant({0.5f, 0.3f, 0.4f});
     const MaterialId sheet = b.add(paper);
     b.quad({-0.9f, 0.9f, -0.2f}, {0.7f, 0.3f, 0}, {0, 0, 0.8f}, sheet);
-    b.quad({-0.2f, 1.1f, 0.2f}, {0.5f, 0, 0.1f}, {0.1f, 0.4f, 0}, sheet,
-           b.emission({3, 2, 4}, true));
+    b.quad({-0.2f, 1.1f, 0.2f}, {0.5f, 0, 0.1f}, {0.1f, 0.4f, 0}, sheet, b.emission({3, 2, 4}, true));
     return b.build();
 }
 
@@ -248,8 +240,7 @@ inline SceneBuilder apart_builder() {
 
 inline std::shared_ptr<const Scene> apart_with_lamp() {
     SceneBuilder b = apart_builder();
-    b.quad({-0.7f, 2.5f, -0.7f}, {1.4f, 0, 0}, {0, 0, 1.4f}, b.diffuse(Rgb(0.2f)),
-           b.emission({6, 5, 4}));
+    b.quad({-0.7f, 2.5f, -0.7f}, {1.4f, 0, 0}, {0, 0, 1.4f}, b.diffuse(Rgb(0.2f)), b.emission({6, 5, 4}));
     return b.build();
 }
 
@@ -281,12 +272,9 @@ inline constexpr NamedScene kScenes[] = {
     {"spherical_lights", spherical_lights, "path light bdpt"},
     {"environment_lit", environment_lit, "path light bdpt"},
     {"delta_lights", delta_lights, "path light bdpt"},
-    {"glass_and_mirror", glass_and_mirror,
-     "path bdpt"},  // light: what is seen through glass is missing
-    {"rough_and_coated", rough_and_coated, "path bdpt",
-     true},  // light: and what a smooth coat reflects
-    {"caustic_of_a_point_light", caustic_of_a_point_light,
-     "light bdpt"},  // path: the caustic is missing
+    {"glass_and_mirror", glass_and_mirror, "path bdpt"},                   // light: what is seen through glass is missing
+    {"rough_and_coated", rough_and_coated, "path bdpt", true},             // light: and what a smooth coat reflects
+    {"caustic_of_a_point_light", caustic_of_a_point_light, "light bdpt"},  // path: the caustic is missing
 };
 
 }  // namespace lightloom::testing

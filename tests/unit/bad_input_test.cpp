@@ -47,8 +47,7 @@ void expect_means_of_path(const std::shared_ptr<const Scene>& scene, const std::
                           uint32_t samples_per_pixel = 8) {
     testing::TestFamily family;
     const Rect crop = scene->frame().crop;
-    const auto path =
-        testing::replicate(testing::catalog_image(scene, "path", max_depth, samples_per_pixel), crop, kSeeds, 100);
+    const auto path = testing::replicate(testing::catalog_image(scene, "path", max_depth, samples_per_pixel), crop, kSeeds, 100);
     for (const std::string algorithm : kAlgorithms) {
         const auto other = testing::replicate(
             testing::catalog_image(scene, algorithm, max_depth, samples_per_pixel, small(algorithm)), crop, kSeeds, 900);

@@ -102,8 +102,7 @@ TEST(AlgorithmChoice, ParsesSettingsAndNamesMistakes) {
     const auto choice = parse_algorithm("bdpt:rr-start=6:heuristic=1");
     ASSERT_TRUE(choice.ok()) << choice.status().message();
     EXPECT_EQ(choice->name, "bdpt");
-    EXPECT_EQ(choice->parameters,
-              (std::map<std::string, std::string>{{"heuristic", "1"}, {"rr-min", "0.5"}, {"rr-start", "6"}}));
+    EXPECT_EQ(choice->parameters, (std::map<std::string, std::string>{{"heuristic", "1"}, {"rr-min", "0.5"}, {"rr-start", "6"}}));
     EXPECT_EQ(choice->label, "bdpt:rr-start=6:heuristic=1");
     EXPECT_TRUE(parse_algorithm("path").ok());
     for (const char* wrong : {"", "no-such", "bdpt:", "bdpt:=1", "bdpt:heuristic", "bdpt:heuristic=9", "bdpt:no-such=1",
@@ -262,9 +261,11 @@ TEST(BenchTable, ShowsMediansPreparationAndRatios) {
     const std::string table = bench_table({"slow", "fast:m=2"}, done, 12);
     // 25 iterations against 4; 25 s against 4 + 1 s.
     EXPECT_NE(table.find("slow          3      0         25.0      25.00       0.00      25.00        1.00        1.00"),
-              std::string::npos) << table;
+              std::string::npos)
+        << table;
     EXPECT_NE(table.find("fast:m=2      3      0          4.0       4.00       1.00       5.00        6.25        5.00"),
-              std::string::npos) << table;
+              std::string::npos)
+        << table;
     EXPECT_EQ(table.find('~'), std::string::npos) << table;
 }
 
@@ -283,7 +284,9 @@ TEST(BenchTable, MarksWhatIsExtrapolated) {
 ExrImage grey(float value, float variance) {
     const FrameLayout frame{8, 8, {0, 0, 8, 8}};
     const std::vector<float> pixels(8 * 8 * 3, value);
-    return {frame, {8, 8, pixels}, {{"variance", "RGB", std::vector<float>(pixels.size(), variance)}},
+    return {frame,
+            {8, 8, pixels},
+            {{"variance", "RGB", std::vector<float>(pixels.size(), variance)}},
             {{exr_attribute::kAlgorithm, "bdpt"}, {exr_attribute::kMaxDepth, "5"}, {exr_attribute::kScene, "digest"}}};
 }
 

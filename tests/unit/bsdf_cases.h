@@ -13,7 +13,7 @@ namespace lightloom::testing {
 struct BsdfCase {
     std::string name;
     Bsdf bsdf;
-    float sharpness = 1;  ///< The narrowest lobe's alpha; 1 for diffuse.
+    float sharpness = 1;    ///< The narrowest lobe's alpha; 1 for diffuse.
     bool lossless = false;  ///< Densities plus delta pmfs must sum to one.
 };
 

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/unit/bsdf_cases.h"
 #include "tests/support/statistics.h"
+#include "tests/unit/bsdf_cases.h"
 
 namespace lightloom::testing {
 namespace {
@@ -15,7 +15,8 @@ class SphereGrid {
     static constexpr int kRings = 16, kSectors = 24;
 
     SphereGrid(const Vec3& upper_pole, const Vec3& lower_pole, double power)
-        : frames_{Frame(upper_pole), Frame(lower_pole)}, power_(power) {}
+        : frames_{Frame(upper_pole), Frame(lower_pole)},
+          power_(power) {}
 
     size_t cell(const Vec3& w) const {
         const int side = w.z > 0 ? 0 : 1;
@@ -119,8 +120,8 @@ TEST(BsdfSampling, ChiSquareOfEveryMaterialDirectionAndMode) {
     uint64_t index = 0;
     for (const Run& run : runs) {
         const SphereGrid grid = grid_for(run.c, run.wo);
-        std::vector<double> expected = grid.integrate(
-            [&](const Vec3& wi) { return double(run.c.bsdf.eval(run.wo, wi, run.mode).pdf_fwd); });
+        std::vector<double> expected =
+            grid.integrate([&](const Vec3& wi) { return double(run.c.bsdf.eval(run.wo, wi, run.mode).pdf_fwd); });
         double total = 0;
         for (double& e : expected) total += e, e *= kSamples;
         const double delta = delta_pmf(run.c.bsdf, run.wo);
@@ -142,9 +143,9 @@ TEST(BsdfSampling, ChiSquareOfEveryMaterialDirectionAndMode) {
             observed[bin] += 1;
         }
         const ChiSquare chi = chi_square_test(observed, expected);
-        EXPECT_GT(chi.p_value, level) << run.c.name << " wo " << run.wo.x << " " << run.wo.y << " " << run.wo.z
-                                      << ": chi2 " << chi.statistic << " with "
-                                      << chi.degrees << " degrees, lost " << lost << ", delta " << delta;
+        EXPECT_GT(chi.p_value, level) << run.c.name << " wo " << run.wo.x << " " << run.wo.y << " " << run.wo.z << ": chi2 "
+                                      << chi.statistic << " with " << chi.degrees << " degrees, lost " << lost << ", delta "
+                                      << delta;
     }
 }
 

@@ -70,9 +70,7 @@ double textbook_dielectric(V3 o, V3 i, double eta, double ax, double ay, bool ra
     const double fresnel = textbook_fresnel(std::fabs(om), o.z > 0 ? eta : 1 / eta);
     const double tan2 = (m.x * m.x / (ax * ax) + m.y * m.y / (ay * ay)) / (m.z * m.z);
     const double d = 1 / (3.14159265358979 * ax * ay * std::pow(m.z, 4) * (1 + tan2) * (1 + tan2));
-    const auto lambda = [&](V3 w) {
-        return (std::sqrt(1 + (w.x * w.x * ax * ax + w.y * w.y * ay * ay) / (w.z * w.z)) - 1) / 2;
-    };
+    const auto lambda = [&](V3 w) { return (std::sqrt(1 + (w.x * w.x * ax * ax + w.y * w.y * ay * ay) / (w.z * w.z)) - 1) / 2; };
     const double g = 1 / (1 + lambda(o) + lambda(i));
     if (reflect) return d * g * fresnel / (4 * std::fabs(o.z * i.z));
     const double f = d * g * (1 - fresnel) * std::fabs(im * om / (o.z * i.z)) / std::pow(im + om / etap, 2);
@@ -110,8 +108,8 @@ TEST(Bsdf, MicrofacetsMatchTheTextbook) {
         for (TransportMode mode : kModes) {
             const double expected = textbook_dielectric(o, i, eta, ax, ay, mode == kRadiance);
             const double f = b.eval(wo, wi, mode).f.r;
-            ASSERT_NEAR(f, expected, 2e-3 * expected + 1e-5) << "alpha " << ax << " " << ay << " eta " << eta << " cos "
-                                                              << wo.z << " " << wi.z;
+            ASSERT_NEAR(f, expected, 2e-3 * expected + 1e-5)
+                << "alpha " << ax << " " << ay << " eta " << eta << " cos " << wo.z << " " << wi.z;
             compared += expected > 1e-3;
         }
         // A conductor differs from the dielectric's reflection by Fresnel's factor alone.
@@ -145,8 +143,8 @@ TEST(Bsdf, ReciprocityAndReverseDensities) {
             ASSERT_TRUE(close(there.pdf_rev, back.pdf_fwd)) << c.name << " " << there.pdf_rev << " " << back.pdf_fwd;
             const BsdfEval radiance = c.bsdf.eval(wo, wi, kRadiance);
             ASSERT_EQ(radiance.pdf_fwd, there.pdf_fwd) << c.name;
-            const float etap = wo.z * wi.z > 0 || c.bsdf.kind != BsdfKind::kDielectric
-                                   ? 1 : (wo.z > 0 ? c.bsdf.eta : 1 / c.bsdf.eta);
+            const float etap =
+                wo.z * wi.z > 0 || c.bsdf.kind != BsdfKind::kDielectric ? 1 : (wo.z > 0 ? c.bsdf.eta : 1 / c.bsdf.eta);
             ASSERT_TRUE(close(radiance.f.r * etap * etap, there.f.r)) << c.name;
         }
     }
@@ -231,8 +229,8 @@ TEST(Bsdf, CoatedConductorIsCloseToTheLayeredWalk) {
     for (float base : {0.0f, 0.05f, 0.1f})
         for (float cos : {1.0f, 0.5f, 0.15f}) {
             const Rgb eta(0.2f), k(3.9f);
-            const Estimate walk = walk_through_layers(make_dielectric(1.5f, 0, 0),
-                                                      make_conductor(eta / 1.5f, k / 1.5f, base, base), 0.01f, cos, 100000);
+            const Estimate walk = walk_through_layers(make_dielectric(1.5f, 0, 0), make_conductor(eta / 1.5f, k / 1.5f, base, base),
+                                                      0.01f, cos, 100000);
             const Estimate model =
                 albedo(make_coated_conductor(eta, k, base, base, 1.5f, 0.01f, 0, 0), direction(cos, 0), kImportance);
             const double tolerance = base == 0 ? 1e-3 : 0.12 * walk.mean;

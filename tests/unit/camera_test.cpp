@@ -42,8 +42,7 @@ TEST(Camera, ProjectFindsWhatSampleRayMade) {
         Rng rng({1, Stage::kTraining, 0, 0});
         for (int i = 0; i < 20000; ++i) {
             // Away from the border, where rounding may decide either way.
-            const Vec2 u = rng.uniform2(),
-                       film{0.01f + u.x * (kWidth - 0.02f), 0.01f + u.y * (kHeight - 0.02f)},
+            const Vec2 u = rng.uniform2(), film{0.01f + u.x * (kWidth - 0.02f), 0.01f + u.y * (kHeight - 0.02f)},
                        lens = rng.uniform2();
             const Camera::CameraRay ray = camera.sample_ray(film, lens);
             EXPECT_EQ(length(ray.origin - camera.sample_lens(lens)), 0) << c.name;
@@ -64,8 +63,7 @@ TEST(Camera, DirectionsBehindOrBesideTheFrameAreNotSeen) {
         float pdf = 0;
         const Vec3 lens = camera.sample_lens({0.5f, 0.5f});
         EXPECT_FALSE(camera.project(lens, -camera.forward(), &film, &pdf)) << c.name;
-        for (const Vec2 outside :
-             {Vec2{-1, 5}, Vec2{kWidth + 1, 5}, Vec2{5, -1}, Vec2{5, kHeight + 1}}) {
+        for (const Vec2 outside : {Vec2{-1, 5}, Vec2{kWidth + 1, 5}, Vec2{5, -1}, Vec2{5, kHeight + 1}}) {
             const Camera::CameraRay ray = camera.sample_ray(outside, {0.5f, 0.5f});
             EXPECT_FALSE(camera.project(ray.origin, ray.direction, &film, &pdf)) << c.name;
         }
@@ -81,15 +79,12 @@ TEST(Camera, DensityOfAPixelIntegratesToOne) {
         for (const Vec2 lens : {Vec2{0.5f, 0.5f}, Vec2{0.9f, 0.2f}}) {
             // Uniform directions in a cone around the pixel.
             for (const Vec2 pixel : {Vec2{0, 0}, Vec2{20, 12}, Vec2{39, 3}}) {
-                const Camera::CameraRay axis =
-                    camera.sample_ray({pixel.x + 0.5f, pixel.y + 0.5f}, lens);
+                const Camera::CameraRay axis = camera.sample_ray({pixel.x + 0.5f, pixel.y + 0.5f}, lens);
                 double widest = 1;
                 for (const Vec2 corner : {Vec2{0, 0}, Vec2{1, 0}, Vec2{0, 1}, Vec2{1, 1}})
                     widest = std::min(
                         widest,
-                        double(dot(axis.direction,
-                                   camera.sample_ray({pixel.x + corner.x, pixel.y + corner.y}, lens)
-                                       .direction)));
+                        double(dot(axis.direction, camera.sample_ray({pixel.x + corner.x, pixel.y + corner.y}, lens).direction)));
                 const double height = 1.5 * (1 - widest), cone = 2 * kPiD * height;
                 Rng rng({2, Stage::kTraining, uint64_t(pixel.x), uint64_t(pixel.y)});
                 std::vector<double> groups(20, 0);
@@ -97,16 +92,13 @@ TEST(Camera, DensityOfAPixelIntegratesToOne) {
                 for (double& group : groups)
                     for (int i = 0; i < per_group; ++i) {
                         const Vec2 u = rng.uniform2();
-                        const double z = 1 - u.x * height, r = std::sqrt(1 - z * z),
-                                     phi = 2 * kPiD * u.y;
-                        const Vec3 d = Frame(axis.direction)
-                                           .to_world({float(r * std::cos(phi)),
-                                                      float(r * std::sin(phi)), float(z)});
+                        const double z = 1 - u.x * height, r = std::sqrt(1 - z * z), phi = 2 * kPiD * u.y;
+                        const Vec3 d =
+                            Frame(axis.direction).to_world({float(r * std::cos(phi)), float(r * std::sin(phi)), float(z)});
                         Vec2 film;
                         float pdf = 0;
                         if (!camera.project(axis.origin, d, &film, &pdf)) continue;
-                        if (std::floor(film.x) == pixel.x && std::floor(film.y) == pixel.y)
-                            group += double(pdf) * cone / per_group;
+                        if (std::floor(film.x) == pixel.x && std::floor(film.y) == pixel.y) group += double(pdf) * cone / per_group;
                     }
                 family.add(testing::one_sample_p_value(testing::Sample(groups), 1), c.name);
             }
@@ -121,8 +113,7 @@ TEST(Camera, SamplesCoverThePixelUniformly) {
     for (const Case& c : cases()) {
         const Camera camera = *Camera::create(c.camera, kWidth, kHeight);
         const int bins = 8, n = 40000;
-        std::vector<double> observed(bins * bins, 0),
-            expected(bins * bins, double(n) / (bins * bins));
+        std::vector<double> observed(bins * bins, 0), expected(bins * bins, double(n) / (bins * bins));
         Rng rng({3, Stage::kTraining, 0, 0});
         int lost = 0;
         for (int i = 0; i < n; ++i) {
@@ -131,8 +122,7 @@ TEST(Camera, SamplesCoverThePixelUniformly) {
             Vec2 film;
             float pdf = 0;
             ASSERT_TRUE(camera.project(ray.origin, ray.direction, &film, &pdf));
-            const int x = int(std::floor((film.x - 17) * bins)),
-                      y = int(std::floor((film.y - 9) * bins));
+            const int x = int(std::floor((film.x - 17) * bins)), y = int(std::floor((film.y - 9) * bins));
             if (x < 0 || x >= bins || y < 0 || y >= bins)
                 ++lost;
             else
@@ -152,17 +142,14 @@ TEST(Camera, LensIsUniform) {
     const Vec3 centre = camera.sample_lens({0.5f, 0.5f});
     const Frame frame(camera.forward());
     const int rings = 6, sectors = 12, n = 60000;
-    std::vector<double> observed(rings * sectors, 0),
-        expected(rings * sectors, double(n) / (rings * sectors));
+    std::vector<double> observed(rings * sectors, 0), expected(rings * sectors, double(n) / (rings * sectors));
     Rng rng({4, Stage::kTraining, 0, 0});
     for (int i = 0; i < n; ++i) {
         const Vec3 p = frame.to_local(camera.sample_lens(rng.uniform2()) - centre);
         EXPECT_NEAR(p.z, 0, 1e-6f);
-        const double r2 = double(p.x * p.x + p.y * p.y) / (0.2 * 0.2),
-                     phi = std::atan2(p.y, p.x) / (2 * kPiD) + 0.5;
+        const double r2 = double(p.x * p.x + p.y * p.y) / (0.2 * 0.2), phi = std::atan2(p.y, p.x) / (2 * kPiD) + 0.5;
         ASSERT_LE(r2, 1.00001);
-        ++observed[size_t(std::min(rings - 1, int(r2 * rings)) * sectors +
-                          std::min(sectors - 1, int(phi * sectors)))];
+        ++observed[size_t(std::min(rings - 1, int(r2 * rings)) * sectors + std::min(sectors - 1, int(phi * sectors)))];
     }
     EXPECT_GT(testing::chi_square_test(observed, expected).p_value, 0.001);
 }

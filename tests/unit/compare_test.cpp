@@ -88,8 +88,11 @@ TEST_F(Compare, JsonAloneGoesToStandardOutput) {
 TEST_F(Compare, RefusesWithOneLineAndUsageCode) {
     const std::string a = write("a.exr", 8, 8, 1, "bdpt"), other = write("other.exr", 8, 9, 1, "path");
     ASSERT_TRUE(write_file_atomically(path("text.exr"), "no picture").ok());
-    const std::vector<std::vector<std::string>> bad{{a, other}, {a, path("none.exr")}, {path("text.exr"), a},
-                                                    {a, a, "--regions", "3x"}, {a, a, "--regions", "9x9"},
+    const std::vector<std::vector<std::string>> bad{{a, other},
+                                                    {a, path("none.exr")},
+                                                    {path("text.exr"), a},
+                                                    {a, a, "--regions", "3x"},
+                                                    {a, a, "--regions", "9x9"},
                                                     {a, a, "--heat", path("no-such-folder/h.png")}};
     for (const auto& arguments : bad) {
         const Outcome o = run(arguments);

@@ -51,7 +51,8 @@ TEST(Draws, AreScaledByTheirProbability) {
             std::map<const PathVertex*, std::map<int, Sums>> found;
             for (int d = 0; d < kDraws; ++d) {
                 LightPick picks[kMaxConnections];
-                const int count = algorithm.method.draw(state.cache, state.index, v, [&] { return rng.uniform2(); }, rng, 6, picks);
+                const int count = algorithm.method.draw(
+                    state.cache, state.index, v, [&] { return rng.uniform2(); }, rng, 6, picks);
                 ASSERT_LE(count, connections);
                 std::map<std::pair<const PathVertex*, int>, double> once;  // draws of one vertex are not independent
                 for (int n = 0; n < count; ++n)
@@ -67,7 +68,7 @@ TEST(Draws, AreScaledByTheirProbability) {
                 const PathVertex* y = state.cache.at(place.first);
                 const double paths = double(options.paths) * tables.window[i];
                 const double r = double(scalar_of(y[place.second - 1].alpha));
-                const double all = double(state.index.subspaces[i].scale) * paths * connections;  // R_i
+                const double all = double(state.index.subspaces[i].scale) * paths * connections;     // R_i
                 if (kDraws * connections * double(tables.column(eye)[i]) * r / all < 400) continue;  // too rarely to be normal
                 const Sums& s = found[y][int(place.second)];
                 const double mean = s.sum / kDraws, error = std::sqrt((s.square / kDraws - mean * mean) / kDraws);

@@ -80,8 +80,7 @@ struct EnvironmentCase {
         Image map;
         map.width = map.height = 8;
         for (int i = 0; i < 64; ++i)
-            map.floats.insert(map.floats.end(),
-                              {0.1f * float(i % 7), 0.3f * float(i % 2), float(i == 20) * 9});
+            map.floats.insert(map.floats.end(), {0.1f * float(i % 7), 0.3f * float(i % 2), float(i == 20) * 9});
         images.push_back(map);
         InfiniteLight image, constant, turned;
         image.image = turned.image = 0;
@@ -125,17 +124,12 @@ Rgb flux(const Case& c) {
     const float disc = kPi * kRadius * kRadius;
     switch (e.kind) {
         case EmitterKind::kTriangle:
-        case EmitterKind::kSphere:
-            return e.radiance * (kPi / e.inv_area * (e.two_sided ? 2.0f : 1.0f));
-        case EmitterKind::kPoint:
-            return e.radiance * (4 * kPi);
+        case EmitterKind::kSphere: return e.radiance * (kPi / e.inv_area * (e.two_sided ? 2.0f : 1.0f));
+        case EmitterKind::kPoint: return e.radiance * (4 * kPi);
         // The smoothstep between the two cosines averages one half.
-        case EmitterKind::kSpot:
-            return e.radiance * (kPi * (e.total_height + e.falloff_height));
-        case EmitterKind::kDistant:
-            return e.radiance * disc;
-        case EmitterKind::kEnvironment:
-            break;
+        case EmitterKind::kSpot: return e.radiance * (kPi * (e.total_height + e.falloff_height));
+        case EmitterKind::kDistant: return e.radiance * disc;
+        case EmitterKind::kEnvironment: break;
     }
     const EnvironmentCase source(c.environment);
     Rgb sum;
@@ -163,8 +157,7 @@ struct Cells {
 /// Which cell of four equal parts a point of a triangle lies in.
 int quarter_of(const Emitter& e, const Vec3& p) {
     const Vec3 n = cross(e.edge1, e.edge2), d = p - e.position;
-    const float n2 = length_squared(n), b1 = dot(cross(d, e.edge2), n) / n2,
-                b2 = dot(cross(e.edge1, d), n) / n2;
+    const float n2 = length_squared(n), b1 = dot(cross(d, e.edge2), n) / n2, b2 = dot(cross(e.edge1, d), n) / n2;
     return b1 > 0.5f ? 1 : b2 > 0.5f ? 2 : b1 + b2 < 0.5f ? 0 : 3;
 }
 
@@ -173,8 +166,7 @@ int quarter_of(const Emitter& e, const Vec3& p) {
 EmitterSet set_of(const Case& c, const EnvironmentCase& source) {
     Emitter other = point();
     other.radiance = Rgb(40.0f);
-    return EmitterSet({c.emitter, other}, c.environment != 0 ? source.make() : Environment(),
-                      kCentre, kRadius);
+    return EmitterSet({c.emitter, other}, c.environment != 0 ? source.make() : Environment(), kCentre, kRadius);
 }
 
 TEST(Emission, IsDrawnWithItsDensities) {
@@ -183,8 +175,7 @@ TEST(Emission, IsDrawnWithItsDensities) {
         const EnvironmentCase source(c.environment);
         const EmitterSet set = set_of(c, source);
         const Emitter& e = set[0];
-        const Cells directions{e.is_area() || !e.is_infinite() ? 10 : 1, e.is_infinite() ? 1 : 8},
-            discs{6, 8}, spheres{4, 8};
+        const Cells directions{e.is_area() || !e.is_infinite() ? 10 : 1, e.is_infinite() ? 1 : 8}, discs{6, 8}, spheres{4, 8};
         const bool map = e.kind == EmitterKind::kEnvironment;
         const int square = 16;  // cells of the environment's own map, two to a texel side
         const int position_bins = e.kind == EmitterKind::kTriangle ? 4
@@ -192,11 +183,9 @@ TEST(Emission, IsDrawnWithItsDensities) {
                                   : map                            ? square * square
                                                                    : 1;
         const int direction_bins = e.is_infinite() ? discs.count() : directions.count();
-        const Mat4 map_to_world =
-            map && !source.lights.empty() ? source.lights.back().light_to_world : Mat4{};
+        const Mat4 map_to_world = map && !source.lights.empty() ? source.lights.back().light_to_world : Mat4{};
         const Mat4 world_to_map = *inverse(map_to_world);
-        std::vector<double> observed(size_t(position_bins * direction_bins), 0),
-            expected(observed.size(), 0);
+        std::vector<double> observed(size_t(position_bins * direction_bins), 0), expected(observed.size(), 0);
         Rng rng({1, Stage::kTraining, 0, 0});
         int drawn = 0;
         for (int i = 0; i < kSamples; ++i) {
@@ -216,10 +205,8 @@ TEST(Emission, IsDrawnWithItsDensities) {
                 position = spheres.of((1 + double(n.z)) / 2, n.x, n.y);
             }
             if (map) {
-                const Vec2 uv =
-                    equal_area_sphere_to_square(normalize(world_to_map.vector(-s.direction)));
-                position = std::min(int(uv.y * square), square - 1) * square +
-                           std::min(int(uv.x * square), square - 1);
+                const Vec2 uv = equal_area_sphere_to_square(normalize(world_to_map.vector(-s.direction)));
+                position = std::min(int(uv.y * square), square - 1) * square + std::min(int(uv.x * square), square - 1);
             }
             if (e.is_infinite()) {
                 const Vec3 d = Frame(s.direction).to_local(s.position - kCentre) / kRadius;
@@ -241,44 +228,34 @@ TEST(Emission, IsDrawnWithItsDensities) {
             if (e.kind == EmitterKind::kTriangle)
                 position = double(e.pmf) * e.inv_area * 0.25 / e.inv_area;
             else if (e.kind == EmitterKind::kSphere)
-                position = double(set.pdf_position(e, {})) * 4 * kPiD * e.radius * e.radius /
-                           position_bins;
+                position = double(set.pdf_position(e, {})) * 4 * kPiD * e.radius * e.radius / position_bins;
             else if (map) {
-                const int n =
-                    c.environment == 3 ? 16 : 1;  // one lobe is turned against these cells
+                const int n = c.environment == 3 ? 16 : 1;  // one lobe is turned against these cells
                 for (int i = 0; i < n * n; ++i) {
                     const Vec2 uv{(float(p % square) + (float(i % n) + 0.5f) / float(n)) / square,
                                   (float(p / square) + (float(i / n) + 0.5f) / float(n)) / square};
                     const Vec3 d = normalize(map_to_world.vector(equal_area_square_to_sphere(uv)));
-                    position +=
-                        double(set.pdf_position(e, -d)) * 4 * kPiD / (square * square * n * n);
+                    position += double(set.pdf_position(e, -d)) * 4 * kPiD / (square * square * n * n);
                 }
             } else
                 position = set.pdf_position(e, e.normal);
             for (int d = 0; d < direction_bins; ++d) {
                 double direction = 0;
                 if (e.is_infinite()) {
-                    direction = double(set.pdf_direction(e, {}, e.normal)) * kPiD * kRadius *
-                                kRadius / direction_bins;
+                    direction = double(set.pdf_direction(e, {}, e.normal)) * kPiD * kRadius * kRadius / direction_bins;
                 } else {
                     const int n = 64;
                     for (int i = 0; i < n; ++i) {
-                        const double z =
-                            2 * (d / directions.columns + (i + 0.5) / n) / directions.rows - 1;
-                        const Vec3 axis = e.is_area()                    ? Vec3{0, 0, 1}
-                                          : e.kind == EmitterKind::kSpot ? e.normal
-                                                                         : Vec3{0, 0, 1};
-                        const Vec3 w =
-                            Frame(axis).to_world({float(std::sqrt(1 - z * z)), 0, float(z)});
-                        direction += double(set.pdf_direction(e, axis, w)) * 4 * kPiD /
-                                     (double(direction_bins) * n);
+                        const double z = 2 * (d / directions.columns + (i + 0.5) / n) / directions.rows - 1;
+                        const Vec3 axis = e.is_area() ? Vec3{0, 0, 1} : e.kind == EmitterKind::kSpot ? e.normal : Vec3{0, 0, 1};
+                        const Vec3 w = Frame(axis).to_world({float(std::sqrt(1 - z * z)), 0, float(z)});
+                        direction += double(set.pdf_direction(e, axis, w)) * 4 * kPiD / (double(direction_bins) * n);
                     }
                 }
                 total += expected[size_t(p * direction_bins + d)] = position * direction;
             }
         }
-        EXPECT_NEAR(total / double(e.pmf), 1, 2e-3)
-            << c.name << ": the densities do not integrate to the pmf";
+        EXPECT_NEAR(total / double(e.pmf), 1, 2e-3) << c.name << ": the densities do not integrate to the pmf";
         for (double& x : expected) x *= double(drawn) / total;
         EXPECT_NEAR(drawn, kSamples * double(e.pmf), 5 * std::sqrt(kSamples * 0.25)) << c.name;
         family.add(testing::chi_square_test(observed, expected).p_value, c.name);
@@ -292,8 +269,7 @@ TEST(Emission, CarriesTheAnalyticPower) {
     testing::TestFamily family;
     for (const Case& c : cases()) {
         const EnvironmentCase source(c.environment);
-        const EmitterSet set({c.emitter}, c.environment != 0 ? source.make() : Environment(),
-                             kCentre, kRadius);
+        const EmitterSet set({c.emitter}, c.environment != 0 ? source.make() : Environment(), kCentre, kRadius);
         const Rgb expected = flux(c);
         EXPECT_NEAR(set.power(set[0]) / scalar_of(expected), 1, 1e-4) << c.name;
         std::vector<double> groups[3];
@@ -307,16 +283,14 @@ TEST(Emission, CarriesTheAnalyticPower) {
                 if (!set.sample_emission(pick, u, v, &s)) continue;
                 sum[0] += s.alpha.r, sum[1] += s.alpha.g, sum[2] += s.alpha.b;
             }
-            for (int channel = 0; channel < 3; ++channel)
-                groups[channel].push_back(sum[channel] / (kSamples / 20));
+            for (int channel = 0; channel < 3; ++channel) groups[channel].push_back(sum[channel] / (kSamples / 20));
         }
         const double wanted[3] = {expected.r, expected.g, expected.b};
         for (int channel = 0; channel < 3; ++channel) {
             const testing::Sample sample(groups[channel]);
             // A perfect sampler has no variance: then only rounding remains.
             if (std::fabs(sample.mean / wanted[channel] - 1) > 1e-5)
-                family.add(testing::one_sample_p_value(sample, wanted[channel]),
-                           c.name + ", channel " + std::to_string(channel));
+                family.add(testing::one_sample_p_value(sample, wanted[channel]), c.name + ", channel " + std::to_string(channel));
         }
     }
     family.check();
@@ -382,12 +356,9 @@ TEST(NextEvent, IsDrawnWithItsDensity) {
         const EnvironmentCase source(c.environment);
         const EmitterSet set = set_of(c, source);
         const Emitter& e = set[0];
-        const bool round = e.kind == EmitterKind::kSphere,
-                   map = e.kind == EmitterKind::kEnvironment;
+        const bool round = e.kind == EmitterKind::kSphere, map = e.kind == EmitterKind::kEnvironment;
         std::vector<Vec3> references = {{0.3f, -1.2f, 0.8f}, {-0.5f, 1.2f, 0.72f}};
-        if (round)
-            references = {
-                {0.3f, -1.2f, 0.8f}, {-0.5f, 0.4f, 0.7f + 0.6f * 1.02f}, {-0.4f, 0.5f, 0.9f}};
+        if (round) references = {{0.3f, -1.2f, 0.8f}, {-0.5f, 0.4f, 0.7f + 0.6f * 1.02f}, {-0.4f, 0.5f, 0.9f}};
         for (const Vec3& reference : references) {
             // Bins: quarters of a triangle; (z, azimuth) on the sphere about the axis to the
             // reference; texels.
@@ -397,10 +368,7 @@ TEST(NextEvent, IsDrawnWithItsDensity) {
             // A cap from outside, all of the sphere from inside.
             const double lowest = cone ? e.radius / distance : -1;
             const Cells cap{12, 8};
-            const int square = 16, bins = e.kind == EmitterKind::kTriangle ? 4
-                                          : round                          ? cap.count()
-                                          : map                            ? square * square
-                                                                           : 1;
+            const int square = 16, bins = e.kind == EmitterKind::kTriangle ? 4 : round ? cap.count() : map ? square * square : 1;
             const Mat4 map_to_world = map ? source.lights.back().light_to_world : Mat4{};
             const Mat4 world_to_map = *inverse(map_to_world);
             std::vector<double> observed(size_t(bins) + 1, 0), expected(size_t(bins) + 1, 0);
@@ -413,9 +381,7 @@ TEST(NextEvent, IsDrawnWithItsDensity) {
                     ++observed[size_t(bins)];
                     continue;
                 }
-                EXPECT_NEAR(s.pdf / set.pdf_next_event(e, reference, s.position, s.normal, s.wi), 1,
-                            1e-4)
-                    << c.name;
+                EXPECT_NEAR(s.pdf / set.pdf_next_event(e, reference, s.position, s.normal, s.wi), 1, 1e-4) << c.name;
                 int bin = 0;
                 if (e.kind == EmitterKind::kTriangle) bin = quarter_of(e, s.position);
                 if (round) {
@@ -423,16 +389,13 @@ TEST(NextEvent, IsDrawnWithItsDensity) {
                     bin = cap.of((double(n.z) - lowest) / (1 - lowest), n.x, n.y);
                 }
                 if (map) {
-                    const Vec2 uv =
-                        equal_area_sphere_to_square(normalize(world_to_map.vector(s.wi)));
-                    bin = std::min(int(uv.y * square), square - 1) * square +
-                          std::min(int(uv.x * square), square - 1);
+                    const Vec2 uv = equal_area_sphere_to_square(normalize(world_to_map.vector(s.wi)));
+                    bin = std::min(int(uv.y * square), square - 1) * square + std::min(int(uv.x * square), square - 1);
                 }
                 if (!e.is_infinite()) {
                     const Vec3 d = s.position - reference;
                     EXPECT_NEAR(dot(normalize(d), s.wi), 1, 1e-5f);
-                    const double wanted =
-                        (e.is_area() ? double(abs_dot(s.normal, s.wi)) : 1.0) / length_squared(d);
+                    const double wanted = (e.is_area() ? double(abs_dot(s.normal, s.wi)) : 1.0) / length_squared(d);
                     EXPECT_NEAR(s.geometry / wanted, 1, 1e-4) << c.name;
                 }
                 ++observed[size_t(bin)];
@@ -442,9 +405,7 @@ TEST(NextEvent, IsDrawnWithItsDensity) {
             // refused.
             const auto density = [&](const Vec3& p, const Vec3& n) {
                 const Vec3 wi = normalize(p - reference);
-                return set.emitted(e, n, -wi).is_black()
-                           ? 0.0
-                           : double(set.pdf_next_event(e, reference, p, n, wi));
+                return set.emitted(e, n, -wi).is_black() ? 0.0 : double(set.pdf_next_event(e, reference, p, n, wi));
             };
             for (int b = 0; b < bins; ++b) {
                 double sum = 0;
@@ -454,37 +415,29 @@ TEST(NextEvent, IsDrawnWithItsDensity) {
                     sum = density(middle, e.normal) / e.inv_area * 0.25;
                 } else if (round) {
                     for (int i = 0; i < n; ++i) {
-                        const double z =
-                            lowest + (1 - lowest) * (b / cap.columns + (i + 0.5) / n) / cap.rows;
-                        const Vec3 w =
-                            Frame(axis).to_world({float(std::sqrt(1 - z * z)), 0, float(z)});
-                        sum += density(e.position + w * e.radius, e.inward ? -w : w) * 2 * kPiD *
-                               (1 - lowest) * e.radius * e.radius / (double(bins) * n);
+                        const double z = lowest + (1 - lowest) * (b / cap.columns + (i + 0.5) / n) / cap.rows;
+                        const Vec3 w = Frame(axis).to_world({float(std::sqrt(1 - z * z)), 0, float(z)});
+                        sum += density(e.position + w * e.radius, e.inward ? -w : w) * 2 * kPiD * (1 - lowest) * e.radius *
+                               e.radius / (double(bins) * n);
                     }
                 } else if (map) {
                     for (int i = 0; i < n * n; ++i) {
-                        const Vec2 uv{
-                            (float(b % square) + (float(i % n) + 0.5f) / float(n)) / square,
-                            (float(b / square) + (float(i / n) + 0.5f) / float(n)) / square};
-                        const Vec3 d =
-                            normalize(map_to_world.vector(equal_area_square_to_sphere(uv)));
-                        sum += double(set.pdf_next_event(e, reference, {}, {}, d)) * 4 * kPiD /
-                               (square * square * n * n);
+                        const Vec2 uv{(float(b % square) + (float(i % n) + 0.5f) / float(n)) / square,
+                                      (float(b / square) + (float(i / n) + 0.5f) / float(n)) / square};
+                        const Vec3 d = normalize(map_to_world.vector(equal_area_square_to_sphere(uv)));
+                        sum += double(set.pdf_next_event(e, reference, {}, {}, d)) * 4 * kPiD / (square * square * n * n);
                     }
                 } else {
-                    const bool lit =
-                        !set.emitted(e, {}, normalize(reference - e.position)).is_black();
+                    const bool lit = !set.emitted(e, {}, normalize(reference - e.position)).is_black();
                     sum = lit ? double(set.pdf_next_event(e, reference, e.position, {}, {})) : 0;
                 }
                 total += expected[size_t(b)] = sum * kSamples;
             }
             if (cone && !e.two_sided) {
-                EXPECT_NEAR(total / (double(e.pmf) * kSamples), 1, 1e-2)
-                    << c.name << ": the density does not integrate to the pmf";
+                EXPECT_NEAR(total / (double(e.pmf) * kSamples), 1, 1e-2) << c.name << ": the density does not integrate to the pmf";
             }
             expected[size_t(bins)] = kSamples - total;
-            family.add(testing::chi_square_test(observed, expected).p_value,
-                       c.name + " from distance " + std::to_string(distance));
+            family.add(testing::chi_square_test(observed, expected).p_value, c.name + " from distance " + std::to_string(distance));
         }
     }
     family.check();

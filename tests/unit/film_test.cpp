@@ -55,16 +55,13 @@ Partial random_partial(const FrameLayout& frame, const Rect& tile, uint64_t seed
 
 std::vector<Rect> four_tiles(const Rect& crop) {
     const int xm = crop.x0 + crop.width() / 3, ym = crop.y0 + crop.height() / 2;
-    return {{crop.x0, crop.y0, xm, ym},
-            {xm, crop.y0, crop.x1, ym},
-            {crop.x0, ym, xm, crop.y1},
-            {xm, ym, crop.x1, crop.y1}};
+    return {{crop.x0, crop.y0, xm, ym}, {xm, crop.y0, crop.x1, ym}, {crop.x0, ym, xm, crop.y1}, {xm, ym, crop.x1, crop.y1}};
 }
 
 bool same(const Partial& a, const Partial& b) {
     return a.tile == b.tile && a.samples_per_pixel == b.samples_per_pixel && a.camera == b.camera &&
-           a.light_paths == b.light_paths && a.splats == b.splats && a.dropped_count == b.dropped_count &&
-           a.dropped == b.dropped && a.counters.rays == b.counters.rays;
+           a.light_paths == b.light_paths && a.splats == b.splats && a.dropped_count == b.dropped_count && a.dropped == b.dropped &&
+           a.counters.rays == b.counters.rays;
 }
 
 PartialExpectation expectation_of(const Partial& p, const FrameLayout& frame) {
@@ -239,8 +236,7 @@ TEST(PartialExr, RoundTripsBitForBit) {
             const Result<EncodedPartial> encoded = encode_partial(p, kFrame);
             ASSERT_TRUE(encoded.ok()) << encoded.status().message();
             EXPECT_EQ(encoded->payload.size(), partial_payload_size(kFrame, tile, splats));
-            const Result<Partial> back =
-                decode_partial(expectation_of(p, kFrame), encoded->descriptor, encoded->payload);
+            const Result<Partial> back = decode_partial(expectation_of(p, kFrame), encoded->descriptor, encoded->payload);
             ASSERT_TRUE(back.ok()) << back.status().message();
             EXPECT_TRUE(same(p, *back));
             EXPECT_EQ(encode_partial(*back, kFrame)->payload, encoded->payload);

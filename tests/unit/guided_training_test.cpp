@@ -37,11 +37,11 @@ std::vector<std::pair<std::string, double>> estimates(const TrainingData& data) 
     const double n = double(data.samples);
     for (const double b : data.block_sum) out[0].second += b / n;
     for (const TrainingPath& p : data.light_paths)
-        for (uint32_t i = 0; i < p.vertex_count; ++i) 
+        for (uint32_t i = 0; i < p.vertex_count; ++i)
             out[1].second += double(data.vertices[p.first_vertex + i].density) / double(data.light_samples);
     for (const TrainingPath& p : data.paths) {
         out[p.vertex_count].second += double(p.estimate) / n;  // k = vertex_count - 1 stands at 3 + k - 2
-        double density = 0;  // of a renderer with N Gamma / Q = 1
+        double density = 0;                                    // of a renderer with N Gamma / Q = 1
         for (uint32_t i = 0; i < p.vertex_count; ++i) density += double(data.vertices[p.first_vertex + i].density);
         if (density > 0) out[2].second += double(p.square) / density / n;
     }
@@ -87,9 +87,8 @@ TEST(GuidedTraining, EstimatesWhatThePilotEstimates) {
                 const Sample a(pilot[i]), b(guided[i]);
                 if (a.mean == 0 && b.mean == 0) continue;
                 if (std::max(a.relative_error(), b.relative_error()) > 0.1) continue;  // would find nothing
-                family.add(testing::welch_p_value(a, b), std::string(named.name) + ", " + what + " guide, " +
-                                                             names[i].first + ": " + std::to_string(a.mean) + " and " +
-                                                             std::to_string(b.mean));
+                family.add(testing::welch_p_value(a, b), std::string(named.name) + ", " + what + " guide, " + names[i].first +
+                                                             ": " + std::to_string(a.mean) + " and " + std::to_string(b.mean));
             }
         }
     }

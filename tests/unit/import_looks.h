@@ -29,7 +29,7 @@ inline std::string tga(int width, int height, const std::string& bgr) {
 
 /// A PNG of 8 bits per sample, stored without compression; `rows` begin with a filter byte each. The decoder checks no sums.
 inline std::string png(int width, int height, int colour_type, const std::string& rows, const std::string& palette = "",
-                const std::string& transparency = "") {
+                       const std::string& transparency = "") {
     const auto big = [](size_t v) { return std::string{char(v >> 24), char(v >> 16), char(v >> 8), char(v)}; };
     const auto chunk = [&](const std::string& type, const std::string& data) {
         return big(data.size()) + type + data + std::string(4, '\0');

@@ -9,9 +9,9 @@
 namespace lightloom {
 namespace {
 
-using testing::exr;
 using testing::expect_error;
 using testing::expect_warning;
+using testing::exr;
 using testing::import_world;
 using testing::kShape;
 using testing::material_of;
@@ -33,8 +33,7 @@ TEST(ImportMaterial, DefaultsAreThoseOfPbrt) {
     EXPECT_EQ(value(d, material_of(d).k), import::named_metal("metal-Cu")->k);
     EXPECT_EQ(value(d, material_of(d).roughness_u), Rgb(0.0f));
     EXPECT_TRUE(material_of(d).remap_roughness);
-    d = world("Material \"dielectric\" \"float vroughness\" 0.3 \"float roughness\" 0.1 \"bool remaproughness\" false" +
-              kShape);
+    d = world("Material \"dielectric\" \"float vroughness\" 0.3 \"float roughness\" 0.1 \"bool remaproughness\" false" + kShape);
     EXPECT_EQ(material_of(d).ior, 1.5f);
     EXPECT_EQ(value(d, material_of(d).roughness_u), Rgb(0.1f));
     EXPECT_EQ(value(d, material_of(d).roughness_v), Rgb(0.3f));
@@ -53,10 +52,10 @@ TEST(ImportMaterial, DefaultsAreThoseOfPbrt) {
 }
 
 TEST(ImportMaterial, NamedOnesMayComeLaterAndMix) {
-    const SceneDescription d = world(
-        "NamedMaterial \"m\"" + kShape +
-        "MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"a\" \"b\"] \"float amount\" 0.25\n"
-        "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" MakeNamedMaterial \"b\" \"string type\" \"dielectric\"");
+    const SceneDescription d =
+        world("NamedMaterial \"m\"" + kShape +
+              "MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"a\" \"b\"] \"float amount\" 0.25\n"
+              "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" MakeNamedMaterial \"b\" \"string type\" \"dielectric\"");
     const Material m = material_of(d);
     EXPECT_EQ(m.kind, MaterialKind::kMix);
     EXPECT_EQ(m.name, "m");
@@ -65,9 +64,8 @@ TEST(ImportMaterial, NamedOnesMayComeLaterAndMix) {
     expect_error("MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"m\" \"m\"]", {"itself"});
     expect_error("NamedMaterial \"x\"" + kShape, {"scene.pbrt:3", "\"x\""});
     expect_error("MakeNamedMaterial \"x\"", {"type"});
-    expect_error(
-        "MakeNamedMaterial \"x\" \"string type\" \"diffuse\" MakeNamedMaterial \"x\" \"string type\" \"diffuse\"",
-        {"twice"});
+    expect_error("MakeNamedMaterial \"x\" \"string type\" \"diffuse\" MakeNamedMaterial \"x\" \"string type\" \"diffuse\"",
+                 {"twice"});
     std::string chain = "MakeNamedMaterial \"m0\" \"string type\" \"diffuse\"";
     for (int i = 1; i < 40; ++i) {
         const std::string previous = "\"m" + std::to_string(i - 1) + "\"";
@@ -111,13 +109,11 @@ TEST(ImportMaterial, WhatIsNotModelledIsNamed) {
     }
     expect_warning("Material \"coatedconductor\" \"integer maxdepth\" 7", "maxdepth");
     expect_warning("Material \"coateddiffuse\" \"integer nsamples\" 4", "nsamples");
-    const Material coat =
-        material_of(world("Material \"coateddiffuse\" \"float thickness\" 0.1 \"integer maxdepth\" 7" + kShape));
+    const Material coat = material_of(world("Material \"coateddiffuse\" \"float thickness\" 0.1 \"integer maxdepth\" 7" + kShape));
     EXPECT_EQ(coat.thickness, 0.1f);
     EXPECT_EQ(coat.layer_events, 7);
     expect_warning("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"" + kShape, "dispersion");
-    EXPECT_NEAR(material_of(world("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"" + kShape)).ior, 1.5168,
-                1e-4);
+    EXPECT_NEAR(material_of(world("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"" + kShape)).ior, 1.5168, 1e-4);
 }
 
 TEST(ImportMaterial, RoughnessLiesBetweenZeroAndOne) {
@@ -172,8 +168,7 @@ TEST(ImportMaterial, RoughnessOfTexturesIsBounded) {
 }
 
 TEST(ImportLight, AreaLights) {
-    SceneDescription d =
-        world("AreaLightSource \"diffuse\" \"rgb L\" [1 2 3] \"float scale\" 2 \"bool twosided\" true" + kShape);
+    SceneDescription d = world("AreaLightSource \"diffuse\" \"rgb L\" [1 2 3] \"float scale\" 2 \"bool twosided\" true" + kShape);
     ASSERT_EQ(d.emissions.size(), 1u);
     EXPECT_EQ(d.emissions[0].radiance, Rgb(2, 4, 6));
     EXPECT_TRUE(d.emissions[0].two_sided);
@@ -183,14 +178,12 @@ TEST(ImportLight, AreaLights) {
     EXPECT_NEAR(d.emissions[0].radiance.g, 10 / (3.14159265 * 4 * 3.14159265), 1e-5);
     // As in pbrt, the power is each triangle's: a 1 x 3 rectangle of two triangles gets one radiance for its area
     // of 1.5.
-    const std::string quad =
-        "Shape \"trianglemesh\" \"point3 P\" [0 0 0 3 0 0 3 1 0 0 1 0] \"integer indices\" [0 1 2 0 2 3]";
+    const std::string quad = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 3 0 0 3 1 0 0 1 0] \"integer indices\" [0 1 2 0 2 3]";
     d = world("AreaLightSource \"diffuse\" \"float power\" 10 " + quad);
     ASSERT_EQ(d.meshes.size(), 1u);
     EXPECT_NEAR(d.emissions.at(0).radiance.g, 10 / (3.14159265 * 1.5), 1e-5);
     EXPECT_NE(d.warnings.at(0).find("each of the 2 triangles"), std::string::npos);
-    const std::string uneven =
-        "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 0 9 9] \"integer indices\" [0 1 2 1 2 3]";
+    const std::string uneven = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 0 9 9] \"integer indices\" [0 1 2 1 2 3]";
     d = world("AreaLightSource \"diffuse\" \"float power\" 10 " + uneven);
     EXPECT_EQ(d.meshes.size(), 2u);
     EXPECT_EQ(d.emissions.size(), 2u);
@@ -234,13 +227,12 @@ TEST(ImportLight, PowerIsThatOfTheWholeShape) {
         double shapes;
         bool even;
     };
-    for (const Case& c : {Case{"Shape \"disk\" \"float radius\" 3", 1, true},
-                          Case{"Shape \"disk\" \"float radius\" 3 \"float innerradius\" 1", 1, true},
-                          Case{"Scale 1 2 3 Shape \"sphere\"", 1, true},
-                          Case{square + "]", 1, true},
-                          Case{"Shape \"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 1 0 1 1 1]", 1, true},
-                          Case{square + " 9 9 0 9 9 5] \"integer indices\" [0 1 2 3 1 3 4 5]", 2, false},
-                          Case{"Shape \"plymesh\" \"string filename\" \"a.ply\"", 3, false}}) {
+    for (const Case& c :
+         {Case{"Shape \"disk\" \"float radius\" 3", 1, true},
+          Case{"Shape \"disk\" \"float radius\" 3 \"float innerradius\" 1", 1, true}, Case{"Scale 1 2 3 Shape \"sphere\"", 1, true},
+          Case{square + "]", 1, true}, Case{"Shape \"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 1 0 1 1 1]", 1, true},
+          Case{square + " 9 9 0 9 9 5] \"integer indices\" [0 1 2 3 1 3 4 5]", 2, false},
+          Case{"Shape \"plymesh\" \"string filename\" \"a.ply\"", 3, false}}) {
         bool even = false;
         const SceneDescription d = world(light + c.shape, {{"a.ply", header + "3 0 1 3\n4 0 1 2 3\n3 1 4 5\n"}});
         EXPECT_NEAR(power_of(d, &even) / (10 * c.shapes), 1, 1e-5) << c.shape;
@@ -248,8 +240,7 @@ TEST(ImportLight, PowerIsThatOfTheWholeShape) {
     }
     // A two-sided one sends half of its power to either side.
     bool even = false;
-    const SceneDescription d =
-        world("AreaLightSource \"diffuse\" \"float power\" 10 \"bool twosided\" true Shape \"disk\"");
+    const SceneDescription d = world("AreaLightSource \"diffuse\" \"float power\" 10 \"bool twosided\" true Shape \"disk\"");
     EXPECT_NEAR(power_of(d, &even), 5, 1e-4);
     const SceneDescription two = world(light + square + " 9 9 0 9 9 5] \"integer indices\" [0 1 2 3 1 3 4 5]");
     EXPECT_NE(two.warnings.at(1).find("each of the 2 faces"), std::string::npos) << two.warnings.at(1);
@@ -270,8 +261,9 @@ TEST(ImportLight, PowerIsThatOfTheShapeAsItIsScaled) {
 }
 
 TEST(ImportLight, KnowsItsLine) {
-    const SceneDescription d = world("\nLightSource \"point\"\nLightSource \"spot\"\nLightSource \"distant\"\n"
-                                     "LightSource\n\"infinite\"\n\nLightSource \"infinite\"");
+    const SceneDescription d = world(
+        "\nLightSource \"point\"\nLightSource \"spot\"\nLightSource \"distant\"\n"
+        "LightSource\n\"infinite\"\n\nLightSource \"infinite\"");
     EXPECT_EQ(d.point_lights.at(0).source, "scene.pbrt:4");
     EXPECT_EQ(d.spot_lights.at(0).source, "scene.pbrt:5");
     EXPECT_EQ(d.distant_lights.at(0).source, "scene.pbrt:6");
@@ -289,8 +281,7 @@ TEST(ImportLight, PositionsAreBounded) {
 }
 
 TEST(ImportLight, PointSpotAndDistant) {
-    SceneDescription d =
-        world("Translate 1 0 0 LightSource \"point\" \"rgb I\" [1 2 3] \"point3 from\" [0 1 0] \"float power\" 8");
+    SceneDescription d = world("Translate 1 0 0 LightSource \"point\" \"rgb I\" [1 2 3] \"point3 from\" [0 1 0] \"float power\" 8");
     EXPECT_EQ(d.point_lights.at(0).position, (Vec3{1, 1, 0}));
     EXPECT_NEAR(d.point_lights[0].intensity.g, 2 * 8 / (4 * 3.14159265), 1e-5);
     d = world(
@@ -334,7 +325,9 @@ TEST(ImportLight, Infinite) {
     EXPECT_NEAR(radiance_of(Rgb(1.0f)) / radiance_of({0, 0, 1}), Rgb(1, 0, 0).luminance(), 1e-5);
     constexpr std::array<float, 8> kRec2020{0.708f, 0.292f, 0.17f, 0.797f, 0.131f, 0.046f, 0.3127f, 0.329f};
     const Rgb wide = world("LightSource \"infinite\" \"string filename\" \"e.EXR\" \"float illuminance\" 1",
-                           {{"e.EXR", exr({0.1f, 0.1f, 1}, kRec2020)}}).infinite_lights.at(0).radiance;
+                           {{"e.EXR", exr({0.1f, 0.1f, 1}, kRec2020)}})
+                         .infinite_lights.at(0)
+                         .radiance;
     EXPECT_NEAR(radiance_of(Rgb(1.0f)) / wide.r, 0.1 + 0.9 * 0.2627, 1e-4) << "by the file's own primaries";
     expect_warning("LightSource \"infinite\" \"string filename\" \"e.exr\"", "negative", {{"e.exr", exr({-1e-6f, 1, 1}, kRec709)}});
     expect_error("LightSource \"infinite\" \"point3 portal\" [0 0 0 1 0 0 1 1 0 0 1 0]", {"portal"});
@@ -375,8 +368,7 @@ TEST(ImportSpectra, InScenes) {
     SceneDescription d = world("LightSource \"point\" \"blackbody I\" 3000 \"float scale\" 4");
     EXPECT_NEAR(d.point_lights.at(0).intensity.luminance(), 4, 0.01);
     EXPECT_GT(d.point_lights[0].intensity.r, d.point_lights[0].intensity.b);
-    d = world("Material \"diffuse\" \"spectrum reflectance\" \"r.spd\"" + kShape,
-              {{"r.spd", "# grey\n300 0.25\n900 0.25\n"}});
+    d = world("Material \"diffuse\" \"spectrum reflectance\" \"r.spd\"" + kShape, {{"r.spd", "# grey\n300 0.25\n900 0.25\n"}});
     EXPECT_NEAR(value(d, material_of(d).reflectance).g, 0.25, 1e-6);
     d = world("Material \"conductor\" \"spectrum eta\" \"metal-Au-eta\" \"spectrum k\" \"metal-Au-k\"" + kShape);
     EXPECT_EQ(value(d, material_of(d).eta), import::named_metal("metal-Au")->eta);

@@ -39,26 +39,25 @@ TEST_P(SharedScene, LoadsWithoutAWarning) {
     RecordProperty("triangles", std::to_string(triangles));
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, SharedScene,
-    ::testing::Values(Expected{"bedroom/scene.pbrt", 270000}, Expected{"box-far-ceiling/scene.pbrt", 10},
-                      Expected{"box-near-ceiling/scene.pbrt", 10}, Expected{"classroom/scene.pbrt", 100000},
-                      Expected{"cornell-box/scene.pbrt", 30}, Expected{"cornell-closed/scene.pbrt", 10},
-                      Expected{"cornell-peer/scene.pbrt", 30}, Expected{"curtain-slit/scene.pbrt", 10},
-                      Expected{"door/scene.pbrt", 20000}, Expected{"door/scene-facing.pbrt", 20000},
-                      Expected{"door-many-lights/scene.pbrt", 10}, Expected{"furnace-box/scene.pbrt", 1},
-                      Expected{"furnace-sphere/scene.pbrt", 1}, Expected{"glossy-highlights/scene.pbrt", 5},
-                      Expected{"house/scene.pbrt", 470000}, Expected{"lampshade-mirror/scene.pbrt", 10},
-                      Expected{"modern-hall/scene.pbrt", 28000}, Expected{"sds-glass-sphere-mirror/scene.pbrt", 5},
-                      Expected{"sponza/scene.pbrt", 65000}, Expected{"striped-caustics/scene.pbrt", 5},
-                      Expected{"torus/scene.pbrt", 23000}, Expected{"veach-ajar/scene.pbrt", 23000},
-                      Expected{"veach-bidir/scene.pbrt", 11000}),
-    [](const auto& test) {
-        std::string name = test.param.path;
-        for (char& c : name)
-            if (!isalnum(static_cast<unsigned char>(c))) c = '_';
-        return name;
-    });
+INSTANTIATE_TEST_SUITE_P(All, SharedScene,
+                         ::testing::Values(Expected{"bedroom/scene.pbrt", 270000}, Expected{"box-far-ceiling/scene.pbrt", 10},
+                                           Expected{"box-near-ceiling/scene.pbrt", 10}, Expected{"classroom/scene.pbrt", 100000},
+                                           Expected{"cornell-box/scene.pbrt", 30}, Expected{"cornell-closed/scene.pbrt", 10},
+                                           Expected{"cornell-peer/scene.pbrt", 30}, Expected{"curtain-slit/scene.pbrt", 10},
+                                           Expected{"door/scene.pbrt", 20000}, Expected{"door/scene-facing.pbrt", 20000},
+                                           Expected{"door-many-lights/scene.pbrt", 10}, Expected{"furnace-box/scene.pbrt", 1},
+                                           Expected{"furnace-sphere/scene.pbrt", 1}, Expected{"glossy-highlights/scene.pbrt", 5},
+                                           Expected{"house/scene.pbrt", 470000}, Expected{"lampshade-mirror/scene.pbrt", 10},
+                                           Expected{"modern-hall/scene.pbrt", 28000},
+                                           Expected{"sds-glass-sphere-mirror/scene.pbrt", 5}, Expected{"sponza/scene.pbrt", 65000},
+                                           Expected{"striped-caustics/scene.pbrt", 5}, Expected{"torus/scene.pbrt", 23000},
+                                           Expected{"veach-ajar/scene.pbrt", 23000}, Expected{"veach-bidir/scene.pbrt", 11000}),
+                         [](const auto& test) {
+                             std::string name = test.param.path;
+                             for (char& c : name)
+                                 if (!isalnum(static_cast<unsigned char>(c))) c = '_';
+                             return name;
+                         });
 
 }  // namespace
 }  // namespace lightloom

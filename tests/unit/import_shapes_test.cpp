@@ -20,8 +20,7 @@ double area_of(const TriangleMesh& mesh) {
     double sum = 0;
     for (size_t i = 0; i < mesh.indices.size(); i += 3) {
         const Vec3& a = mesh.positions[mesh.indices[i]];
-        sum += 0.5 *
-               double(length(cross(mesh.positions[mesh.indices[i + 1]] - a, mesh.positions[mesh.indices[i + 2]] - a)));
+        sum += 0.5 * double(length(cross(mesh.positions[mesh.indices[i + 1]] - a, mesh.positions[mesh.indices[i + 2]] - a)));
     }
     return sum;
 }
@@ -32,23 +31,19 @@ Vec3 normal_of(const TriangleMesh& mesh, size_t triangle) {
 }
 
 TEST(ImportMesh, NormalsFollowTheTransformationAndReversal) {
-    const std::string mesh =
-        "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 1 0 1 0] \"normal N\" [-2 0 2 -2 0 2 -2 0 2]";
+    const std::string mesh = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 1 0 1 0] \"normal N\" [-2 0 2 -2 0 2 -2 0 2]";
     const Vec3 n = world("Scale 2 1 1 " + mesh).meshes[0].normals[0];
     EXPECT_NEAR(n.x, -1 / std::sqrt(5.0f), 1e-6);
     EXPECT_NEAR(n.z, 2 / std::sqrt(5.0f), 1e-6);
     EXPECT_NEAR(world("ReverseOrientation Scale 2 1 1 " + mesh).meshes[0].normals[0].z, -2 / std::sqrt(5.0f), 1e-6);
-    expect_warning("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"normal N\" [0 0 0 0 0 1 0 0 1]",
-                   "length zero");
+    expect_warning("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"normal N\" [0 0 0 0 0 1 0 0 1]", "length zero");
 }
 
 TEST(ImportMesh, Errors) {
     expect_error("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 3]",
                  {"scene.pbrt:3", "out of range"});
-    expect_error("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 -1]",
-                 {"out of range"});
-    expect_error("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1]",
-                 {"multiple of 3"});
+    expect_error("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 -1]", {"out of range"});
+    expect_error("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1]", {"multiple of 3"});
     expect_error("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 nan]", {"finite"});
     expect_error("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 0]", {"indices"});
     expect_error("Shape \"trianglemesh\"", {"point3 P"});
@@ -64,8 +59,7 @@ TEST(ImportMesh, Errors) {
 }
 
 TEST(ImportSphere, SimilaritiesStaySpheresAndOthersBecomeTriangles) {
-    const SceneDescription d =
-        world("Translate 1 2 3 Rotate 90 1 0 0 Scale -2 2 2 Shape \"sphere\" \"float radius\" 0.5");
+    const SceneDescription d = world("Translate 1 2 3 Rotate 90 1 0 0 Scale -2 2 2 Shape \"sphere\" \"float radius\" 0.5");
     ASSERT_EQ(d.spheres.size(), 1u);
     EXPECT_FLOAT_EQ(d.spheres[0].radius, 1);
     EXPECT_EQ(d.spheres[0].centre, (Vec3{1, 2, 3}));
@@ -101,8 +95,7 @@ TEST(ImportBilinearMesh, ParallelogramsAreTwoTriangles) {
     EXPECT_NEAR(normal_of(flat, 0).z, 1, 1e-6);
     EXPECT_EQ(flat.uvs[3].x, 1);
     expect_warning("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]", "grid");
-    expect_error("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1] \"integer indices\" [0 1 2]",
-                 {"multiple of 4"});
+    expect_error("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1] \"integer indices\" [0 1 2]", {"multiple of 4"});
 }
 
 std::string ascii_header(const std::string& vertices, const std::string& faces) {
@@ -113,12 +106,11 @@ std::string ascii_header(const std::string& vertices, const std::string& faces) 
 
 /// A quad with normals and (u, v), in the given byte order.
 std::string binary_quad(bool big) {
-    std::string out =
-        std::string("ply\r\nformat binary_") + (big ? "big" : "little") +
-        "_endian 1.0\r\ncomment x\r\nelement vertex 4\r\nproperty float x\r\nproperty float y\r\nproperty double "
-        "z\r\nproperty float nx\r\n"
-        "property float ny\r\nproperty float nz\r\nproperty float u\r\nproperty float v\r\nelement face 1\r\n"
-        "property list uchar uint vertex_index\r\nend_header\r\n";
+    std::string out = std::string("ply\r\nformat binary_") + (big ? "big" : "little") +
+                      "_endian 1.0\r\ncomment x\r\nelement vertex 4\r\nproperty float x\r\nproperty float y\r\nproperty double "
+                      "z\r\nproperty float nx\r\n"
+                      "property float ny\r\nproperty float nz\r\nproperty float u\r\nproperty float v\r\nelement face 1\r\n"
+                      "property list uchar uint vertex_index\r\nend_header\r\n";
     const auto put = [&](auto value) {
         char raw[sizeof value];
         std::memcpy(raw, &value, sizeof value);
@@ -157,12 +149,12 @@ TEST(Ply, AllFormatsAgree) {
         EXPECT_EQ(mesh->normals.size(), 4u);
         EXPECT_EQ(mesh->uvs[3].y, 1);
     }
-    const auto ascii =
-        import::read_ply(ascii_header("5", "2") + "0 0 0\n1 0 0\n1 1 0\n0 1 0\n-1 .5 0\n5 0 1 2 3 4\n3 0 1 2");
+    const auto ascii = import::read_ply(ascii_header("5", "2") + "0 0 0\n1 0 0\n1 1 0\n0 1 0\n-1 .5 0\n5 0 1 2 3 4\n3 0 1 2");
     ASSERT_TRUE(ascii.ok()) << ascii.status().message();
     EXPECT_EQ(ascii->indices.size(), 12u);
     EXPECT_EQ(ascii->faces, (std::vector<uint32_t>{0, 0, 0, 1}));
-    const auto mixed = import::read_ply(ascii_header("4", "4") + "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+    const auto mixed = import::read_ply(ascii_header("4", "4") +
+                                        "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
                                         "3 0 1 2\n3 0 2 3\n4 0 1 2 3\n3 0 1 2");
     ASSERT_TRUE(mixed.ok()) << mixed.status().message();
     EXPECT_EQ(mixed->faces, (std::vector<uint32_t>{0, 1, 2, 2, 3}));
@@ -180,10 +172,11 @@ TEST(Ply, AllFormatsAgree) {
 
 /// Files with such normals exist. Where all are, the mesh has none, as in pbrt; where some are, the geometry's own stand in.
 TEST(Ply, NormalsThatAreNoNumbersAreLeftOut) {
-    const std::string text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-                             "property float nx\nproperty float ny\nproperty float nz\nelement face 1\n"
-                             "property list uchar int vertex_indices\nend_header\n"
-                             "0 0 0 0 0 1\n1 0 0 nan nan nan\n0 1 0 0 0 1\n3 0 1 2\n";
+    const std::string text =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "property float nx\nproperty float ny\nproperty float nz\nelement face 1\n"
+        "property list uchar int vertex_indices\nend_header\n"
+        "0 0 0 0 0 1\n1 0 0 nan nan nan\n0 1 0 0 0 1\n3 0 1 2\n";
     const auto mesh = import::read_ply(text);
     ASSERT_TRUE(mesh.ok()) << mesh.status().message();
     EXPECT_EQ(mesh->normals[1], (Vec3{0, 0, 0}));
@@ -226,12 +219,10 @@ TEST(Ply, Errors) {
     std::string cut = binary_quad(false);
     cut.resize(cut.size() - 1);
     refused(cut, "end");
-    expect_error("Shape \"plymesh\" \"string filename\" \"a.ply\"", {"scene.pbrt:3", "a.ply", "not a PLY"},
-                 {{"a.ply", "oops"}});
+    expect_error("Shape \"plymesh\" \"string filename\" \"a.ply\"", {"scene.pbrt:3", "a.ply", "not a PLY"}, {{"a.ply", "oops"}});
     expect_error("Shape \"plymesh\" \"string filename\" \"missing.ply\"", {"scene.pbrt:3", "missing.ply"});
     expect_error("Shape \"plymesh\" \"string filename\" \"a.ply\"", {"gzip"}, {{"a.ply", "\x1f\x8b garbage"}});
-    expect_error("Shape \"plymesh\" \"string filename\" \"a.ply\"", {"limit"},
-                 {{"a.ply", gzip(std::string(4 << 20, 'x'))}});
+    expect_error("Shape \"plymesh\" \"string filename\" \"a.ply\"", {"limit"}, {{"a.ply", gzip(std::string(4 << 20, 'x'))}});
     expect_error("Shape \"plymesh\" \"string filename\" \"a.ply\" \"texture displacement\" \"d\"", {"displacement"},
                  {{"a.ply", binary_quad(true)}});
 }

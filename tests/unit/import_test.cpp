@@ -32,14 +32,11 @@ TEST(ImportTransform, ComposesInPbrtOrder) {
     expect_near(first_corner(world("Translate 9 9 9 Identity " + mesh)), {1, 0, 0});
     // Matrices are written column by column.
     expect_near(first_corner(world("Translate 9 9 9 Transform [1 0 0 0 0 1 0 0 0 0 1 0 5 6 7 1] " + mesh)), {6, 6, 7});
-    expect_near(first_corner(world("Scale 2 1 1 ConcatTransform [1 0 0 0 0 1 0 0 0 0 1 0 5 6 7 1] " + mesh)),
-                {12, 6, 7});
-    expect_near(first_corner(world("Translate 1 0 0 CoordinateSystem \"a\" Identity CoordSysTransform \"a\" " + mesh)),
-                {2, 0, 0});
+    expect_near(first_corner(world("Scale 2 1 1 ConcatTransform [1 0 0 0 0 1 0 0 0 0 1 0 5 6 7 1] " + mesh)), {12, 6, 7});
+    expect_near(first_corner(world("Translate 1 0 0 CoordinateSystem \"a\" Identity CoordSysTransform \"a\" " + mesh)), {2, 0, 0});
     // LookAt is world to camera: the eye lands at the origin.
     expect_near(first_corner(world("LookAt 1 0 0  1 0 5  0 1 0 " + mesh)), {0, 0, 0});
-    expect_near(first_corner(world(
-                    "AttributeBegin Translate 5 0 0 AttributeEnd TransformBegin Scale 7 7 7 TransformEnd " + mesh)),
+    expect_near(first_corner(world("AttributeBegin Translate 5 0 0 AttributeEnd TransformBegin Scale 7 7 7 TransformEnd " + mesh)),
                 {1, 0, 0});
     expect_near(first_corner(world("ActiveTransform StartTime Translate 1 0 0 ActiveTransform EndTime Translate 1 0 0 "
                                    "ActiveTransform All TransformTimes 0 1 " +
@@ -112,17 +109,17 @@ TEST(ImportState, AttributesHaveTheTypesThatDirectivesAskFor) {
     expect_error("Attribute \"shape\" \"float radius\" 1 \"integer radius\" 2", {"scene.pbrt:3", "\"radius\"", "twice"});
     // pbrt's spellings of a type are one type; another directive's type is a default that this one does not have.
     EXPECT_TRUE(import_world("Attribute \"shape\" \"vector S\" [1 0 0] \"normal3 N\" [0 0 1] Shape \"sphere\"", {}, true).ok());
-    const SceneDescription d = world("Attribute \"material\" \"float eta\" 1.3 Material \"conductor\" Shape \"sphere\" "
-                                     "Material \"dielectric\" Shape \"sphere\"");
+    const SceneDescription d = world(
+        "Attribute \"material\" \"float eta\" 1.3 Material \"conductor\" Shape \"sphere\" "
+        "Material \"dielectric\" Shape \"sphere\"");
     const Material& metal = d.materials.at(size_t(d.spheres[0].attributes.material));
     EXPECT_EQ(d.textures.at(size_t(metal.eta)).value, import::named_metal("metal-Cu")->eta);
     EXPECT_EQ(d.materials.at(size_t(d.spheres[1].attributes.material)).ior, 1.3f);
 }
 
 TEST(ImportState, ObjectsAreInstanced) {
-    const SceneDescription d =
-        world(std::string("ObjectBegin \"o\" Translate 1 0 0 ") + kTriangle +
-              "Shape \"sphere\" ObjectEnd Translate 0 5 0 ObjectInstance \"o\" ObjectInstance \"o\"");
+    const SceneDescription d = world(std::string("ObjectBegin \"o\" Translate 1 0 0 ") + kTriangle +
+                                     "Shape \"sphere\" ObjectEnd Translate 0 5 0 ObjectInstance \"o\" ObjectInstance \"o\"");
     ASSERT_EQ(d.objects.size(), 1u);
     ASSERT_EQ(d.instances.size(), 2u);
     EXPECT_TRUE(d.meshes.empty());
@@ -140,8 +137,7 @@ TEST(ImportState, ObjectsAreInstanced) {
     expect_error("ObjectBegin \"x\" ObjectBegin \"y\"", {"inside"});
     expect_error("ObjectBegin \"x\" ObjectEnd ObjectBegin \"x\"", {"twice"});
     expect_error("ObjectBegin \"x\" ObjectInstance \"x\"", {"nested"});
-    expect_warning(std::string("AreaLightSource \"diffuse\" ObjectBegin \"o\" ") + kTriangle + "ObjectEnd",
-                   "ignored, as in pbrt");
+    expect_warning(std::string("AreaLightSource \"diffuse\" ObjectBegin \"o\" ") + kTriangle + "ObjectEnd", "ignored, as in pbrt");
 }
 
 TEST(ImportState, ScopesMustMatch) {
@@ -267,8 +263,8 @@ TEST(ImportOptions, CameraFilmAndDepth) {
 /// The command line says which algorithm renders and where the picture goes; the description keeps what the file says, to show it.
 TEST(ImportOptions, IntegratorAndFileNameAreKeptForShow) {
     for (const std::string name : {"path", "volpath", "bdpt", "sppm"}) {
-        const auto scene = import_text("PixelFilter \"box\" Integrator \"" + name +
-                                       "\" Film \"rgb\" \"string filename\" \"foo.exr\" WorldBegin", {}, true);
+        const auto scene = import_text(
+            "PixelFilter \"box\" Integrator \"" + name + "\" Film \"rgb\" \"string filename\" \"foo.exr\" WorldBegin", {}, true);
         ASSERT_TRUE(scene.ok()) << scene.status().message();
         EXPECT_EQ(scene->description.integrator, name);
         EXPECT_EQ(scene->description.film.file_name, "foo.exr");
@@ -311,8 +307,7 @@ TEST(ImportOptions, CamerasStayWithinSinglePrecision) {
     for (const std::string look : {"1e18 0 0  0 0 0", "1e19 0 0  0 0 0", "0 0 0  0 0 3e38"}) {
         const auto scene = camera("", "LookAt " + look + "  0 1 0");
         ASSERT_FALSE(scene.ok()) << look;
-        EXPECT_NE(scene.status().message().find("scene.pbrt:1: LookAt: the eye or the target lies beyond 1e15"),
-                  std::string::npos)
+        EXPECT_NE(scene.status().message().find("scene.pbrt:1: LookAt: the eye or the target lies beyond 1e15"), std::string::npos)
             << scene.status().message();
     }
     refused("position", "", "Translate 0 0 1e16");

@@ -39,8 +39,7 @@ inline void expect_error(const std::string& text, std::initializer_list<const ch
     ASSERT_FALSE(scene.ok()) << "this must not load: " << text;
     const std::string& message = scene.status().message();
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
-    for (const char* part : parts)
-        EXPECT_NE(message.find(part), std::string::npos) << "no \"" << part << "\" in: " << message;
+    for (const char* part : parts) EXPECT_NE(message.find(part), std::string::npos) << "no \"" << part << "\" in: " << message;
 }
 
 /// A world that loads with exactly one warning, which contains `part`; under --strict it is an error.

@@ -8,9 +8,9 @@
 namespace lightloom {
 namespace {
 
-using testing::exr;
 using testing::expect_error;
 using testing::expect_warning;
+using testing::exr;
 using testing::kShape;
 using testing::material_of;
 using testing::png;
@@ -42,8 +42,8 @@ TEST(ImportTexture, ImagesAreLookedUpAsInPbrt) {
                                                            "\xff\xff\xff",
                                                            12))}};
     const auto look = [&](const std::string& options, Vec2 uv) {
-        const SceneDescription d = world("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"t.tga\" " +
-                                             options + " Material \"diffuse\" \"texture reflectance\" \"t\"" + kShape,
+        const SceneDescription d = world("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"t.tga\" " + options +
+                                             " Material \"diffuse\" \"texture reflectance\" \"t\"" + kShape,
                                          files);
         return value(d, material_of(d).reflectance, uv);
     };
@@ -63,8 +63,8 @@ TEST(ImportTexture, EncodingsAndFloats) {
     const testing::FileMap files{{"g.png", png(1, 1, 0, std::string("\0\x80", 2))},
                                  {"c.png", png(1, 1, 2, std::string("\0\x30\x60\x90", 4))}};
     const auto grey = [&](const std::string& options) {
-        const SceneDescription d = world("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"g.png\" " +
-                                             options + " Shape \"sphere\" \"texture alpha\" \"t\"",
+        const SceneDescription d = world("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"g.png\" " + options +
+                                             " Shape \"sphere\" \"texture alpha\" \"t\"",
                                          files);
         return value(d, d.spheres.at(0).attributes.alpha).g;
     };
@@ -88,9 +88,9 @@ TEST(ImportTexture, EncodingsAndFloats) {
 /// pbrt-v4 knows the alpha of an RGBA PNG; what the decoder makes of a palette's transparency or finds in a TGA is dropped.
 TEST(ImportTexture, AlphaIsThatOfRgbaFilesAlone) {
     const auto alpha = [&](const std::string& name, const std::string& bytes) {
-        const SceneDescription d = world("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"" + name +
-                                             "\" Shape \"sphere\" \"texture alpha\" \"t\"",
-                                         {{name, bytes}});
+        const SceneDescription d = world(
+            "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"" + name + "\" Shape \"sphere\" \"texture alpha\" \"t\"",
+            {{name, bytes}});
         return value(d, d.spheres.at(0).attributes.alpha).r;
     };
     EXPECT_NEAR(alpha("a.png", png(1, 1, 6, std::string("\0\xff\xff\xff\x80", 5))), 0.21586, 1e-4);
@@ -142,41 +142,39 @@ TEST(ImportTexture, SpectraAreReducedByTheirUse) {
     EXPECT_EQ(value(d, material_of(d).eta), value(index, material_of(index).eta));
     EXPECT_NE(value(d, material_of(d).eta), expected);
     // In per cent, as a texture's scale may have it.
-    d = world("Texture \"p\" \"spectrum\" \"constant\" \"spectrum value\" [300 80 900 80] "
-              "Texture \"t\" \"spectrum\" \"scale\" \"texture tex\" \"p\" \"float scale\" 0.01 "
-              "Material \"diffuse\" \"texture reflectance\" \"t\"" + kShape);
+    d = world(
+        "Texture \"p\" \"spectrum\" \"constant\" \"spectrum value\" [300 80 900 80] "
+        "Texture \"t\" \"spectrum\" \"scale\" \"texture tex\" \"p\" \"float scale\" 0.01 "
+        "Material \"diffuse\" \"texture reflectance\" \"t\"" +
+        kShape);
     EXPECT_NEAR(value(d, material_of(d).reflectance).g, 0.8, 1e-5);
 }
 
 TEST(ImportTexture, Errors) {
     expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.png\"", {"scene.pbrt:3", "no.png"});
-    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.bmp\"", {"bmp", "png"},
-                 {{"no.bmp", "BM"}});
+    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.bmp\"", {"bmp", "png"}, {{"no.bmp", "BM"}});
     for (const char* name : {"a.png", "a.jpg", "a.hdr", "a.tga", "a.exr"})
-        expect_error(std::string("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"") + name + "\"",
-                     {name}, {{name, "rubbish"}});
+        expect_error(std::string("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"") + name + "\"", {name},
+                     {{name, "rubbish"}});
     std::string huge = tga(1, 1, "");
     huge[12] = huge[13] = huge[14] = huge[15] = '\x3f';
-    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.tga\"", {"cannot hold"},
-                 {{"a.tga", huge}});
+    expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.tga\"", {"cannot hold"}, {{"a.tga", huge}});
     expect_error("Texture \"t\" \"spectrum\" \"marble\"", {"marble", "not supported"});
     expect_error("Texture \"t\" \"spectrum\" \"checkerboard\" \"string mapping\" \"planar\"", {"mapping", "uv"});
     expect_error("Texture \"t\" \"spectrum\" \"checkerboard\" \"integer dimension\" 3", {"dimension"});
     expect_error("Texture \"t\" \"spectrum\" \"scale\" \"texture tex\" \"t\"", {"itself"});
     expect_error("Texture \"t\" \"colour\" \"constant\"", {"float or spectrum"});
     expect_error("Texture \"t\" \"float\" \"constant\" Texture \"t\" \"float\" \"constant\"", {"twice"});
-    expect_error("Texture \"t\" \"float\" \"constant\" Material \"diffuse\" \"texture reflectance\" \"t\"",
-                 {"other type"});
-    expect_warning("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"t.tga\" \"string filter\" \"trilinear\"",
-                   "bilinear", {{"t.tga", tga(1, 1, "abc")}});
+    expect_error("Texture \"t\" \"float\" \"constant\" Material \"diffuse\" \"texture reflectance\" \"t\"", {"other type"});
+    expect_warning("Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"t.tga\" \"string filter\" \"trilinear\"", "bilinear",
+                   {{"t.tga", tga(1, 1, "abc")}});
     std::string chain = "Texture \"t0\" \"float\" \"checkerboard\"", wide = chain;
     for (int i = 1; i < 40; ++i) {
         const std::string name = "\"t" + std::to_string(i) + "\"", previous = "\"t" + std::to_string(i - 1) + "\"";
-        chain += " Shape \"sphere\" \"texture alpha\" " + previous + " Texture " + name +
-                 " \"float\" \"scale\" \"texture tex\" " + previous;
+        chain += " Shape \"sphere\" \"texture alpha\" " + previous + " Texture " + name + " \"float\" \"scale\" \"texture tex\" " +
+                 previous;
         if (i < 20)
-            wide += " Texture " + name + " \"float\" \"scale\" \"texture tex\" " + previous + " \"texture scale\" " +
-                    previous;
+            wide += " Texture " + name + " \"float\" \"scale\" \"texture tex\" " + previous + " \"texture scale\" " + previous;
     }
     expect_error(chain, {"31 levels"});
     expect_error(wide, {"4096"});

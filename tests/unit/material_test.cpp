@@ -185,7 +185,7 @@ TEST(Material, ImagesAreClampedAsReflectancesOnly) {
     index.eta = t.constant(Rgb(2)), index.k = t.constant(Rgb(3));
     same.eta = t.image(Rgb(2)), same.k = t.image(Rgb(3));
     const Bsdf wanted = t.resolve(t.add(index)), found = t.resolve(t.add(same));
-    EXPECT_EQ(found.reflectance, wanted.reflectance);  // eta
+    EXPECT_EQ(found.reflectance, wanted.reflectance);      // eta
     EXPECT_EQ(found.transmittance, wanted.transmittance);  // k
 }
 

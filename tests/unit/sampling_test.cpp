@@ -35,24 +35,19 @@ TEST(EqualAreaMapping, HasTheSameJacobianEverywhere) {
             const Vec2 p{(float(i) + 0.37f) / float(n), (float(j) + 0.61f) / float(n)};
             const float u = std::fabs(2 * p.x - 1), v = std::fabs(2 * p.y - 1);
             if (u < 0.01f || v < 0.01f || std::fabs(u + v - 1) < 0.01f) continue;
-            const Vec3 dx = equal_area_square_to_sphere({p.x + h, p.y}) -
-                            equal_area_square_to_sphere({p.x - h, p.y});
-            const Vec3 dy = equal_area_square_to_sphere({p.x, p.y + h}) -
-                            equal_area_square_to_sphere({p.x, p.y - h});
-            EXPECT_NEAR(length(cross(dx, dy)) / (4 * h * h), 4 * kPi, 0.02f * 4 * kPi)
-                << p.x << " " << p.y;
+            const Vec3 dx = equal_area_square_to_sphere({p.x + h, p.y}) - equal_area_square_to_sphere({p.x - h, p.y});
+            const Vec3 dy = equal_area_square_to_sphere({p.x, p.y + h}) - equal_area_square_to_sphere({p.x, p.y - h});
+            EXPECT_NEAR(length(cross(dx, dy)) / (4 * h * h), 4 * kPi, 0.02f * 4 * kPi) << p.x << " " << p.y;
         }
 }
 
 TEST(AliasTable, DrawsItsOwnPmfAndLeavesFreshUniforms) {
     testing::TestFamily family;
-    const std::vector<std::vector<double>> tables = {
-        {1}, {1, 1}, {0, 3, 1}, {5, 0, 0, 1e-3, 2, 2, 0}, {0, 0, 0}};
+    const std::vector<std::vector<double>> tables = {{1}, {1, 1}, {0, 3, 1}, {5, 0, 0, 1e-3, 2, 2, 0}, {0, 0, 0}};
     for (const std::vector<double>& weights : tables) {
         const AliasTable table(weights);
         double total = 0, weight_sum = 0;
-        for (size_t i = 0; i < weights.size(); ++i)
-            total += double(table.pmf(i)), weight_sum += weights[i];
+        for (size_t i = 0; i < weights.size(); ++i) total += double(table.pmf(i)), weight_sum += weights[i];
         EXPECT_NEAR(total, 1, 1e-6);
         const int n = 200000, bins = 16;
         std::vector<double> observed(weights.size() * bins), expected(weights.size() * bins);
@@ -68,10 +63,8 @@ TEST(AliasTable, DrawsItsOwnPmfAndLeavesFreshUniforms) {
             ++observed[k * bins + size_t(rest * bins)];
         }
         for (size_t k = 0; k < weights.size(); ++k)
-            for (int b = 0; b < bins; ++b)
-                expected[k * bins + size_t(b)] = double(table.pmf(k)) * n / bins;
-        family.add(testing::chi_square_test(observed, expected).p_value,
-                   "table of " + std::to_string(weights.size()));
+            for (int b = 0; b < bins; ++b) expected[k * bins + size_t(b)] = double(table.pmf(k)) * n / bins;
+        family.add(testing::chi_square_test(observed, expected).p_value, "table of " + std::to_string(weights.size()));
     }
     family.check();
 }
@@ -154,11 +147,9 @@ TEST(LowDiscrepancy, EveryAlignedBlockIsStratified) {
                     std::vector<int> count(size_t(1) << m, 0);
                     for (uint32_t i = 0; i < 1u << m; ++i) {
                         const Vec2 p = low_discrepancy_point((block << m) + i, seed);
-                        ++count[(size_t(p.x * float(1 << a)) << (m - a)) +
-                                size_t(p.y * float(1 << (m - a)))];
+                        ++count[(size_t(p.x * float(1 << a)) << (m - a)) + size_t(p.y * float(1 << (m - a)))];
                     }
-                    for (const int c : count)
-                        ASSERT_EQ(c, 1) << "seed " << seed << ", block " << block << ", 2^" << m;
+                    for (const int c : count) ASSERT_EQ(c, 1) << "seed " << seed << ", block " << block << ", 2^" << m;
                 }
 }
 
@@ -176,10 +167,8 @@ TEST(LowDiscrepancy, EveryPointIsUniformOverSeeds) {
                 const float y = other ? low_discrepancy_point(index, seed + 1).x : p.y;
                 ++observed[size_t(p.x * bins) * bins + size_t(y * bins)];
             }
-            const std::vector<double> expected(observed.size(),
-                                               double(n) / double(observed.size()));
-            family.add(testing::chi_square_test(observed, expected).p_value,
-                       "index " + std::to_string(index));
+            const std::vector<double> expected(observed.size(), double(n) / double(observed.size()));
+            family.add(testing::chi_square_test(observed, expected).p_value, "index " + std::to_string(index));
         }
     family.check();
 }

@@ -89,9 +89,7 @@ TEST(Tables, EveryBadTableIsRefusedByName) {
         {"too many subspaces", [](SubspaceTables& t) { t.light_count = SubspaceTables::kMaxSubspaces + 1; }},
         {"division of no scene", [](SubspaceTables& t) { t.division = LightDivision(); }},
         {"division of another scene",
-         [](SubspaceTables& t) {
-             t.division = LightDivision(std::vector<LightDivision::Cells>(t.division.cells().size() + 1));
-         }},
+         [](SubspaceTables& t) { t.division = LightDivision(std::vector<LightDivision::Cells>(t.division.cells().size() + 1)); }},
         {"cells beyond",
          [](SubspaceTables& t) {
              auto cells = t.division.cells();
@@ -117,13 +115,13 @@ TEST(Tables, EveryBadTableIsRefusedByName) {
          }},
         {"tree with an unknown axis",
          [](SubspaceTables& t) {
-             t.light_tree = SubspaceTree({SubspaceTree::make_inner(SubspaceTree::kAxes, 0, 1), SubspaceTree::make_leaf(0),
-                                          SubspaceTree::make_leaf(0)});
+             t.light_tree = SubspaceTree(
+                 {SubspaceTree::make_inner(SubspaceTree::kAxes, 0, 1), SubspaceTree::make_leaf(0), SubspaceTree::make_leaf(0)});
          }},
         {"tree with a threshold that is no number",
          [](SubspaceTables& t) {
-             t.light_tree = SubspaceTree(
-                 {SubspaceTree::make_inner(0, kNan, 1), SubspaceTree::make_leaf(0), SubspaceTree::make_leaf(0)});
+             t.light_tree =
+                 SubspaceTree({SubspaceTree::make_inner(0, kNan, 1), SubspaceTree::make_leaf(0), SubspaceTree::make_leaf(0)});
          }},
         {"Q too short", [](SubspaceTables& t) { t.energy.pop_back(); }},
         {"Q zero", [](SubspaceTables& t) { t.energy[1] = 0; }},

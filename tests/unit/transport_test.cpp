@@ -23,8 +23,8 @@ using testing::whole_frame;
 const char* const kAlgorithms[] = {"path", "light", "bdpt"};
 const char* const kAllAlgorithms[] = {"path", "light", "bdpt", "lvcbpt", "spcbpt"};
 
-Partial render(const std::shared_ptr<const Scene>& scene, const std::string& algorithm,
-               const UnitWork& work, uint64_t seed = 5, std::map<std::string, std::string> parameters = {}) {
+Partial render(const std::shared_ptr<const Scene>& scene, const std::string& algorithm, const UnitWork& work, uint64_t seed = 5,
+               std::map<std::string, std::string> parameters = {}) {
     RenderSettings settings{algorithm, testing::with_small_training(algorithm, std::move(parameters)), seed, 5};
     Result<std::unique_ptr<Renderer>> renderer = create_with_tables(scene, settings, {});
     if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
@@ -36,14 +36,11 @@ Partial render(const std::shared_ptr<const Scene>& scene, const std::string& alg
 /// Bit for bit, counters included.
 void expect_identical(const Partial& a, const Partial& b, const std::string& what) {
     ASSERT_EQ(a.camera.size(), b.camera.size()) << what;
-    EXPECT_EQ(std::memcmp(a.camera.data(), b.camera.data(), a.camera.size() * sizeof(double)), 0)
-        << what;
+    EXPECT_EQ(std::memcmp(a.camera.data(), b.camera.data(), a.camera.size() * sizeof(double)), 0) << what;
     ASSERT_EQ(a.splats.size(), b.splats.size()) << what;
     for (size_t i = 0; i < a.splats.size(); ++i) {
         EXPECT_EQ(a.splats[i].pixel, b.splats[i].pixel) << what;
-        EXPECT_EQ(
-            std::memcmp(a.splats[i].rgb.data(), b.splats[i].rgb.data(), sizeof(a.splats[i].rgb)), 0)
-            << what;
+        EXPECT_EQ(std::memcmp(a.splats[i].rgb.data(), b.splats[i].rgb.data(), sizeof(a.splats[i].rgb)), 0) << what;
     }
     EXPECT_EQ(a.counters.rays, b.counters.rays) << what;
     EXPECT_EQ(a.counters.vertices, b.counters.vertices) << what;
@@ -76,11 +73,8 @@ TEST(Determinism, OneTwoAndEightThreadsMakeTheSameBytes) {
             // different orders.
             for (const int threads : {2, 8, 8, 8}) {
                 Partial partial;
-                tbb::task_arena(threads).execute(
-                    [&] { partial = render(threads == 2 ? again : scene, algorithm, work); });
-                expect_identical(
-                    alone, partial,
-                    std::string(algorithm) + " on " + std::to_string(threads) + " threads");
+                tbb::task_arena(threads).execute([&] { partial = render(threads == 2 ? again : scene, algorithm, work); });
+                expect_identical(alone, partial, std::string(algorithm) + " on " + std::to_string(threads) + " threads");
             }
         }
     }
@@ -135,11 +129,8 @@ TEST(Tiles, HoldExactlyTheSamplesOfTheFrame) {
         for (int y0 = 0; y0 < crop.height(); y0 += 5) {
             const Rect rows{0, y0, crop.width(), std::min(y0 + 5, crop.height())};
             const uint64_t first = uint64_t(y0) * uint64_t(crop.width());
-            const Partial part =
-                render(scene, algorithm, {0, 1, 0, rows, first, uint64_t(rows.area())});
-            EXPECT_EQ(std::memcmp(part.camera.data(), &whole.camera[3 * first],
-                                  part.camera.size() * sizeof(double)),
-                      0)
+            const Partial part = render(scene, algorithm, {0, 1, 0, rows, first, uint64_t(rows.area())});
+            EXPECT_EQ(std::memcmp(part.camera.data(), &whole.camera[3 * first], part.camera.size() * sizeof(double)), 0)
                 << algorithm;
             for (const SplatSum& s : part.splats)
                 for (size_t c = 0; c < 3; ++c) splats[3 * s.pixel + c] += s.rgb[c];
@@ -147,22 +138,17 @@ TEST(Tiles, HoldExactlyTheSamplesOfTheFrame) {
         // Splats of different tiles meet in a pixel, so their sum is the same up to the order of
         // additions.
         for (const SplatSum& s : whole.splats)
-            for (size_t c = 0; c < 3; ++c)
-                EXPECT_NEAR(splats[3 * s.pixel + c], s.rgb[c], 1e-12 * s.rgb[c]) << algorithm;
+            for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(splats[3 * s.pixel + c], s.rgb[c], 1e-12 * s.rgb[c]) << algorithm;
     }
     // No sub-path of its own: any tiling, any number of iterations.
     const Partial whole = render(scene, "path", whole_frame(*scene, 3));
     for (int y0 = 0; y0 < crop.height(); y0 += 5)
         for (int x0 = 0; x0 < crop.width(); x0 += 7) {
-            const Rect tile{x0, y0, std::min(x0 + 7, crop.width()),
-                            std::min(y0 + 5, crop.height())};
+            const Rect tile{x0, y0, std::min(x0 + 7, crop.width()), std::min(y0 + 5, crop.height())};
             const Partial part = render(scene, "path", {0, 3, 0, tile, 0, 0});
             for (int64_t i = 0; i < tile.area(); ++i) {
-                const int64_t p =
-                    crop.index(tile.x0 + int(i % tile.width()), tile.y0 + int(i / tile.width()));
-                EXPECT_EQ(std::memcmp(&part.camera[size_t(3 * i)], &whole.camera[size_t(3 * p)],
-                                      3 * sizeof(double)),
-                          0);
+                const int64_t p = crop.index(tile.x0 + int(i % tile.width()), tile.y0 + int(i / tile.width()));
+                EXPECT_EQ(std::memcmp(&part.camera[size_t(3 * i)], &whole.camera[size_t(3 * p)], 3 * sizeof(double)), 0);
             }
         }
 }
@@ -188,25 +174,20 @@ TEST(Tiles, OfAnySizeKeepTheMean) {
             sum.light_paths = 0;
             for (int y0 = 0; y0 < crop.height(); y0 += 5)
                 for (int x0 = 0; x0 < crop.width(); x0 += 7) {
-                    const Rect tile{x0, y0, std::min(x0 + 7, crop.width()),
-                                    std::min(y0 + 5, crop.height())};
+                    const Rect tile{x0, y0, std::min(x0 + 7, crop.width()), std::min(y0 + 5, crop.height())};
                     const uint64_t paths = 4 * uint64_t(tile.area());
-                    const Partial part =
-                        render(scene, algorithm, {0, 4, 0, tile, sum.light_paths, paths}, seed, poor);
+                    const Partial part = render(scene, algorithm, {0, 4, 0, tile, sum.light_paths, paths}, seed, poor);
                     sum.light_paths += paths;
                     for (int64_t i = 0; i < tile.area(); ++i) {
-                        const int64_t p = crop.index(tile.x0 + int(i % tile.width()),
-                                                     tile.y0 + int(i / tile.width()));
-                        for (int64_t c = 0; c < 3; ++c)
-                            sum.camera[size_t(3 * p + c)] = part.camera[size_t(3 * i + c)];
+                        const int64_t p = crop.index(tile.x0 + int(i % tile.width()), tile.y0 + int(i / tile.width()));
+                        for (int64_t c = 0; c < 3; ++c) sum.camera[size_t(3 * p + c)] = part.camera[size_t(3 * i + c)];
                     }
                     sum.splats.insert(sum.splats.end(), part.splats.begin(), part.splats.end());
                 }
             return testing::develop(sum, crop);
         };
         const auto whole = testing::catalog_image(scene, algorithm, 5, 4);
-        testing::compare(testing::replicate(whole, crop, 32, 100),
-                         testing::replicate(tiled, crop, 32, 200), algorithm, &family);
+        testing::compare(testing::replicate(whole, crop, 32, 100), testing::replicate(tiled, crop, 32, 200), algorithm, &family);
     }
     family.check();
 }
@@ -229,10 +210,8 @@ TEST(Tiles, ACropHasTheMeanOfItsPartOfTheFrame) {
             return part;
         };
         const Rect crop = b->frame().crop;
-        testing::compare(
-            testing::replicate(part_of_frame, crop, 32, 100),
-            testing::replicate(testing::catalog_image(b, algorithm, 5, 8), crop, 32, 200),
-            algorithm, &family);
+        testing::compare(testing::replicate(part_of_frame, crop, 32, 100),
+                         testing::replicate(testing::catalog_image(b, algorithm, 5, 8), crop, 32, 200), algorithm, &family);
     }
     family.check();
 }
@@ -247,8 +226,7 @@ struct MeetingAlgorithm {
             threads->insert(std::this_thread::get_id());
             return threads->size();
         };
-        for (int i = 0; i < 10000 && arrived() < 2; ++i)
-            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        for (int i = 0; i < 10000 && arrived() < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
         return {};
     }
 };
@@ -273,8 +251,7 @@ struct BrokenAlgorithm {
     uint64_t iteration;
     Rgb sample(SampleContext& context) const {
         if (context.pixel == pixel && context.iteration == iteration) {
-            context.splat({float(context.px) + 0.5f, float(context.py) + 0.5f},
-                          Rgb(std::numeric_limits<float>::infinity()));
+            context.splat({float(context.px) + 0.5f, float(context.py) + 0.5f}, Rgb(std::numeric_limits<float>::infinity()));
             return {1, std::numeric_limits<float>::quiet_NaN(), 1};
         }
         context.splat({float(context.px) + 0.5f, float(context.py) + 0.5f}, Rgb(2.0f));
@@ -288,8 +265,7 @@ TEST(NonFinite, SamplesAreDroppedCountedAndRecorded) {
     const uint32_t pixel = 333;
     UnitWork work = whole_frame(*scene, 4);
     work.first_iteration = 10;
-    const Result<Partial> partial =
-        render_unit(BrokenAlgorithm{pixel, 12}, *scene, settings, {}, work, {});
+    const Result<Partial> partial = render_unit(BrokenAlgorithm{pixel, 12}, *scene, settings, {}, work, {});
     ASSERT_TRUE(partial.ok());
     EXPECT_EQ(partial->dropped_count, 2u);
     ASSERT_EQ(partial->dropped.size(), 2u);
@@ -309,8 +285,7 @@ struct NeverFinite {
 
 TEST(NonFinite, RecordsAreBounded) {
     const auto scene = testing::diffuse_box();
-    const Result<Partial> partial =
-        render_unit(NeverFinite{}, *scene, {}, {}, whole_frame(*scene, 2), {});
+    const Result<Partial> partial = render_unit(NeverFinite{}, *scene, {}, {}, whole_frame(*scene, 2), {});
     ASSERT_TRUE(partial.ok());
     EXPECT_EQ(partial->dropped_count, 2 * uint64_t(scene->frame().crop.area()));
     EXPECT_EQ(partial->dropped.size(), Partial::kMaxDroppedRecords);
@@ -322,8 +297,7 @@ TEST(Units, OutsideTheFrameOrCancelledAreRefused) {
         EXPECT_FALSE(render_unit(PathAlgorithm{}, *scene, {}, {}, {0, 1, 0, tile, 0, 0}, {}).ok());
     std::stop_source stop;
     stop.request_stop();
-    const Result<Partial> partial =
-        render_unit(PathAlgorithm{}, *scene, {}, {}, whole_frame(*scene, 1), stop.get_token());
+    const Result<Partial> partial = render_unit(PathAlgorithm{}, *scene, {}, {}, whole_frame(*scene, 1), stop.get_token());
     ASSERT_FALSE(partial.ok());
     EXPECT_EQ(partial.status().code(), StatusCode::kCancelled);
 }
@@ -340,11 +314,9 @@ TEST(SelfIntersection, LargeGroundShowsItsAlbedo) {
         const auto scene = b.build();
         for (const char* algorithm : {"path", "bdpt"}) {
             const auto image = testing::catalog_image(scene, algorithm, 5, 4);
-            const testing::RegionMeans means =
-                testing::replicate(image, scene->frame().crop, 16, 77);
+            const testing::RegionMeans means = testing::replicate(image, scene->frame().crop, 16, 77);
             const testing::Sample sample(means.values[0]);
-            family.add(testing::one_sample_p_value(sample, 0.5),
-                       what + " " + algorithm + ": " + std::to_string(sample.mean));
+            family.add(testing::one_sample_p_value(sample, 0.5), what + " " + algorithm + ": " + std::to_string(sample.mean));
         }
     };
     for (const float size : {10.0f, 100.0f, 1000.0f, 10000.0f, 1e6f}) {
@@ -353,10 +325,8 @@ TEST(SelfIntersection, LargeGroundShowsItsAlbedo) {
         sphere.look({0, 1, -0.01f}, {0, 0, 0}, 40);
         test(sphere, "sphere " + std::to_string(size));
         SceneBuilder tilted;
-        const Vec3 a = normalize(Vec3{0.8f, 0.53f, 0.21f}),
-                   n = normalize(cross(Vec3{0.1f, -0.2f, 1}, a)), c = cross(a, n);
-        tilted.quad(a * -size - c * (1.3f * size), c * (2 * size), a * (2.1f * size),
-                    tilted.diffuse(Rgb(0.5f)));
+        const Vec3 a = normalize(Vec3{0.8f, 0.53f, 0.21f}), n = normalize(cross(Vec3{0.1f, -0.2f, 1}, a)), c = cross(a, n);
+        tilted.quad(a * -size - c * (1.3f * size), c * (2 * size), a * (2.1f * size), tilted.diffuse(Rgb(0.5f)));
         tilted.look(n * (n.y > 0 ? 1.0f : -1.0f), {0, 0, 0}, 40);
         test(tilted, "triangle " + std::to_string(size));
     }
@@ -370,8 +340,7 @@ TEST(Roulette, CanBeSwitchedOff) {
     b.room({-1, -1, -1}, {1, 1, 1}, b.diffuse(Rgb(1.0f)));
     b.look({0, 0, -0.9f}, {0, 0, 1}, 80);
     const auto scene = b.build();
-    const auto renderer =
-        Renderer::create(scene, {"path", {{"rr-min", "1"}, {"rr-start", "2"}}, 3, 20});
+    const auto renderer = Renderer::create(scene, {"path", {{"rr-min", "1"}, {"rr-start", "2"}}, 3, 20});
     ASSERT_TRUE(renderer.ok());
     const Result<Partial> partial = (*renderer)->render(whole_frame(*scene, 4), {});
     ASSERT_TRUE(partial.ok());
@@ -399,8 +368,8 @@ TEST(Means, OfAllAlgorithmsAgree) {
         const Rect crop = scene->frame().crop;
         std::vector<testing::RegionMeans> estimates;
         for (const char* algorithm : kAllAlgorithms)
-            estimates.push_back(testing::replicate(testing::catalog_image(scene, algorithm, 5, 8), crop,
-                                                   32, 1000 * (estimates.size() + 1)));
+            estimates.push_back(
+                testing::replicate(testing::catalog_image(scene, algorithm, 5, 8), crop, 32, 1000 * (estimates.size() + 1)));
         for (size_t i = 0; i < estimates.size(); ++i)
             EXPECT_TRUE(testing::compare(estimates[i], estimates[(i + 1) % estimates.size()],
                                          std::string(kAllAlgorithms[i]) + " and the next", &family));

@@ -25,8 +25,7 @@ using testing::Tally;
 
 /// Sum of the weights of all techniques that can make `path`, each from its own rebuilt view.
 template <class Selection>
-double weight_sum(const Scene& scene, const FullPath& path, const Selection& selection,
-                  Heuristic heuristic) {
+double weight_sum(const Scene& scene, const FullPath& path, const Selection& selection, Heuristic heuristic) {
     double sum = 0;
     const int k = path.k();
     std::optional<testing::Rebuilt> any;
@@ -38,8 +37,7 @@ double weight_sum(const Scene& scene, const FullPath& path, const Selection& sel
     }
     if constexpr (Selection::kMerges) {
         for (int i = 1; any && i < k; ++i)
-            if (!any->view.delta[i])
-                sum += mis_weight(any->view, {TechniqueKind::kMerge, i}, selection, heuristic);
+            if (!any->view.delta[i]) sum += mis_weight(any->view, {TechniqueKind::kMerge, i}, selection, heuristic);
     }
     return sum;
 }
@@ -55,69 +53,58 @@ TEST_P(Weights, SumToOneOverAllTechniques) {
     Tally tallies[6];
     std::vector<int> made(16, 0);
     const auto& emitters = scene->emitters().all();
-    const bool hits = std::any_of(emitters.begin(), emitters.end(),
-                                  [](const Emitter& e) { return !e.is_delta(); });
+    const bool hits = std::any_of(emitters.begin(), emitters.end(), [](const Emitter& e) { return !e.is_delta(); });
     // A scene without lights that can be hit has far fewer paths to offer.
-    testing::for_each_path(
-        *scene, hits ? 10000 : 30000, 7, 11,
-        [&](const FullPath& path, int s, const PathView&, const Rgb&) {
-            ++made[size_t(s)];
-            if (path.k() < 2) return;
-            tallies[0].add(weight_sum(*scene, path, bdpt, Heuristic::kBalance) - 1, path);
-            tallies[1].add(weight_sum(*scene, path, bdpt, Heuristic::kPower) - 1, path);
-            tallies[2].add(weight_sum(*scene, path, merging, Heuristic::kBalance) - 1, path);
-            tallies[3].add(weight_sum(*scene, path, pairing, Heuristic::kBalance) - 1, path);
-            if (s <= 1)
-                tallies[4].add(weight_sum(*scene, path, PathSelection{}, Heuristic::kBalance) - 1, path);
-            if (s == path.k())
-                tallies[5].add(weight_sum(*scene, path, LightSelection{}, Heuristic::kBalance) - 1, path);
-        });
-    const char* names[] = {"bdpt balance", "bdpt power", "merge stub",
-                           "pairing stub", "path",       "light"};
+    testing::for_each_path(*scene, hits ? 10000 : 30000, 7, 11, [&](const FullPath& path, int s, const PathView&, const Rgb&) {
+        ++made[size_t(s)];
+        if (path.k() < 2) return;
+        tallies[0].add(weight_sum(*scene, path, bdpt, Heuristic::kBalance) - 1, path);
+        tallies[1].add(weight_sum(*scene, path, bdpt, Heuristic::kPower) - 1, path);
+        tallies[2].add(weight_sum(*scene, path, merging, Heuristic::kBalance) - 1, path);
+        tallies[3].add(weight_sum(*scene, path, pairing, Heuristic::kBalance) - 1, path);
+        if (s <= 1) tallies[4].add(weight_sum(*scene, path, PathSelection{}, Heuristic::kBalance) - 1, path);
+        if (s == path.k()) tallies[5].add(weight_sum(*scene, path, LightSelection{}, Heuristic::kBalance) - 1, path);
+    });
+    const char* names[] = {"bdpt balance", "bdpt power", "merge stub", "pairing stub", "path", "light"};
     for (int i = 0; i < 6; ++i) tallies[i].check(names[i]);
-    for (int s = hits ? 0 : 1; s <= 4; ++s)
-        EXPECT_GT(made[size_t(s)], 20) << "technique s = " << s << " was hardly exercised";
+    for (int s = hits ? 0 : 1; s <= 4; ++s) EXPECT_GT(made[size_t(s)], 20) << "technique s = " << s << " was hardly exercised";
 }
 
 TEST_P(Weights, EveryTechniqueSeesTheSamePath) {
     const auto scene = GetParam().make();
     Tally densities, contributions;
-    testing::for_each_path(
-        *scene, 1500, 6, 12, [&](const FullPath& path, int own, const PathView&, const Rgb&) {
-            const int k = path.k();
-            if (k < 2) return;
-            // f = contribution * density of the technique: the same number for all of them.
-            const auto f_of = [&](const PathView& v, const Rgb& c, int s) {
-                double density = s == 1 ? v.next_event : 1;
-                for (int i = 0; i < k; ++i)
-                    if (!(s == 1 && i == 0)) density *= i < s ? v.fwd[i] : v.rev[i];
-                return density * scalar_of(c);
-            };
-            const auto mine = testing::rebuild(*scene, path, own);
-            if (!mine) return;
-            const double f = f_of(mine->view, mine->contribution, own);
-            for (int s = 0; s <= k; ++s) {
-                const auto other = testing::rebuild(*scene, path, s);
-                if (!other) continue;
-                EXPECT_EQ(other->view.k, k);
-                for (int i = 0; i < k; ++i) {
-                    EXPECT_EQ(other->view.delta[i], path.x[size_t(i)].delta);
-                    densities.add(other->view.fwd[i] / mine->view.fwd[i] - 1, path);
-                    if (mine->view.rev[i] > 0)
-                        densities.add(other->view.rev[i] / mine->view.rev[i] - 1, path);
-                }
-                densities.add(other->view.next_event / mine->view.next_event - 1, path);
-                contributions.add(f_of(other->view, other->contribution, s) / f - 1, path);
+    testing::for_each_path(*scene, 1500, 6, 12, [&](const FullPath& path, int own, const PathView&, const Rgb&) {
+        const int k = path.k();
+        if (k < 2) return;
+        // f = contribution * density of the technique: the same number for all of them.
+        const auto f_of = [&](const PathView& v, const Rgb& c, int s) {
+            double density = s == 1 ? v.next_event : 1;
+            for (int i = 0; i < k; ++i)
+                if (!(s == 1 && i == 0)) density *= i < s ? v.fwd[i] : v.rev[i];
+            return density * scalar_of(c);
+        };
+        const auto mine = testing::rebuild(*scene, path, own);
+        if (!mine) return;
+        const double f = f_of(mine->view, mine->contribution, own);
+        for (int s = 0; s <= k; ++s) {
+            const auto other = testing::rebuild(*scene, path, s);
+            if (!other) continue;
+            EXPECT_EQ(other->view.k, k);
+            for (int i = 0; i < k; ++i) {
+                EXPECT_EQ(other->view.delta[i], path.x[size_t(i)].delta);
+                densities.add(other->view.fwd[i] / mine->view.fwd[i] - 1, path);
+                if (mine->view.rev[i] > 0) densities.add(other->view.rev[i] / mine->view.rev[i] - 1, path);
             }
-        });
+            densities.add(other->view.next_event / mine->view.next_event - 1, path);
+            contributions.add(f_of(other->view, other->contribution, s) / f - 1, path);
+        }
+    });
     densities.check("densities");
     contributions.check("path integrand");
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Weights, ::testing::ValuesIn(testing::kScenes),
-                         [](const ::testing::TestParamInfo<testing::NamedScene>& param) {
-                             return param.param.name;
-                         });
+                         [](const ::testing::TestParamInfo<testing::NamedScene>& param) { return param.param.name; });
 
 // Synthetic views: no geometry, exact double densities.
 
@@ -126,9 +113,7 @@ PathView synthetic_view(int k, uint64_t seed, double scale) {
     PathView view;
     view.k = k;
     // Area densities scale with 1 / length^2.
-    const auto density = [&] {
-        return std::exp((rng.uniform_double() - 0.5) * 24) / (scale * scale);
-    };
+    const auto density = [&] { return std::exp((rng.uniform_double() - 0.5) * 24) / (scale * scale); };
     for (int i = 0; i < k; ++i) {
         view.fwd[i] = density();
         view.rev[i] = density();
@@ -147,13 +132,11 @@ TEST(WeightEvaluator, PartitionOfUnityOnSyntheticPaths) {
         for (const Heuristic h : {Heuristic::kBalance, Heuristic::kPower, Heuristic::kMaximum}) {
             double sum = 0;
             for (int s = 0; s <= k; ++s) {
-                const bool blocked =
-                    (s > 0 && view.delta[s - 1]) || (s > 0 && s < k && view.delta[s]);
+                const bool blocked = (s > 0 && view.delta[s - 1]) || (s > 0 && s < k && view.delta[s]);
                 if (!blocked) sum += mis_weight(view, {TechniqueKind::kConnect, s}, selection, h);
             }
             for (int i = 1; i < k; ++i)
-                if (!view.delta[i])
-                    sum += mis_weight(view, {TechniqueKind::kMerge, i}, selection, h);
+                if (!view.delta[i]) sum += mis_weight(view, {TechniqueKind::kMerge, i}, selection, h);
             EXPECT_NEAR(sum, 1, 1e-10) << "seed " << seed << " k " << k;
         }
     }
@@ -174,8 +157,7 @@ TEST(WeightEvaluator, EqualsExplicitProducts) {
         }
         for (int s = 0; s <= k; ++s)
             if (rho[size_t(s)] > 0) {
-                EXPECT_NEAR(mis_weight(view, {TechniqueKind::kConnect, s}, selection),
-                            rho[size_t(s)] / sum, 1e-12);
+                EXPECT_NEAR(mis_weight(view, {TechniqueKind::kConnect, s}, selection), rho[size_t(s)] / sum, 1e-12);
             }
     }
 }

@@ -72,8 +72,8 @@ TEST(Plan, TilesCoverTheCropExactlyOnce) {
         for (const WorkUnit& unit : plan.units(plan.group(0))) {
             EXPECT_FALSE(unit.tile.empty());
             for (const Rect& other : seen) {
-                const bool apart = unit.tile.x1 <= other.x0 || other.x1 <= unit.tile.x0 || unit.tile.y1 <= other.y0 ||
-                                   other.y1 <= unit.tile.y0;
+                const bool apart =
+                    unit.tile.x1 <= other.x0 || other.x1 <= unit.tile.x0 || unit.tile.y1 <= other.y0 || other.y1 <= unit.tile.y0;
                 EXPECT_TRUE(apart);
             }
             seen.push_back(unit.tile);
@@ -186,8 +186,7 @@ TEST(JobSpec, DigestChangesWithEverythingThatChangesTheImageAndOnlyThat) {
 }
 
 TEST(AssetPath, OnlyPlainRelativePathsTravel) {
-    for (const char* good : {"a", "a/b.ply", "a b/c", "..a/b..", "\xc3\xa4/x"})
-        EXPECT_TRUE(validate_asset_path(good).ok()) << good;
+    for (const char* good : {"a", "a/b.ply", "a b/c", "..a/b..", "\xc3\xa4/x"}) EXPECT_TRUE(validate_asset_path(good).ok()) << good;
     for (const char* bad : {"", "/a", "../a", "a/../b", "a/./b", "a//b", "a/", ".", "..", "a\\b", "a\nb", "a\x7f", "caf\xe9.pbrt",
                             "\xc3", "\xc0\xaf", "\xed\xa0\x80", "\xf5\x80\x80\x80"})
         EXPECT_FALSE(validate_asset_path(bad).ok()) << bad;
@@ -289,8 +288,14 @@ TEST(Wire, SpecAndUnitsSurviveTheRoundTrip) {
     spec.height = 480;
     spec.scene_root = sha256("x");
     spec.frame = {640, 480, {1, 2, 3, 4}};
-    const UnitLease lease{"job-1", spec, {.key = {3, 4}, .first_iteration = 5, .iteration_count = 6, .tile = {1, 2, 3, 4},
-                                          .first_light_path = 7, .light_path_count = 8}};
+    const UnitLease lease{"job-1",
+                          spec,
+                          {.key = {3, 4},
+                           .first_iteration = 5,
+                           .iteration_count = 6,
+                           .tile = {1, 2, 3, 4},
+                           .first_light_path = 7,
+                           .light_path_count = 8}};
     v1::UnitLease message;
     wire::put(lease, &message);
     const auto back = wire::get(message);
@@ -318,7 +323,8 @@ TEST(Golden, ItsScenesHoldEveryKindOfMaterialTextureShapeAndLight) {
     for (int kind = 0; kind <= int(TextureKind::kImage); ++kind) {
         const auto is = [&](const TextureNode& t) { return t.kind == TextureKind(kind); };
         EXPECT_TRUE(std::any_of(room.textures.begin(), room.textures.end(), is) ||
-                    std::any_of(court.textures.begin(), court.textures.end(), is)) << kind;
+                    std::any_of(court.textures.begin(), court.textures.end(), is))
+            << kind;
     }
     EXPECT_FALSE(court.instances.empty() || court.spheres.empty() || court.meshes.empty());
     EXPECT_FALSE(court.point_lights.empty() || court.spot_lights.empty() || court.distant_lights.empty() ||
@@ -354,7 +360,9 @@ TEST(Golden, EveryPartOfTheCourtyardShowsInItsUnit) {
             changes(what + (" " + std::to_string(i)), [&](SceneDescription& d) { change((d.*list)[i]); });
     };
     using D = SceneDescription;
-    each("mesh", &D::meshes, [](TriangleMesh& m) { for (Vec3& p : m.positions) p.x += 0.01f; });
+    each("mesh", &D::meshes, [](TriangleMesh& m) {
+        for (Vec3& p : m.positions) p.x += 0.01f;
+    });
     each("sphere", &D::spheres, [](Sphere& s) { s.radius *= 1.01f; });
     each("instance", &D::instances, [](Instance& i) { i.object_to_world = translation(0.01, 0, 0) * i.object_to_world; });
     each("emission", &D::emissions, [](AreaEmission& e) { e.radiance = e.radiance * 1.001f; });
