@@ -10,8 +10,8 @@
 #include <filesystem>
 #include <system_error>
 
+#include "common/core/atomic_file.h"
 #include "common/core/digest.h"
-#include "common/film/atomic_file.h"
 
 namespace lightloom::client {
 namespace {

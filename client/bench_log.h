@@ -14,7 +14,7 @@
 
 #include "client/error_curve.h"
 #include "client/progressive_render.h"
-#include "common/film/metrics.h"
+#include "common/metrics/metrics.h"
 
 namespace lightloom::client {
 

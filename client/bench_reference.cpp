@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "common/film/metrics.h"
+#include "common/metrics/metrics.h"
 
 namespace lightloom::client {
 namespace {

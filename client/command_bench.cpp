@@ -17,7 +17,7 @@
 #include "client/output_files.h"
 #include "client/run_job.h"
 #include "common/cli/numbers.h"
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "common/path/path_view.h"
 #include "common/work/identity.h"

@@ -9,10 +9,10 @@
 #include "client/commands.h"
 #include "client/output_files.h"
 #include "common/cli/numbers.h"
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/film/exr_io.h"
-#include "common/film/metrics.h"
 #include "common/film/png.h"
+#include "common/metrics/metrics.h"
 
 namespace lightloom::client {
 

@@ -13,7 +13,7 @@
 #include "client/inspect_tables.h"
 #include "client/job_options.h"
 #include "client/output_files.h"
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/import/diagnostics.h"
 #include "common/import/import.h"
 #include "common/scene/scene.h"

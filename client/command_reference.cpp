@@ -14,7 +14,7 @@
 #include "client/progress.h"
 #include "client/run_job.h"
 #include "common/cli/numbers.h"
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/work/identity.h"
 #include "server/results.h"
 

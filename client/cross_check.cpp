@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "common/core/distributions.h"
+#include "common/metrics/significance.h"
 
 namespace lightloom::client {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "client/progressive_render.h"
-#include "common/film/region_means.h"
+#include "common/metrics/region_means.h"
 
 namespace lightloom::client {
 

@@ -5,9 +5,9 @@
 #include <cstdio>
 #include <set>
 
+#include "common/core/atomic_file.h"
 #include "common/core/fork_join.h"
 #include "common/core/rng.h"
-#include "common/film/atomic_file.h"
 #include "common/film/png.h"
 #include "server/table_cache.h"
 

@@ -139,8 +139,17 @@ int exit_code_of(const Status& status) {
         case StatusCode::kUnimplemented: return kUsage;
         case StatusCode::kUnavailable:
         case StatusCode::kDeadlineExceeded: return kUnavailable;
-        default: return kFailure;
+        case StatusCode::kUnknown:
+        case StatusCode::kAlreadyExists:
+        case StatusCode::kPermissionDenied:
+        case StatusCode::kResourceExhausted:
+        case StatusCode::kFailedPrecondition:
+        case StatusCode::kAborted:
+        case StatusCode::kOutOfRange:
+        case StatusCode::kInternal:
+        case StatusCode::kDataLoss: return kFailure;
     }
+    return kFailure;  // A code that only gRPC knows.
 }
 
 int report_error(const Status& status) {

@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 
 namespace lightloom::client {
 

@@ -13,7 +13,7 @@
 #include "client/commands.h"
 #include "client/output_files.h"
 #include "client/progress.h"
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "common/film/png.h"
 #include "server/results.h"

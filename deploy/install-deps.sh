@@ -7,7 +7,7 @@ packages=(
     libembree-dev libopenexr-dev libtbb-dev libpng-dev zlib1g-dev libjpeg-dev libstb-dev
     libgrpc++-dev protobuf-compiler protobuf-compiler-grpc libprotobuf-dev libssl-dev
     libspdlog-dev nlohmann-json3-dev libcli11-dev libboost-dev libsqlite3-dev
-    libgtest-dev libgmock-dev clang-14 libclang-rt-14-dev curl
+    libgtest-dev libgmock-dev clang-14 libclang-rt-14-dev clang-format-14 curl
 )
 
 missing=()

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs, builds, and runs the whole test suite, then each fuzz target for a minute (LIGHTLOOM_FUZZ_SECONDS), and the quick tests
-# under sanitizers.
+# Installs, checks that sources are formatted, builds, and runs the whole test suite, then each fuzz target for a minute
+# (LIGHTLOOM_FUZZ_SECONDS), and the quick tests under sanitizers.
 # Arguments go to ctest and leave the rest out. With CI=true, warnings are errors.
 #
 #   deploy/test.sh                     everything
@@ -10,6 +10,11 @@ set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 "$root/deploy/install-deps.sh"
 cd "$root"
+if git rev-parse --is-inside-work-tree >/dev/null 2>&1 &&
+    ! git ls-files -z '*.h' '*.cpp' | xargs -0 clang-format-14 --dry-run -Werror; then
+    echo "test: sources are not formatted; mend it with: git ls-files '*.h' '*.cpp' | xargs clang-format-14 -i" >&2
+    exit 1
+fi
 # The quick start's build is reused; CI adds warnings as errors.
 werror=OFF
 if [ "${CI:-}" = true ]; then werror=ON; fi

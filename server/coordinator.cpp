@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/path/path_view.h"
 #include "common/transport/catalog.h"
 #include "server/job_record.h"

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/transport/catalog.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"

@@ -1,6 +1,6 @@
 #include "server/local_ports.h"
 
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 
 namespace lightloom {
 

@@ -14,7 +14,7 @@
 
 #include "common/cli/log.h"
 #include "common/cli/numbers.h"
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/work/identity.h"
 #include "server/data_lock.h"
 #include "server/grpc_services.h"

@@ -4,7 +4,7 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "common/film/png.h"
 

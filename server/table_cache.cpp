@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/tables/subspace_tables.h"
 #include "common/work/cache_trim.h"
 

@@ -6,7 +6,7 @@
 #include <random>
 #include <thread>
 
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/import/import.h"
 #include "common/transport/training.h"
 

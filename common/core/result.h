@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "common/core/check.h"
+
 namespace lightloom {
 
 /// Canonical codes; the numbers equal gRPC's, so a Status crosses the wire unchanged.
@@ -57,16 +59,26 @@ class [[nodiscard]] Result {
 
     bool ok() const { return value_.has_value(); }
     const Status& status() const { return status_; }
-    T& value() & { return *value_; }
-    const T& value() const& { return *value_; }
-    T&& value() && { return *std::move(value_); }
-    T* operator->() { return &*value_; }
-    const T* operator->() const { return &*value_; }
-    T& operator*() & { return *value_; }
-    const T& operator*() const& { return *value_; }
-    T&& operator*() && { return *std::move(value_); }  // as of std::optional: *std::move(r) moves
+    // All of these want a value to be there; debug builds say which status is there instead.
+    T& value() & { return *checked(); }
+    const T& value() const& { return *checked(); }
+    T&& value() && { return *std::move(checked()); }
+    T* operator->() { return &*checked(); }
+    const T* operator->() const { return &*checked(); }
+    T& operator*() & { return *checked(); }
+    const T& operator*() const& { return *checked(); }
+    T&& operator*() && { return *std::move(checked()); }  // as of std::optional: *std::move(r) moves
 
   private:
+    std::optional<T>& checked() {
+        LL_DCHECK(value_.has_value(), status_.message());
+        return value_;
+    }
+    const std::optional<T>& checked() const {
+        LL_DCHECK(value_.has_value(), status_.message());
+        return value_;
+    }
+
     std::optional<T> value_;
     Status status_;
 };

@@ -3,7 +3,6 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
-#include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfPartType.h>
@@ -15,7 +14,8 @@
 #include <cstring>
 #include <map>
 
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
+#include "common/film/exr_memory.h"
 
 namespace lightloom {
 
@@ -24,47 +24,6 @@ namespace {
 constexpr int kZipLevel = 4;
 constexpr int64_t kMaxSide = 1 << 17;
 constexpr int64_t kMaxPixels = int64_t(1) << 28;
-
-class MemoryOutput : public Imf::OStream {
-  public:
-    explicit MemoryOutput(const char* name) : Imf::OStream(name) {}
-    void write(const char data[], int size) override {
-        if (position_ + uint64_t(size) > bytes.size()) bytes.resize(position_ + uint64_t(size));
-        std::memcpy(bytes.data() + position_, data, size_t(size));
-        position_ += uint64_t(size);
-    }
-    uint64_t tellp() override { return position_; }
-    void seekp(uint64_t position) override { position_ = position; }
-
-    std::string bytes;
-
-  private:
-    uint64_t position_ = 0;
-};
-
-class MemoryInput : public Imf::IStream {
-  public:
-    MemoryInput(const char* name, std::string_view bytes) : Imf::IStream(name), bytes_(bytes) {}
-    bool read(char data[], int size) override {
-        if (size < 0 || position_ > bytes_.size() || uint64_t(size) > bytes_.size() - position_) {
-            throw std::runtime_error("unexpected end of file");
-        }
-        std::memcpy(data, bytes_.data() + position_, size_t(size));
-        position_ += uint64_t(size);
-        return position_ < bytes_.size();
-    }
-    uint64_t tellg() override { return position_; }
-    void seekg(uint64_t position) override { position_ = position; }
-
-  private:
-    std::string_view bytes_;
-    uint64_t position_ = 0;
-};
-
-std::string one_line(std::string text) {
-    std::replace(text.begin(), text.end(), '\n', ' ');
-    return text;
-}
 
 /// Address of pixel (0, 0) of the display for a slice whose memory begins at the data window's corner.
 Imf::Slice slice_of(Imf::PixelType type, void* data, size_t pixel_bytes, const Rect& crop) {
@@ -164,7 +123,7 @@ Result<std::string> encode_exr(const ExrImage& image, ExrPixelType type) {
             }
         }
 
-        MemoryOutput stream("memory");
+        ExrMemoryOutput stream;
         {
             Imf::OutputFile file(stream, header);
             file.setFrameBuffer(frame_buffer);
@@ -189,7 +148,7 @@ Result<ExrImage> decode_exr(std::string_view bytes, const std::string& name) {
     std::memcpy(&version, bytes.data() + 4, 4);
     if (version & 0x800) return refuse("deep EXR images are not supported");
     try {
-        MemoryInput stream(name.c_str(), bytes);
+        ExrMemoryInput stream(name.c_str(), bytes);
         Imf::InputFile file(stream);
         const Imf::Header& header = file.header();
         if (header.hasType() && header.type() != Imf::SCANLINEIMAGE && header.type() != Imf::TILEDIMAGE) {

@@ -22,6 +22,9 @@ struct Rect {
 /// Largest crop window: a pixel's 28 bytes of a partial must fit EXR's 31-bit chunk size.
 inline constexpr int64_t kMaxPartialPixels = (int64_t(1) << 31) / 28 - 1;
 
+/// Longest side of the full frame.
+inline constexpr int kMaxFrameSide = 65536;
+
 /// The frame that a job renders. Splats and camera samples outside `crop` do not exist.
 struct FrameLayout {
     int width = 0, height = 0;  ///< Full resolution.

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <array>
 
+#include "common/core/atomic_file.h"
 #include "common/core/math.h"
-#include "common/film/atomic_file.h"
 
 namespace lightloom {
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/core/math.h"
+#include "common/film/frame.h"
 #include "common/import/context.h"
 
 namespace lightloom::import {
@@ -115,16 +116,15 @@ void set_film(Context* context, const std::string& kind, const ParameterList& p)
     FilmDescription film;
     film.width = p.one_int("xresolution", 1280);
     film.height = p.one_int("yresolution", 720);
-    constexpr int kMaxSide = 65536;
-    if (film.width < 1 || film.height < 1 || film.width > kMaxSide || film.height > kMaxSide)
-        fail(p.where(), p.what() + ": the resolution must lie between 1 and 65536 pixels a side");
+    if (film.width < 1 || film.height < 1 || film.width > kMaxFrameSide || film.height > kMaxFrameSide)
+        fail(p.where(), p.what() + ": the resolution must lie between 1 and " + std::to_string(kMaxFrameSide) + " pixels a side");
     film.file_name = p.one_string("filename", "");
     const bool cropped = read_crop(p, &film);
     const int64_t pixels =
         cropped ? int64_t(film.crop[1] - film.crop[0]) * (film.crop[3] - film.crop[2]) : int64_t(film.width) * film.height;
-    if (pixels > kMaxFilmPixels)
+    if (pixels > kMaxPartialPixels)
         fail(p.where(), p.what() + ": the picture has " + std::to_string(pixels) + " pixels; the limit is " +
-                            std::to_string(kMaxFilmPixels) + ", so lower the resolution or give a cropwindow");
+                            std::to_string(kMaxPartialPixels) + ", so lower the resolution or give a cropwindow");
     p.ignore(&context->diagnostics, "maxcomponentvalue", "samples are not clamped, because that changes the mean");
     context->iso = p.one_float("iso", 100);
     if (!(context->iso > 0)) fail(p.where(), p.what() + ": iso must be positive");

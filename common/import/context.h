@@ -26,8 +26,7 @@ inline constexpr MaterialId kInterfaceMaterial = -2;
 /// Farthest that anything may lie from the origin, and longest length: its square, and an area times a squared distance
 /// over another, stay far from the end of single precision (Embree gives up beyond 1.8e18).
 inline constexpr float kMaxCoordinate = 1e15f;
-inline constexpr int kMaxDepth = 255;                                   ///< Edges of a path but one; see kMaxEdges.
-inline constexpr int64_t kMaxFilmPixels = (int64_t(1) << 31) / 28 - 1;  ///< Of the crop window; see kMaxPartialPixels.
+inline constexpr int kMaxDepth = 255;  ///< Edges of a path but one; see kMaxEdges.
 
 /// A material as a shape names it: a named one, or an anonymous one by its index.
 struct MaterialReference {

@@ -4,45 +4,18 @@
 #include <ImfChromaticities.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
-#include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <ImfStandardAttributes.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <exception>
 #include <optional>
 
+#include "common/film/exr_memory.h"
+
 namespace lightloom::import {
 namespace {
-
-class MemoryStream : public Imf::IStream {
-  public:
-    explicit MemoryStream(const std::string& bytes) : Imf::IStream("image"), bytes_(bytes) {}
-
-    bool read(char out[], int n) override {
-        if (n < 0 || uint64_t(n) > bytes_.size() - pos_) throw std::runtime_error("the file ends early");
-        std::memcpy(out, bytes_.data() + pos_, size_t(n));
-        pos_ += uint64_t(n);
-        return pos_ < bytes_.size();
-    }
-    uint64_t tellg() override { return pos_; }
-    void seekg(uint64_t pos) override {
-        if (pos > bytes_.size()) throw std::runtime_error("the file ends early");
-        pos_ = pos;
-    }
-
-  private:
-    const std::string& bytes_;
-    uint64_t pos_ = 0;
-};
-
-std::string one_line(std::string text) {
-    for (char& c : text)
-        if (c == '\n' || c == '\r') c = ' ';
-    return text;
-}
 
 /// Primaries and white, as red x, red y, ... white y.
 struct NamedPrimaries {
@@ -89,7 +62,7 @@ Status check_image_size(uint64_t width, uint64_t height, uint64_t channels, uint
 }
 
 Result<ExrPixels> read_exr(const std::string& bytes, ExrChannels channels) try {
-    MemoryStream stream(bytes);
+    ExrMemoryInput stream("image", bytes);
     Imf::InputFile file(stream, 1);
     const Imath::Box2i window = file.header().dataWindow();
     const int64_t width = int64_t(window.max.x) - window.min.x + 1, height = int64_t(window.max.y) - window.min.y + 1;

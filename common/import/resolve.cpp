@@ -62,12 +62,13 @@ void add_powered_mesh(Context* context, TriangleMesh&& mesh, const PendingShape&
         context->diagnostics.warn(shape.where, "as in pbrt, each of the " + std::to_string(count) +
                                                    (shape.faces.empty() ? " triangles" : " faces") +
                                                    " of this light emits the given power");
-    for (const auto& [area, triangles] : by_area) {
-        const int32_t emission = add_emission(context, area_emission(context, *shape.area_light, double(area)));
-        const bool whole = triangles.size() == triangles_in_all;
-        TriangleMesh part = whole ? std::move(mesh) : subset(mesh, triangles);
-        part.attributes.emission = emission;
+    const auto add_part = [&](TriangleMesh part, float area) {
+        part.attributes.emission = add_emission(context, area_emission(context, *shape.area_light, double(area)));
         context->scene.meshes.push_back(std::move(part));
+    };
+    for (const auto& [area, triangles] : by_area) {
+        if (triangles.size() == triangles_in_all) return add_part(std::move(mesh), area);  // There is no other part.
+        add_part(subset(mesh, triangles), area);
     }
 }
 

@@ -117,8 +117,10 @@ inline bool Bsdf::has_smooth_lobe() const {
         case BsdfKind::kDielectric: return alpha_x > 0;
         case BsdfKind::kCoatedDiffuse: return alpha_x > 0 || base_weight > 0;
         case BsdfKind::kCoatedConductor: return base_alpha_x > 0;
-        default: return false;
+        case BsdfKind::kNull:
+        case BsdfKind::kThinDielectric: return false;
     }
+    return false;
 }
 
 inline bool Bsdf::has_delta_lobe() const {
@@ -128,8 +130,11 @@ inline bool Bsdf::has_delta_lobe() const {
         case BsdfKind::kDielectric:
         case BsdfKind::kCoatedDiffuse:
         case BsdfKind::kCoatedConductor: return alpha_x == 0;
-        default: return false;
+        case BsdfKind::kNull:
+        case BsdfKind::kDiffuse:
+        case BsdfKind::kDiffuseTransmission: return false;
     }
+    return false;
 }
 
 inline BsdfEval Bsdf::eval(const Vec3& wo, const Vec3& wi, TransportMode mode) const {

@@ -56,7 +56,10 @@ Bsdf resolve_material(const TextureTables& tables, MaterialId material, Vec2 uv,
                 return make_diffuse_transmission(reflectance(tables, m.reflectance, uv, Rgb(0.25f)),
                                                  reflectance(tables, m.transmittance, uv, Rgb(0.25f)));
             case MaterialKind::kThinDielectric: return make_thin_dielectric(ior);
-            default: break;
+            case MaterialKind::kConductor:
+            case MaterialKind::kDielectric:
+            case MaterialKind::kCoatedDiffuse:
+            case MaterialKind::kCoatedConductor: break;  // They have a roughness, which comes next.
         }
         const float alpha_x = alpha(tables, m.roughness_u, uv, m.remap_roughness);
         const float alpha_y = m.roughness_v == m.roughness_u ? alpha_x : alpha(tables, m.roughness_v, uv, m.remap_roughness);
@@ -75,8 +78,12 @@ Bsdf resolve_material(const TextureTables& tables, MaterialId material, Vec2 uv,
                                              alpha(tables, m.base_roughness_v, uv, m.remap_roughness), ior, m.thickness, alpha_x,
                                              alpha_y);
             }
-            default: return {};
+            case MaterialKind::kMix:
+            case MaterialKind::kDiffuse:
+            case MaterialKind::kDiffuseTransmission:
+            case MaterialKind::kThinDielectric: break;
         }
+        return {};
     }
     return {};
 }

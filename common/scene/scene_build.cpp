@@ -30,17 +30,30 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
         light_sources_.push_back(source.empty() ? fallback : source);
         return int32_t(light_sources_.size()) - 1;
     };
-    for (const TriangleMesh& mesh : description_.meshes) {
-        const bool emits =
-            mesh.attributes.emission != kNone && !description_.emissions[size_t(mesh.attributes.emission)].radiance.is_black();
-        mesh_first_emitter_.push_back(emits ? int32_t(emitters->size()) : kNone);
-        if (!emits) continue;
-        const AreaEmission& emission = description_.emissions[size_t(mesh.attributes.emission)];
+    const auto new_emitter = [&](EmitterKind kind, const std::string& source, const char* fallback = "") {
         Emitter e;
-        e.kind = EmitterKind::kTriangle;
+        e.kind = kind;
+        e.light = new_light(source, fallback);
+        return e;
+    };
+    // The emission of a shape or null, after a note where in `emitters` the shape's begin.
+    const auto area_emission = [&](const ShapeAttributes& attributes, std::vector<int32_t>* first_emitter) {
+        const AreaEmission* emission =
+            attributes.emission != kNone ? &description_.emissions[size_t(attributes.emission)] : nullptr;
+        if (emission && emission->radiance.is_black()) emission = nullptr;
+        first_emitter->push_back(emission ? int32_t(emitters->size()) : kNone);
+        return emission;
+    };
+    const auto new_area_emitter = [&](EmitterKind kind, const AreaEmission& emission, const std::string& source) {
+        Emitter e = new_emitter(kind, source);
         e.two_sided = emission.two_sided;
         e.radiance = emission.radiance;
-        e.light = new_light(mesh.attributes.source);
+        return e;
+    };
+    for (const TriangleMesh& mesh : description_.meshes) {
+        const AreaEmission* emission = area_emission(mesh.attributes, &mesh_first_emitter_);
+        if (!emission) continue;
+        Emitter e = new_area_emitter(EmitterKind::kTriangle, *emission, mesh.attributes.source);
         for (size_t t = 0; t + 2 < mesh.indices.size(); t += 3) {
             const uint32_t* index = &mesh.indices[t];
             e.position = mesh.positions[index[0]];
@@ -61,59 +74,43 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
         }
     }
     for (const Sphere& s : description_.spheres) {
-        const bool emits =
-            s.attributes.emission != kNone && !description_.emissions[size_t(s.attributes.emission)].radiance.is_black();
-        sphere_emitter_.push_back(emits ? int32_t(emitters->size()) : kNone);
-        if (!emits) continue;
-        const AreaEmission& emission = description_.emissions[size_t(s.attributes.emission)];
-        Emitter e;
-        e.kind = EmitterKind::kSphere;
-        e.two_sided = emission.two_sided;
-        e.radiance = emission.radiance;
+        const AreaEmission* emission = area_emission(s.attributes, &sphere_emitter_);
+        if (!emission) continue;
+        Emitter e = new_area_emitter(EmitterKind::kSphere, *emission, s.attributes.source);
         e.position = s.centre;
         e.radius = s.radius;
         e.reach = largest_coordinate(s.centre) + s.radius;
         e.inward = s.attributes.flip_normal;
         e.inv_area = 1 / (4 * kPi * s.radius * s.radius);
-        e.light = new_light(s.attributes.source);
         emitters->push_back(e);
     }
     for (const PointLight& l : description_.point_lights) {
-        Emitter e;
-        e.kind = EmitterKind::kPoint;
+        Emitter e = new_emitter(EmitterKind::kPoint, l.source, "point light");
         e.position = l.position;
         e.radiance = l.intensity;
-        e.light = new_light(l.source, "point light");
         emitters->push_back(e);
     }
     for (const SpotLight& l : description_.spot_lights) {
-        Emitter e;
-        e.kind = EmitterKind::kSpot;
+        Emitter e = new_emitter(EmitterKind::kSpot, l.source, "spot light");
         e.position = l.position;
         e.normal = l.axes.n;
         e.radiance = l.intensity;
         e.total_height = l.total_height;
         e.falloff_height = l.falloff_height;
-        e.light = new_light(l.source, "spot light");
         emitters->push_back(e);
     }
     for (const DistantLight& l : description_.distant_lights) {
-        Emitter e;
-        e.kind = EmitterKind::kDistant;
+        Emitter e = new_emitter(EmitterKind::kDistant, l.source, "distant light");
         e.normal = l.direction;
         e.radiance = l.irradiance;
-        e.light = new_light(l.source, "distant light");
         emitters->push_back(e);
     }
     if (!description_.infinite_lights.empty()) {
-        Emitter e;
-        e.kind = EmitterKind::kEnvironment;
         std::string source = description_.infinite_lights[0].source;
         // They are one emitter, which is sampled by what all of them add up to.
         const size_t others = description_.infinite_lights.size() - 1;
         if (others > 0 && !source.empty()) source += " (and " + std::to_string(others) + " more)";
-        e.light = new_light(source, "infinite light");
-        emitters->push_back(e);
+        emitters->push_back(new_emitter(EmitterKind::kEnvironment, source, "infinite light"));
     }
 }
 
@@ -131,8 +128,8 @@ Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions
     FrameLayout frame;
     frame.width = options.width > 0 ? options.width : film.width;
     frame.height = options.height > 0 ? options.height : film.height;
-    if (frame.width <= 0 || frame.height <= 0 || frame.width > 65536 || frame.height > 65536)
-        return invalid_argument("the image resolution must lie between 1 and 65536 pixels");
+    if (frame.width <= 0 || frame.height <= 0 || frame.width > kMaxFrameSide || frame.height > kMaxFrameSide)
+        return invalid_argument("the image resolution must lie between 1 and " + std::to_string(kMaxFrameSide) + " pixels");
     frame.crop = {0, 0, frame.width, frame.height};
     if (film.crop[0] >= 0) {
         // The crop scales with an overridden resolution, rounded outwards.

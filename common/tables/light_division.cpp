@@ -28,8 +28,11 @@ Vec2 emitter_coordinates(const Emitter& e, const Vec3& position, const Vec3& w) 
             return {0.5f + 0.5f * n.z, 0.5f + float(math::atan2(n.y, n.x)) / kTwoPi};
         }
         case EmitterKind::kEnvironment: return equal_area_sphere_to_square(-w);
-        default: return {};
+        case EmitterKind::kPoint:
+        case EmitterKind::kSpot:
+        case EmitterKind::kDistant: return {};
     }
+    return {};
 }
 
 uint32_t grid_line(float u, uint32_t side) {

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/work/asset.h"
 #include "common/work/cache_trim.h"
 

@@ -6,7 +6,7 @@
 
 namespace lightloom {
 
-/// Version and digest of all sources under common/, for example "0.1.0+1a2b3c4d5e6f7081".
+/// Version and digest of the sources that compute light, for example "0.1.0+1a2b3c4d5e6f7081".
 extern const char* const kBuildId;
 /// Compiler and ray tracer with their versions, for example "GNU-12.2.0 embree-3.13.5".
 extern const char* const kTools;

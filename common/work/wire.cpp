@@ -7,6 +7,43 @@
 namespace lightloom::wire {
 namespace {
 
+// Enumerations cross the wire by casts. A value more on one side, or another order, must not compile.
+template <typename Ours, typename Theirs>
+constexpr bool one_below(Ours ours, Theirs theirs) {
+    return int(ours) + 1 == int(theirs);
+}
+static_assert(one_below(UnitKind::kRender, v1::UNIT_KIND_RENDER) && one_below(UnitKind::kTraining, v1::UNIT_KIND_TRAINING) &&
+              one_below(UnitKind::kProbe, v1::UNIT_KIND_PROBE) && one_below(UnitKind::kPilot, v1::UNIT_KIND_PILOT) &&
+              one_below(UnitKind::kPilot, v1::UnitKind_MAX));
+static_assert(one_below(JobState::kPreparing, v1::JOB_STATE_PREPARING) && one_below(JobState::kRunning, v1::JOB_STATE_RUNNING) &&
+              one_below(JobState::kFinishing, v1::JOB_STATE_FINISHING) &&
+              one_below(JobState::kSucceeded, v1::JOB_STATE_SUCCEEDED) && one_below(JobState::kFailed, v1::JOB_STATE_FAILED) &&
+              one_below(JobState::kCancelled, v1::JOB_STATE_CANCELLED) && one_below(JobState::kCancelled, v1::JobState_MAX));
+static_assert(one_below(PreparePhase::kReadingScene, v1::PREPARE_PHASE_READING_SCENE) &&
+              one_below(PreparePhase::kProbing, v1::PREPARE_PHASE_PROBING) &&
+              one_below(PreparePhase::kTracing, v1::PREPARE_PHASE_TRACING) &&
+              one_below(PreparePhase::kLearning, v1::PREPARE_PHASE_LEARNING) &&
+              one_below(PreparePhase::kWaitingForTables, v1::PREPARE_PHASE_WAITING_FOR_TABLES) &&
+              one_below(PreparePhase::kWaitingForTables, v1::PreparePhase_MAX));
+static_assert(one_below(SubmitOutcome::kAccepted, v1::SUBMIT_OUTCOME_ACCEPTED) &&
+              one_below(SubmitOutcome::kDuplicateSame, v1::SUBMIT_OUTCOME_DUPLICATE_SAME) &&
+              one_below(SubmitOutcome::kDuplicateDifferent, v1::SUBMIT_OUTCOME_DUPLICATE_DIFFERENT) &&
+              one_below(SubmitOutcome::kStale, v1::SUBMIT_OUTCOME_STALE) &&
+              one_below(SubmitOutcome::kRejected, v1::SUBMIT_OUTCOME_REJECTED) &&
+              one_below(SubmitOutcome::kRejected, v1::SubmitOutcome_MAX));
+
+constexpr bool equal(StatusCode ours, grpc::StatusCode theirs) { return int(ours) == int(theirs); }
+static_assert(equal(StatusCode::kOk, grpc::OK) && equal(StatusCode::kCancelled, grpc::CANCELLED) &&
+              equal(StatusCode::kUnknown, grpc::UNKNOWN) && equal(StatusCode::kInvalidArgument, grpc::INVALID_ARGUMENT) &&
+              equal(StatusCode::kDeadlineExceeded, grpc::DEADLINE_EXCEEDED) && equal(StatusCode::kNotFound, grpc::NOT_FOUND) &&
+              equal(StatusCode::kAlreadyExists, grpc::ALREADY_EXISTS) &&
+              equal(StatusCode::kPermissionDenied, grpc::PERMISSION_DENIED) &&
+              equal(StatusCode::kResourceExhausted, grpc::RESOURCE_EXHAUSTED) &&
+              equal(StatusCode::kFailedPrecondition, grpc::FAILED_PRECONDITION) && equal(StatusCode::kAborted, grpc::ABORTED) &&
+              equal(StatusCode::kOutOfRange, grpc::OUT_OF_RANGE) && equal(StatusCode::kUnimplemented, grpc::UNIMPLEMENTED) &&
+              equal(StatusCode::kInternal, grpc::INTERNAL) && equal(StatusCode::kUnavailable, grpc::UNAVAILABLE) &&
+              equal(StatusCode::kDataLoss, grpc::DATA_LOSS));
+
 void put_rect(const Rect& in, v1::Rect* out) {
     out->set_x0(in.x0);
     out->set_y0(in.y0);

@@ -9,8 +9,8 @@
 #include "common/core/rng.h"
 #include "common/film/accumulation.h"
 #include "common/film/exr_io.h"
-#include "common/film/metrics.h"
 #include "common/film/partial_exr.h"
+#include "common/metrics/metrics.h"
 
 namespace {
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "tests/service/fake.h"
 #include "tests/service/process.h"
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/scene/scene.h"
 #include "server/reducer.h"
 #include "server/scene_reader.h"

@@ -12,7 +12,7 @@
 #include "client/commands.h"
 #include "client/run_job.h"
 #include "common/cli/numbers.h"
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "server/data_lock.h"
 #include "server/results.h"
 #include "server/status_http.h"

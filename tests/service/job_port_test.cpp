@@ -7,7 +7,7 @@
 #include <atomic>
 
 #include "client/grpc_job_port.h"
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/work/channel.h"
 #include "server/grpc_services.h"
 #include "tests/service/fake.h"

@@ -9,7 +9,7 @@
 #include <set>
 
 #include "client/grpc_job_port.h"
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "tests/service/fake.h"
 #include "tests/service/process.h"
 

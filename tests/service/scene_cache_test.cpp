@@ -7,7 +7,7 @@
 
 #include <future>
 
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "server/local_ports.h"
 #include "tests/service/fake.h"
 #include "worker/scene_cache.h"

@@ -7,7 +7,7 @@
 
 #include <fstream>
 
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/transport/training.h"
 #include "common/work/golden.h"
 #include "server/grpc_services.h"

@@ -23,8 +23,8 @@
 #include <map>
 
 #include "common/film/exr_io.h"
-#include "common/film/metrics.h"
 #include "common/film/png.h"
+#include "common/metrics/metrics.h"
 
 using namespace lightloom;
 using namespace lightloom::equivalence;

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "common/core/distributions.h"
 #include "common/core/result.h"
-#include "common/film/region_means.h"
+#include "common/metrics/region_means.h"
+#include "common/metrics/significance.h"
 #include "common/scene/scene.h"
 #include "common/transport/renderer.h"
 

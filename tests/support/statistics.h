@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "common/core/distributions.h"
+#include "common/metrics/significance.h"
 
 namespace lightloom::testing {
 

@@ -11,7 +11,7 @@
 
 #include "client/bench_log.h"
 #include "client/bench_reference.h"
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 
 namespace {
 int flock_error = 0;  ///< What the file system answers to locks, if not 0.

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/commands.h"
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 #include "common/film/exr_io.h"
 
 namespace lightloom::client {

@@ -1,1 +1,2 @@
 lightloom_test(core_test LINK lt_core)
+lightloom_test(check_test LINK lt_core)

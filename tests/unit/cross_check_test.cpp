@@ -6,8 +6,8 @@
 
 #include <cmath>
 
-#include "common/core/distributions.h"
 #include "common/core/rng.h"
+#include "common/metrics/significance.h"
 #include "common/work/golden.h"
 
 namespace lightloom::client {

@@ -3,7 +3,6 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
-#include <ImfIO.h>
 #include <ImfInputPart.h>
 #include <ImfMultiPartInputFile.h>
 #include <gtest/gtest.h>
@@ -18,6 +17,7 @@
 #include "common/core/rng.h"
 #include "common/film/accumulation.h"
 #include "common/film/exr_io.h"
+#include "common/film/exr_memory.h"
 #include "common/film/partial_exr.h"
 
 namespace lightloom {
@@ -244,30 +244,13 @@ TEST(PartialExr, RoundTripsBitForBit) {
     }
 }
 
-class StringInput : public Imf::IStream {
-  public:
-    explicit StringInput(const std::string& bytes) : Imf::IStream("memory"), bytes_(bytes) {}
-    bool read(char data[], int size) override {
-        if (position_ + uint64_t(size) > bytes_.size()) throw std::runtime_error("end of file");
-        std::memcpy(data, bytes_.data() + position_, size_t(size));
-        position_ += uint64_t(size);
-        return position_ < bytes_.size();
-    }
-    uint64_t tellg() override { return position_; }
-    void seekg(uint64_t position) override { position_ = position; }
-
-  private:
-    const std::string& bytes_;
-    uint64_t position_ = 0;
-};
-
 TEST(PartialExr, IsAnExrThatOpenExrReads) {
     const uint32_t area = uint32_t(kFrame.crop.area());
     for (const uint32_t splats : {0u, 50u, area}) {
         const Rect tile{5, 6, 20, 25};
         const Partial p = random_partial(kFrame, tile, 9, splats);
         const EncodedPartial encoded = *encode_partial(p, kFrame);
-        StringInput stream(encoded.payload);
+        ExrMemoryInput stream("memory", encoded.payload);
         Imf::MultiPartInputFile file(stream);
         ASSERT_EQ(file.parts(), splats ? 2 : 1);
         for (int part_index = 0; part_index < file.parts(); ++part_index) {

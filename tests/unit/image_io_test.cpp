@@ -14,8 +14,8 @@
 #include <filesystem>
 #include <limits>
 
+#include "common/core/atomic_file.h"
 #include "common/core/rng.h"
-#include "common/film/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "common/film/png.h"
 

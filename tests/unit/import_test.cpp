@@ -272,7 +272,7 @@ TEST(ImportOptions, IntegratorAndFileNameAreKeptForShow) {
 }
 
 TEST(ImportOptions, LimitsAreThoseOfTheRenderer) {
-    static_assert(import::kMaxDepth == kMaxEdges - 1 && import::kMaxFilmPixels == kMaxPartialPixels);
+    static_assert(import::kMaxDepth == kMaxEdges - 1);
     const auto accepted = [](const std::string& text) {
         const auto scene = import_text("PixelFilter \"box\" " + text + " WorldBegin");
         EXPECT_TRUE(scene.ok()) << scene.status().message();

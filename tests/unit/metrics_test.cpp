@@ -1,6 +1,6 @@
 // The metrics against values computed by hand, and the properties that they must have.
 
-#include "common/film/metrics.h"
+#include "common/metrics/metrics.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "common/core/rng.h"
-#include "common/film/flip.h"
+#include "common/metrics/flip.h"
 
 namespace lightloom {
 namespace {

@@ -2,9 +2,9 @@
 
 #include "common/core/math.h"
 #include "common/core/vec.h"
-#include "common/film/filter.h"
-#include "common/film/metrics.h"
 #include "common/film/png.h"
+#include "common/metrics/convolution.h"
+#include "common/metrics/metrics.h"
 
 namespace lightloom {
 

@@ -1,10 +1,10 @@
-#include "common/film/region_means.h"
+#include "common/metrics/region_means.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "common/core/distributions.h"
 #include "common/core/vec.h"
+#include "common/metrics/significance.h"
 
 namespace lightloom {
 

@@ -1,4 +1,4 @@
-#include "common/film/atomic_file.h"
+#include "common/core/atomic_file.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>

@@ -1,4 +1,4 @@
-#include "common/film/filter.h"
+#include "common/metrics/convolution.h"
 
 #include <algorithm>
 

@@ -1,11 +1,11 @@
-#include "common/film/metrics.h"
+#include "common/metrics/metrics.h"
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
 
 #include "common/core/vec.h"
-#include "common/film/flip.h"
+#include "common/metrics/flip.h"
 
 namespace lightloom {
 

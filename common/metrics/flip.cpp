@@ -1,4 +1,4 @@
-#include "common/film/flip.h"
+#include "common/metrics/flip.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 
 #include "common/core/math.h"
 #include "common/core/vec.h"
-#include "common/film/filter.h"
+#include "common/metrics/convolution.h"
 
 namespace lightloom {
 
