@@ -2,14 +2,12 @@
 
 #include <fstream>
 
-#include "common/work/wire.h"
+#include "server/grpc_answers.h"
 
 namespace lightloom {
 namespace {
 
 constexpr int kMaxDigestsPerCall = 10000;
-
-grpc::Status invalid(const char* what) { return {grpc::StatusCode::INVALID_ARGUMENT, what}; }
 
 }  // namespace
 
@@ -37,15 +35,12 @@ grpc::Status AssetServiceImpl::Write(grpc::ServerContext* context, grpc::ServerR
     }
     auto upload = store_.begin_upload(*digest, size);
     if (!upload.ok()) return wire::to_grpc(upload.status());
-    while (reader->Read(&message)) {
-        if (closing_) return {grpc::StatusCode::UNAVAILABLE, "the coordinator is going down"};
-        if (!message.has_chunk()) return invalid("only the first message is a header");
-        const v1::Chunk& chunk = message.chunk();
-        if (chunk.data().size() > kMaxChunkBytes) return invalid("a chunk holds at most 1 MiB");
+    const grpc::Status taken = read_chunks(reader, closing_, [&](const v1::Chunk& chunk) -> grpc::Status {
         if (chunk.offset_bytes() != upload->offset())
             return {grpc::StatusCode::OUT_OF_RANGE, "go on at offset " + std::to_string(upload->offset())};
-        if (const Status status = upload->append(chunk.data()); !status.ok()) return wire::to_grpc(status);
-    }
+        return wire::to_grpc(upload->append(chunk.data()));
+    });
+    if (!taken.ok()) return taken;
     if (context->IsCancelled()) return {grpc::StatusCode::CANCELLED, "the upload was broken off; resume it"};
     const Status status = upload->finish();
     response->set_committed_size_bytes(upload->offset());

@@ -42,6 +42,10 @@ struct CoordinatorOptions {
     size_t kept_jobs = 1000;                      ///< Ended jobs that are remembered; the oldest are forgotten, their files stay.
 };
 
+/// The answer to a result of which expected_partial() or expected_training_bytes() knows nothing: one that comes too late is
+/// stale, any other one is rejected.
+SubmitAck unexpected_result(const Status& why);
+
 class Coordinator {
   public:
     explicit Coordinator(CoordinatorOptions options);
@@ -124,6 +128,8 @@ class Coordinator {
     /// Enters a result into its table: nothing for the first one, which the caller merges; otherwise the answer.
     std::optional<SubmitAck> repeated_result(JobRecord& job, UnitTable& units, const UnitKey& key, const WorkerRecord& worker,
                                              const Digest& digest);
+    /// Counts a result that is none against its worker and its unit, which somebody renders again; the answer.
+    SubmitAck reject_result(JobRecord& job, UnitTable& units, const UnitKey& key, WorkerRecord& worker, const Status& why);
     void unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Failures failures, const Status& why);
     void leases_expired(JobRecord& job, UnitTable& units, const std::vector<UnitTable::Expired>& expired);
     void tick(std::stop_token stop);

@@ -201,10 +201,7 @@ Result<uint64_t> Coordinator::expected_training_bytes(const UnitReference& refer
 Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, const UnitReference& reference, const Digest& digest,
                                                std::string_view payload, double trace_seconds) {
     const auto limit = expected_training_bytes(reference);
-    if (!limit.ok()) {
-        const bool stale = limit.status().code() == StatusCode::kNotFound;
-        return SubmitAck{stale ? SubmitOutcome::kStale : SubmitOutcome::kRejected, limit.status().message()};
-    }
+    if (!limit.ok()) return unexpected_result(limit.status());
     Result<TrainingData> data = data_loss("the training data differ from their digest");
     if (payload.size() > *limit) {
         data = invalid_argument("more training data than the unit can have");
@@ -229,12 +226,7 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
         problem = data_loss("the training data are those of another unit");
     // What needs the scene's lights to be checked waits for the task that has built it.
     if (problem.ok()) problem = data->validate(SIZE_MAX);
-    if (!problem.ok()) {
-        ++job->rejected;
-        workers_.unit_failed(*worker, options_.clock());
-        unit_failed(*job, reference.key, units->fail(reference.key, worker->index), problem);
-        return SubmitAck{SubmitOutcome::kRejected, problem.message()};
-    }
+    if (!problem.ok()) return reject_result(*job, *units, reference.key, *worker, problem);
     if (auto answer = repeated_result(*job, *units, reference.key, *worker, digest)) return *std::move(answer);
     workers_.unit_succeeded(*worker);
     TrainingRound& round = *job->round;

@@ -13,7 +13,13 @@ std::string describe(const BuildIdentity& identity) {
            identity.golden_digest.hex().substr(0, 16);
 }
 
+Status not_running(const std::string& job_id) { return not_found("job " + job_id + " is not running (any more)"); }
+
 }  // namespace
+
+SubmitAck unexpected_result(const Status& why) {
+    return {why.code() == StatusCode::kNotFound ? SubmitOutcome::kStale : SubmitOutcome::kRejected, why.message()};
+}
 
 Result<WorkerGrant> Coordinator::register_worker(const WorkerHello& hello) {
     if (hello.thread_count == 0) return invalid_argument("a worker needs at least one thread");
@@ -154,7 +160,7 @@ Status Coordinator::goodbye(const std::string& worker_id) {
 Result<PartialExpectation> Coordinator::expected_partial(const UnitReference& reference) const {
     const std::lock_guard lock(mutex_);
     const auto job = find_job(reference.job_id);
-    if (!job || job->state != JobState::kRunning) return not_found("job " + reference.job_id + " is not running (any more)");
+    if (!job || job->state != JobState::kRunning) return not_running(reference.job_id);
     const auto unit = reference.key.kind == UnitKind::kRender ? job->units->find(reference.key) : std::nullopt;
     if (!unit) return invalid_argument("job " + reference.job_id + " has leased no such unit");
     return PartialExpectation{job->spec.frame, unit->tile, unit->iteration_count, unit->light_path_count};
@@ -163,10 +169,7 @@ Result<PartialExpectation> Coordinator::expected_partial(const UnitReference& re
 Result<SubmitAck> Coordinator::submit_payload(const std::string& worker_id, const UnitReference& unit,
                                               const PartialDescriptor& descriptor, std::string_view payload) {
     const auto expected = expected_partial(unit);
-    if (!expected.ok()) {
-        const bool stale = expected.status().code() == StatusCode::kNotFound;
-        return SubmitAck{stale ? SubmitOutcome::kStale : SubmitOutcome::kRejected, expected.status().message()};
-    }
+    if (!expected.ok()) return unexpected_result(expected.status());
     auto partial = decode_partial(*expected, descriptor, payload);
     if (partial.ok()) return submit_partial(worker_id, unit, descriptor.payload_digest, *std::move(partial));
 
@@ -174,12 +177,17 @@ Result<SubmitAck> Coordinator::submit_payload(const std::string& worker_id, cons
     WorkerRecord* worker = workers_.find(worker_id);
     if (!worker) return no_worker(worker_id);
     worker->held.erase(unit);
-    if (const auto job = find_job(unit.job_id); job && job->state == JobState::kRunning) {
-        ++job->rejected;
-        workers_.unit_failed(*worker, options_.clock());
-        unit_failed(*job, unit.key, job->units->fail(unit.key, worker->index), partial.status());
-    }
+    const auto job = find_job(unit.job_id);
+    if (job && job->state == JobState::kRunning) return reject_result(*job, *job->units, unit.key, *worker, partial.status());
     return SubmitAck{SubmitOutcome::kRejected, partial.status().message()};
+}
+
+SubmitAck Coordinator::reject_result(JobRecord& job, UnitTable& units, const UnitKey& key, WorkerRecord& worker,
+                                     const Status& why) {
+    ++job.rejected;
+    workers_.unit_failed(worker, options_.clock());
+    unit_failed(job, key, units.fail(key, worker.index), why);
+    return {SubmitOutcome::kRejected, why.message()};
 }
 
 std::optional<SubmitAck> Coordinator::repeated_result(JobRecord& job, UnitTable& units, const UnitKey& key,
@@ -216,8 +224,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
         worker->last_heard = options_.clock();
         worker->held.erase(reference);
         job = find_job(reference.job_id);
-        if (!job || job->state != JobState::kRunning)
-            return SubmitAck{SubmitOutcome::kStale, "job " + reference.job_id + " is not running (any more)"};
+        if (!job || job->state != JobState::kRunning) return unexpected_result(not_running(reference.job_id));
         index = worker->index;
         const auto known = job->units->find(reference.key);
         if (auto answer = repeated_result(*job, *job->units, reference.key, *worker, digest)) return *std::move(answer);

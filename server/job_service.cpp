@@ -2,18 +2,12 @@
 
 #include <thread>
 
-#include "common/work/wire.h"
+#include "server/grpc_answers.h"
 
 namespace lightloom {
 namespace {
 
 constexpr auto kWatchInterval = std::chrono::milliseconds(100);
-
-grpc::Status answer(const Result<JobInfo>& info, v1::Job* response) {
-    if (!info.ok()) return wire::to_grpc(info.status());
-    wire::put(*info, response);
-    return grpc::Status::OK;
-}
 
 grpc::Status send(const Result<std::string>& bytes, grpc::ServerWriter<v1::Chunk>* writer) {
     if (!bytes.ok()) return wire::to_grpc(bytes.status());
@@ -64,7 +58,7 @@ grpc::Status JobServiceImpl::WatchJob(grpc::ServerContext* context, const v1::Wa
             return grpc::Status::OK;
         }
     }
-    return {grpc::StatusCode::UNAVAILABLE, "the coordinator is going down"};
+    return going_down();
 }
 
 grpc::Status JobServiceImpl::GetImage(grpc::ServerContext*, const v1::GetImageRequest* request,
@@ -72,7 +66,7 @@ grpc::Status JobServiceImpl::GetImage(grpc::ServerContext*, const v1::GetImageRe
     switch (request->kind()) {
         case v1::IMAGE_KIND_FINAL: return send(coordinator_.image(request->job_id(), ImageKind::kFinal), writer);
         case v1::IMAGE_KIND_PREVIEW: return send(coordinator_.image(request->job_id(), ImageKind::kPreview), writer);
-        default: return {grpc::StatusCode::INVALID_ARGUMENT, "an image is FINAL or PREVIEW"};
+        default: return invalid("an image is FINAL or PREVIEW");
     }
 }
 

@@ -1,22 +1,14 @@
 #include "server/worker_service.h"
 
 #include "common/core/utf8.h"
-#include "common/work/wire.h"
+#include "server/grpc_answers.h"
 
 namespace lightloom {
-namespace {
-
-grpc::Status invalid(const std::string& what) { return {grpc::StatusCode::INVALID_ARGUMENT, what}; }
-
-}  // namespace
 
 grpc::Status WorkerServiceImpl::Register(grpc::ServerContext*, const v1::WorkerHello* request, v1::WorkerGrant* response) {
     const auto hello = wire::get(*request);
     if (!hello.ok()) return wire::to_grpc(hello.status());
-    const auto grant = coordinator_.register_worker(*hello);
-    if (!grant.ok()) return wire::to_grpc(grant.status());
-    wire::put(*grant, response);
-    return grpc::Status::OK;
+    return answer(coordinator_.register_worker(*hello), response);
 }
 
 grpc::Status WorkerServiceImpl::LeaseUnits(grpc::ServerContext* context, const v1::LeaseUnitsRequest* request,
@@ -42,21 +34,20 @@ grpc::Status WorkerServiceImpl::Heartbeat(grpc::ServerContext*, const v1::Heartb
     return grpc::Status::OK;
 }
 
-template <class Request>
-grpc::Status WorkerServiceImpl::read_payload(grpc::ServerReader<Request>* reader, uint64_t size, std::string* payload) const {
-    payload->reserve(size);
-    Request message;
-    while (reader->Read(&message)) {
-        if (closing_) return {grpc::StatusCode::UNAVAILABLE, "the coordinator is going down"};
-        if (!message.has_chunk()) return invalid("only the first message is a header");
-        const v1::Chunk& chunk = message.chunk();
-        if (chunk.data().size() > kMaxChunkBytes) return invalid("a chunk holds at most 1 MiB");
-        if (chunk.offset_bytes() != payload->size() || chunk.data().size() > size - payload->size())
+template <class Request, class Submit>
+grpc::Status WorkerServiceImpl::take_payload(grpc::ServerReader<Request>* reader, uint64_t size, v1::SubmitResultResponse* response,
+                                             const Submit& submit) const {
+    std::string payload;
+    payload.reserve(size);
+    const grpc::Status taken = read_chunks(reader, closing_, [&](const v1::Chunk& chunk) {
+        if (chunk.offset_bytes() != payload.size() || chunk.data().size() > size - payload.size())
             return invalid("chunks are not in order or exceed the announced size");
-        *payload += chunk.data();
-    }
-    if (payload->size() != size) return invalid("the result ended before its announced size");
-    return grpc::Status::OK;
+        payload += chunk.data();
+        return grpc::Status::OK;
+    });
+    if (!taken.ok()) return taken;
+    if (payload.size() != size) return invalid("the result ended before its announced size");
+    return answer(submit(payload), response);
 }
 
 grpc::Status WorkerServiceImpl::SubmitResult(grpc::ServerContext*, grpc::ServerReader<v1::SubmitResultRequest>* reader,
@@ -71,23 +62,16 @@ grpc::Status WorkerServiceImpl::SubmitResult(grpc::ServerContext*, grpc::ServerR
     const UnitReference& unit = *reference;
     // Nothing is taken in before the unit is known and the size is the one that follows from it.
     const auto expected = coordinator_.expected_partial(unit);
-    if (!expected.ok()) {
-        const bool stale = expected.status().code() == StatusCode::kNotFound;
-        wire::put(SubmitAck{stale ? SubmitOutcome::kStale : SubmitOutcome::kRejected, expected.status().message()}, response);
-        return grpc::Status::OK;
-    }
+    if (!expected.ok()) return answer(Result<SubmitAck>(unexpected_result(expected.status())), response);
     if (descriptor->splat_count > uint64_t(expected->frame.crop.area()))
         return invalid("more splat sums than the frame has pixels");
     const uint64_t size = partial_payload_size(expected->frame, expected->tile, descriptor->splat_count);
     if (descriptor->payload_size != size)
         return invalid("the payload of this unit has " + std::to_string(size) + " bytes, announced were " +
                        std::to_string(descriptor->payload_size));
-    std::string payload;
-    if (const grpc::Status status = read_payload(reader, size, &payload); !status.ok()) return status;
-    const auto ack = coordinator_.submit_payload(header.worker_id(), unit, *descriptor, payload);
-    if (!ack.ok()) return wire::to_grpc(ack.status());
-    wire::put(*ack, response);
-    return grpc::Status::OK;
+    return take_payload(reader, size, response, [&](std::string_view payload) {
+        return coordinator_.submit_payload(header.worker_id(), unit, *descriptor, payload);
+    });
 }
 
 grpc::Status WorkerServiceImpl::SubmitTraining(grpc::ServerContext*, grpc::ServerReader<v1::SubmitTrainingRequest>* reader,
@@ -100,20 +84,13 @@ grpc::Status WorkerServiceImpl::SubmitTraining(grpc::ServerContext*, grpc::Serve
     const auto digest = wire::get(header.payload_digest());
     if (!digest.ok()) return wire::to_grpc(digest.status());
     const auto limit = coordinator_.expected_training_bytes(*unit);
-    if (!limit.ok()) {
-        const bool stale = limit.status().code() == StatusCode::kNotFound;
-        wire::put(SubmitAck{stale ? SubmitOutcome::kStale : SubmitOutcome::kRejected, limit.status().message()}, response);
-        return grpc::Status::OK;
-    }
+    if (!limit.ok()) return answer(Result<SubmitAck>(unexpected_result(limit.status())), response);
     if (header.payload_size_bytes() > *limit)
         return invalid("the training data of this unit have at most " + std::to_string(*limit) + " bytes, announced were " +
                        std::to_string(header.payload_size_bytes()));
-    std::string payload;
-    if (const grpc::Status status = read_payload(reader, header.payload_size_bytes(), &payload); !status.ok()) return status;
-    const auto ack = coordinator_.submit_training(header.worker_id(), *unit, *digest, payload, header.trace_seconds());
-    if (!ack.ok()) return wire::to_grpc(ack.status());
-    wire::put(*ack, response);
-    return grpc::Status::OK;
+    return take_payload(reader, header.payload_size_bytes(), response, [&](std::string_view payload) {
+        return coordinator_.submit_training(header.worker_id(), *unit, *digest, payload, header.trace_seconds());
+    });
 }
 
 grpc::Status WorkerServiceImpl::ReleaseUnit(grpc::ServerContext*, const v1::ReleaseUnitRequest* request, v1::ReleaseUnitResponse*) {
