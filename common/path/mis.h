@@ -1,21 +1,29 @@
 #pragma once
 // The one evaluator of the multiple importance sampling weight [Veach 1997, 9.2 and 10.2].
 //
-// Effective density of connecting with s light vertices:  rho_s = sigma(s) C(s) A(s),
+// Effective density of a technique with s light vertices:  rho = sigma C(s) A(s),
 //     C(s) = prod_{i<s} pL[i],  A(s) = prod_{s<=i<k} pE[i],
-// and of merging at x_i (the vertex is sampled from both sides):  rho = sigma_merge(i) C(i+1) A(i).
-// sigma = n * (selection probability relative to plain tracing) is all that differs between algorithms:
+// and of merging at x_i (the vertex is sampled from both sides):  rho = sigma C(i+1) A(i).
+// sigma = n * (selection probability relative to plain tracing) is all that differs between algorithms. A selection says what it is
+// for every technique by name, on one path:
 //
 //   struct Selection {
-//       int s_min(int k) const, s_max(int k) const;          // techniques outside do not exist (inclusive, within 0..k)
-//       double connect_factor(const PathView&, int s) const; // sigma(s); 0 where the technique cannot produce the path
-//       double merge_factor(const PathView&, int i) const;   // only when kMerges is true
-//       static constexpr bool kMerges;
+//       struct OnPath {                          // what a weight asks; PlainTechniques has the usual answers
+//           static constexpr bool kMerges;
+//           int s_min() const, s_max() const;    // splits outside are never asked about and need not be in the view
+//           double survivors(int s) const;       // typical share of the sub-paths that roulette leaves (survival.h); 1: not known
+//           double hit() const;                  // sigma / survivors(0)
+//           double next_event() const;           // sigma / survivors(1), relative to C(1): pdf_next_event / pL[0] for one sample
+//           double connect(int s) const;         // sigma / survivors(s), 1 <= s <= k - 1
+//           double lens() const;                 // sigma / survivors(k)
+//           double merge(int i) const;           // sigma, 1 <= i <= k - 1; only where kMerges
+//       };
+//       OnPath on(const PathView&) const;        // called once per weight: what costs O(k) belongs here
 //   };
 //
-// Rules: the weights of all techniques sum to one over every path that some technique can produce; a weight depends only
-// on the path and on tables frozen before the unit began. Dirac vertices are handled here: a connection next to one is
-// impossible.
+// Zero says that there is no such technique. Rules: the weights of all techniques sum to one over every path that some technique
+// can produce; a weight depends only on the path and on tables frozen before the unit began. What is handled here, for all of them:
+// connecting next to a Dirac vertex and merging at one is impossible, and a directly visible emitter (k = 1) is a hit alone.
 //
 // Range: densities of 1e12 per vertex and 64 vertices overflow even double, so the sweep walks outward from the technique
 // that made the path with ratios, and keeps the exponent apart.
@@ -24,6 +32,7 @@
 #include <cstdint>
 
 #include "common/path/path_view.h"
+#include "common/path/technique.h"
 
 namespace lightloom {
 
@@ -70,6 +79,44 @@ struct RatioSum {
 
 }  // namespace detail
 
+/// What most selections answer: every split exists, roulette is not reckoned with, hits and one next event, nothing else.
+struct PlainTechniques {
+    static constexpr bool kMerges = false;
+    const PathView& view;
+
+    int s_min() const { return 0; }
+    int s_max() const { return view.k; }
+    double survivors(int) const { return 1; }
+    double hit() const { return 1; }
+    double next_event() const { return view.next_event / view.fwd[0]; }
+    double connect(int) const { return 0; }
+    double lens() const { return 0; }
+    double merge(int) const { return 0; }
+};
+
+/// sigma of a technique that can make the path.
+template <class OnPath>
+double sigma(const OnPath& on, Technique t) {
+    switch (t.kind) {
+        case TechniqueKind::kHit: return on.survivors(0) * on.hit();
+        case TechniqueKind::kNextEvent: return on.survivors(1) * on.next_event();
+        case TechniqueKind::kConnect: return on.survivors(t.s) * on.connect(t.s);
+        case TechniqueKind::kLens: return on.survivors(t.s) * on.lens();
+        case TechniqueKind::kMerge: return on.merge(t.s);
+    }
+    return 0;
+}
+
+/// Calls visit(technique) for the techniques without merging that split the path after s light vertices, 0 <= s <= k, in the order
+/// in which ties are broken.
+template <class Visit>
+void for_each_technique_of_split(int s, int k, Visit&& visit) {
+    if (s == 0) return visit(Technique::hit());
+    if (s == k) return visit(Technique::lens(k));
+    if (s == 1) visit(Technique::next_event());
+    visit(Technique::connect(s));
+}
+
 /// Whether no Dirac vertex stands next to the connection between x_{s-1} and x_s.
 inline bool can_connect(const PathView& view, int s) {
     return !(s > 0 && view.delta[s - 1]) && !(s > 0 && s < view.k && view.delta[s]);
@@ -93,28 +140,36 @@ void for_each_split(const PathView& view, int base, int s_min, int s_max, Visit&
     }
 }
 
-/// w of technique `own` for the path in `view`, in [0, 1]; zero when the selection has switched it off. `own` must be able to
+/// w of technique `own` for the path in `on`'s view, in [0, 1]; zero when the selection has switched it off. `own` must be able to
 /// produce the path.
-template <class Selection>
-double mis_weight(const PathView& view, Technique own, const Selection& selection, Heuristic heuristic = Heuristic::kBalance) {
-    const int k = view.k, s_min = selection.s_min(k), s_max = selection.s_max(k);
-    const auto connect = [&](int s) -> double {
-        return s < s_min || s > s_max || !can_connect(view, s) ? 0 : selection.connect_factor(view, s);
-    };
-    // sigma of the own technique, relative to C(base) A(base) of the connection with the same split.
-    const int base = own.s;
-    double own_factor = 0;
-    if (own.kind == TechniqueKind::kConnect) own_factor = selection.connect_factor(view, base);
-    if constexpr (Selection::kMerges) {
-        if (own.kind == TechniqueKind::kMerge) own_factor = selection.merge_factor(view, base) * view.fwd[base];
+template <class OnPath>
+double mis_weight(const PathView& view, Technique own, const OnPath& on, Heuristic heuristic = Heuristic::kBalance) {
+    const int k = view.k, base = own.s;
+    if (k == 1) return own.kind == TechniqueKind::kHit && on.hit() > 0 ? 1 : 0;
+    const int s_min = on.s_min(), s_max = on.s_max();
+    // sigma of the own technique, relative to C(base) A(base) of the split.
+    double own_sigma = sigma(on, own);
+    if constexpr (OnPath::kMerges) {
+        if (own.kind == TechniqueKind::kMerge) own_sigma *= view.fwd[base];
     }
-    if (!(own_factor > 0)) return 0;
-    const double inv_own = 1 / own_factor;
+    if (!(own_sigma > 0)) return 0;
+    const double inv_own = 1 / own_sigma;
     detail::RatioSum ratios{heuristic};
+    // Order for ties: hit, next event, connect 1, merge 1, connect 2, merge 2, ..., lens.
+    const auto split = [&](int s, const WideProduct& chain, bool earlier) {
+        if (s < s_min || s > s_max || !can_connect(view, s)) return;
+        for_each_technique_of_split(s, k, [&](Technique t) {
+            if (t == own) {
+                earlier = false;  // what follows at the own split comes later
+                return;
+            }
+            if (const double f = sigma(on, t); f > 0) ratios.add(chain.value(f * inv_own), earlier);
+        });
+    };
     const auto merge = [&](int i, const WideProduct& chain, bool earlier) {
-        if constexpr (Selection::kMerges) {
-            if (i < 1 || i > k - 1 || view.delta[i] || (own.kind == TechniqueKind::kMerge && i == base)) return;
-            const double factor = selection.merge_factor(view, i);
+        if constexpr (OnPath::kMerges) {
+            if (i < 1 || i > k - 1 || view.delta[i] || own == Technique::merge(i)) return;
+            const double factor = on.merge(i);
             if (factor > 0) {
                 WideProduct merged = chain;
                 merged.multiply(view.fwd[i]);
@@ -122,16 +177,12 @@ double mis_weight(const PathView& view, Technique own, const Selection& selectio
             }
         }
     };
-
-    // Order for ties: connect 0, connect 1, merge 1, connect 2, merge 2, ...
-    if (own.kind == TechniqueKind::kMerge)
-        if (const double f = connect(base); f > 0) ratios.add(f * inv_own, true);
+    split(base, WideProduct{}, true);
     merge(base, WideProduct{}, false);
-    for_each_split(view, base, Selection::kMerges ? 0 : s_min, Selection::kMerges ? k : s_max,
-                   [&](int s, const WideProduct& chain) {
-                       if (const double f = connect(s); f > 0) ratios.add(chain.value(f * inv_own), s < base);
-                       merge(s, chain, s < base);
-                   });
+    for_each_split(view, base, OnPath::kMerges ? 0 : s_min, OnPath::kMerges ? k : s_max, [&](int s, const WideProduct& chain) {
+        split(s, chain, s < base);
+        merge(s, chain, s < base);
+    });
     return ratios.weight();
 }
 

@@ -35,13 +35,4 @@ struct PathView {
     double next_event = 0;
 };
 
-/// How a path was made. kConnect covers s = 0 (emitter hit), s = 1 (next event), 2 <= s <= k-1 and s = k (t = 1).
-enum class TechniqueKind : uint8_t { kConnect, kMerge };
-
-struct Technique {
-    TechniqueKind kind = TechniqueKind::kConnect;
-    /// kConnect: the number of light vertices s. kMerge: the index i of the vertex at which both sub-paths met.
-    int s = 0;
-};
-
 }  // namespace lightloom

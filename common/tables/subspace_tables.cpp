@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <functional>
-#include <map>
+#include <type_traits>
+
+#include "common/tables/sections.h"
 
 namespace lightloom {
 namespace {
 
-constexpr std::string_view kMagic = "lightloom-tables 1\n";
-static_assert(kMagic.starts_with(kTablesPrefix));
+constexpr std::string_view kMagic = "lightloom-subspaces 1\n";
 
 Status positive(const std::vector<float>& values, size_t count, const char* name) {
     if (values.size() != count) return data_loss(std::string(name) + " has the wrong size");
@@ -40,11 +40,19 @@ struct Shape {
     double vertices_per_path;
 };
 
-void put_section(std::string& out, const std::string& name, const std::string& bytes) {
-    out += name + ' ' + std::to_string(bytes.size()) + ' ' + sha256(bytes).hex() + '\n' + bytes + '\n';
-}
-
 }  // namespace
+
+const TablePart SubspaceTables::kPart{
+    .name = "subspaces",
+    .serialize = [](const void* part) { return serialize(*static_cast<const SubspaceTables*>(part)); },
+    .parse = [](std::string_view bytes) -> Result<std::shared_ptr<const void>> {
+        auto tables = parse_subspace_tables(bytes);
+        if (!tables.ok()) return tables.status();
+        return std::shared_ptr<const void>(std::make_shared<const SubspaceTables>(*std::move(tables)));
+    },
+    .validate = [](const void* part,
+                   const EmitterSet& emitters) { return static_cast<const SubspaceTables*>(part)->validate(emitters); },
+};
 
 Status SubspaceTables::validate(const EmitterSet& emitters) const {
     if (light_count < 1 || eye_count < 1 || light_count > kMaxSubspaces || eye_count > kMaxSubspaces)
@@ -88,34 +96,16 @@ std::string serialize(const SubspaceTables& t) {
     return out;
 }
 
-Result<SubspaceTables> parse_tables(std::string_view bytes) {
-    if (bytes.substr(0, kMagic.size()) != kMagic) return data_loss("not a table file of a known version");
-    std::map<std::string, std::string_view, std::less<>> sections;
-    size_t at = kMagic.size();
-    while (at < bytes.size()) {
-        const size_t line_end = bytes.find('\n', at);
-        if (line_end == std::string_view::npos) return data_loss("the tables are cut short");
-        const std::string line(bytes.substr(at, line_end - at));
-        char name[32], hex[65];
-        unsigned long long size = 0;
-        if (std::sscanf(line.c_str(), "%31s %llu %64s", name, &size, hex) != 3) return data_loss("malformed table header");
-        at = line_end + 1;
-        if (size >= bytes.size() || at + size + 1 > bytes.size()) return data_loss("the tables are cut short");
-        const std::string_view content = bytes.substr(at, size_t(size));
-        // Nothing but what serialize() writes: no byte of the file may be wrong unnoticed.
-        if (line != std::string(name) + ' ' + std::to_string(size) + ' ' + hex || bytes[at + size_t(size)] != '\n')
-            return data_loss("malformed table header");
-        if (sha256(content).hex() != hex) return data_loss(std::string("table ") + name + " is damaged");
-        if (!sections.emplace(name, content).second) return data_loss(std::string("table ") + name + " occurs twice");
-        at += size_t(size) + 1;
-    }
+Result<SubspaceTables> parse_subspace_tables(std::string_view bytes) {
+    const auto sections = parse_sections(bytes, kMagic);
+    if (!sections.ok()) return sections.status();
     SubspaceTables t;
     std::vector<Shape> shape;
     std::vector<LightDivision::Cells> cells;
     std::vector<SubspaceTree::Node> light, eye;
     const auto read = [&](const char* name, auto* values) {
-        const auto item = sections.find(std::string_view(name));
-        return item != sections.end() && from_bytes(item->second, values);
+        const auto item = std::find_if(sections->begin(), sections->end(), [&](const auto& s) { return s.first == name; });
+        return item != sections->end() && from_bytes(item->second, values);
     };
     if (!read("shape", &shape) || shape.size() != 1 || !read("division", &cells) || !read("kappa-light", &light) ||
         !read("kappa-eye", &eye) || !read("Q", &t.energy) || !read("Gamma", &t.gamma) || !read("window", &t.window))

@@ -13,6 +13,7 @@
 #include "common/core/result.h"
 #include "common/tables/classifier.h"
 #include "common/tables/light_division.h"
+#include "common/tables/tables.h"
 
 namespace lightloom {
 
@@ -32,6 +33,8 @@ struct SubspaceTables {
     /// Connectible light vertices (y_0 included) per light path; for uniform selection (lvcbpt).
     double vertices_per_path = 1;
 
+    static const TablePart kPart;  ///< "subspaces"
+
     static constexpr uint32_t kMaxSubspaces = 16384;  ///< Labels are 16 bit and one value is reserved.
 
     static constexpr uint16_t kMaxWindow = 32;  ///< A unit traces so many caches at most.
@@ -47,12 +50,9 @@ struct SubspaceTables {
 /// Tables without knowledge: one subspace on both sides. Always valid; what a scene without connectable paths gets.
 SubspaceTables trivial_tables(const EmitterSet& emitters);
 
-/// What serialized tables of every version begin with.
-inline constexpr std::string_view kTablesPrefix = "lightloom-tables ";
-
-/// Named, versioned sections, each with its own SHA-256. The same tables have the same bytes on every host.
+/// Named sections, each with its own SHA-256. The same tables have the same bytes on every host.
 std::string serialize(const SubspaceTables& tables);
 /// kDataLoss when a section is missing, cut short, of an unknown version, or does not match its digest.
-Result<SubspaceTables> parse_tables(std::string_view bytes);
+Result<SubspaceTables> parse_subspace_tables(std::string_view bytes);
 
 }  // namespace lightloom

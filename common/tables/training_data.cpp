@@ -8,7 +8,7 @@ namespace lightloom {
 namespace {
 
 struct Header {
-    char magic[8] = {'L', 'L', 'T', 'R', 'A', 'I', 'N', '2'};
+    char magic[8] = {'L', 'L', 'T', 'R', 'A', 'I', 'N', '3'};
     int32_t blocks_x = 0, blocks_y = 0;
     uint64_t samples = 0, light_samples = 0, path_count = 0, light_path_count = 0, vertex_count = 0;
 };
@@ -73,7 +73,7 @@ Status TrainingData::validate(size_t emitter_count) const {
 
 bool TrainingData::in_range(const TrainingPath& path) const {
     const TrainingVertex* v = &vertices[path.first_vertex];
-    return std::isfinite(path.estimate) && std::isfinite(path.square) &&
+    return std::isfinite(path.estimate) && std::isfinite(path.square) && std::isfinite(v->density + path.lens) &&
            std::all_of(v, v + path.vertex_count, [](const TrainingVertex& x) { return std::isfinite(x.density); });
 }
 

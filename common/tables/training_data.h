@@ -5,9 +5,10 @@
 // A path X of technique `own` with density p_own (as traced, roulette included) and weight w_own:
 //     estimate = L(w_own f / p_own)                a sample of the image, in expectation
 //     square   = L(f / p_own)^2 w_own              c_X p_own of algorithms.md 1.1: E[square / (F / p_own)] is the loss
-//     vertices[i].density = n p of a technique, without N Gamma / Q (with correlation_aware: c_s n p; with the
-//                           typical survival of roulette), over p_own: i = 0 holds the ones that tables do not change
-//                           (s = 0 and s = k), 1 <= s <= k-1 the connection of x_{s-1} and x_s; 0 where impossible
+//     densities: n p of a technique, over p_own, as the weights of the render will count it (typical survival of roulette,
+//                corrections) but without what is to be learned, N Gamma / Q; 0 where impossible. vertices[s].density: of hitting
+//                the emitter (s = 0) and of the connection of x_{s-1} and x_s (1 <= s <= k-1); next_event and lens: of choosing
+//                x_0 afresh from x_1, one sample, and of a light sub-path that reached the lens
 // A camera sample keeps at most two paths with two camera vertices (the lens counts), two with three, four, and two with more: what
 // it found is dealt to the two in turn. A light sub-path that reached the lens keeps one. Each is chosen in proportion to its
 // estimate; both numbers are divided by the probability of that choice, so that sums over D stay unbiased.
@@ -40,6 +41,7 @@ struct TrainingPath {
     uint32_t vertex_count = 0;  ///< k + 1, x_0 ... x_k; light sub-paths: y_0 ... y_{n-1}.
     uint32_t block = 0;         ///< Of the frame. Light sub-paths: 0.
     float estimate = 0, square = 0;
+    float next_event = 0, lens = 0;  ///< Densities; see above. Light sub-paths: 0.
 };
 
 struct TrainingData {

@@ -3,20 +3,24 @@
 // the cache a camera vertex is connected to, and with what densities the weights reckon:
 //
 //   struct Method {
-//       Selection selection;                     // the MIS densities, common/path/mis.h
+//       Selection selection(const UnitScope&) const;   // the densities of one unit's weights (common/path/mis.h), made before its
+//                                                      // first sub-path: what it has to trace itself, it traces from streams of
+//                                                      its own
+//       static constexpr bool kUnitSelection;          // optional; whether they depend on more of the unit than its group
+//       static constexpr bool kNextEvent;              // optional; next event estimation as well, beside s = 1 from the cache
 //       static constexpr ViewDetail kDetail;
-//       struct / using Index;                    // of a unit's cache, frozen before the first camera sample
-//       uint64_t windows() const;                // light-only repetitions of the cache that the index may reach into
+//       struct / using Index;                          // of a unit's cache, frozen before the first camera sample
+//       uint64_t windows() const;                      // light-only repetitions of the cache that the index may reach into
 //       Index index(const LightCache&, uint64_t paths) const;                              // paths: of one window
 //       void label_light_path(const Scene&, PathVertex* y, int n) const;
 //       void label_camera_vertex(const Scene&, PathVertex* v) const;
 //       void complete(const Scene&, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView*) const;
 //       int draw(const LightCache&, const Index&, const PathVertex& v, Stratified&& u, Rng&, int longest_prefix,
-//                LightPick*) const;                  // u(): a point of the vertex that is stratified where that helps
-//       float inverse_density(const LightPick&) const;                                      // see PathContribution
+//                LightPick*) const;                    // u(): a point of the vertex that is stratified where that helps
+//       float inverse_density(const LightPick&) const; // see PathContribution
 //   };
 //
-// s = 0 (emitter hits) and s = k (every counted light sub-path to the lens) are the same for all of them.
+// Emitter hits and connections of every counted light sub-path to the lens are the same for all of them.
 
 #include "common/path/mis.h"
 #include "common/transport/contribution.h"
@@ -30,21 +34,33 @@ struct CachedAlgorithm {
     Heuristic heuristic = Heuristic::kBalance;
     uint64_t minimum_paths = 1;  ///< Of a unit's cache.
 
+    static constexpr bool kUnitSelection = [] {
+        if constexpr (requires { Method::kUnitSelection; }) return Method::kUnitSelection;
+        return false;
+    }();
+    static constexpr bool kNextEvent = [] {
+        if constexpr (requires { Method::kNextEvent; }) return Method::kNextEvent;
+        return false;
+    }();
+
+    using Selection = std::remove_cvref_t<decltype(std::declval<const Method&>().selection(std::declval<const UnitScope&>()))>;
     struct State {
+        Selection selection;
         LightCache cache;
         typename Method::Index index;
     };
 
-    float weight(const PathView& view, int s) const {
-        return float(mis_weight(view, {TechniqueKind::kConnect, s}, method.selection, heuristic));
+    float weight(const Selection& selection, const PathView& view, Technique own) const {
+        return float(mis_weight(view, own, selection.on(view), heuristic));
     }
+    float weight(const State& state, const PathView& view, Technique own) const { return weight(state.selection, view, own); }
 
-    /// Traces a unit's light sub-paths. `contribute(contribution, view, m, chunk)` is called for every counted one, m, that
+    /// Traces a unit's light sub-paths. `contribute(contribution, view, weight, m, chunk)` is called for every counted one, m, that
     /// reaches the lens.
     template <class Contribute>
     State prepare(const UnitScope& scope, UnitPreparation* preparation, Contribute&& contribute) const {
         const Scene& scene = scope.scene;
-        State state;
+        State state{.selection = method.selection(scope), .cache = {}, .index = {}};
         const uint64_t window = std::max(minimum_paths, scope.work.light_path_count);
         const auto splat = [&](const PathVertex* y, int s, Vec2 lens_sample, uint64_t m, auto& chunk) {
             PathView view;
@@ -54,8 +70,8 @@ struct CachedAlgorithm {
             const Rgb c = connect_to_camera(scene, y, s, z0.p, &film, &view, &chunk.counters);
             if (c.is_black()) return;
             method.complete(scene, y, s, &z0, 1, normalize(y[s - 1].p - z0.p), &view);
-            contribute(PathContribution{c, 1, s, 1, y, &z0, y[0].p, y[0].ng, uint32_t(y[0].emitter), film, y[s - 1].survival}, view,
-                       m, chunk);
+            const PathContribution found = from_light_path(c, Technique::lens(s), y, &z0, 1, film);
+            contribute(found, view, weight(state.selection, view, found.technique), m, chunk);
         };
         state.cache = trace_light_cache(
             scope, window * method.windows(), preparation, [&](PathVertex* y, int n) { method.label_light_path(scene, y, n); },
@@ -64,29 +80,34 @@ struct CachedAlgorithm {
         state.cache.prefixes = {};
         return state;
     }
-    State prepare(const UnitScope& scope, UnitPreparation* preparation) const {
-        return prepare(scope, preparation, [&](const PathContribution& c, const PathView& view, uint64_t, auto& chunk) {
-            const uint32_t pixel = uint32_t(scope.scene.frame().crop.index(int(c.film.x), int(c.film.y)));
-            chunk.splats.push_back({pixel, scope.work.first_iteration, c.value * weight(view, c.s)});
-        });
-    }
 
     /// Traces one camera sample and calls contribute(contribution, view) for everything that it gives.
     template <class Contribute>
     void trace(SampleContext& context, const State& state, Contribute&& contribute) const {
+        constexpr ViewDetail kDetail = Method::kDetail;
         const Scene& scene = context.scene;
         PathVertex* z = context.camera_path;
         PathView view;
         CameraSampler sampler(context.seed, context.iteration, context.pixel);
         const auto visit = [&](int t) {
             PathVertex& v = z[t - 1];
-            if (v.emitter != kNone)
-                if (const Rgb c = emitter_hit<Method::kDetail>(scene, z, t, &view); !c.is_black()) {
-                    if (view.k >= 2) method.complete(scene, nullptr, 0, z, t, {}, &view);
-                    contribute(PathContribution{c, 1, 0, t, nullptr, z, v.p, v.ng, uint32_t(v.emitter), {}, v.survival}, view);
-                }
+            contribute_hit<kDetail>(scene, z, t, &view, [&](const PathContribution& c, PathView&) {
+                if (view.k >= 2) method.complete(scene, nullptr, 0, z, t, {}, &view);
+                contribute(c, view);
+            });
             if (t > context.max_edges || !v.bsdf.has_smooth_lobe()) return;
             method.label_camera_vertex(scene, &v);
+            if constexpr (kNextEvent) {
+                contribute_next_event<kDetail>(
+                    scene, z, t, sampler, &view, &context.counters, [&](const PathContribution& c, PathView&) {
+                        PathVertex y0;
+                        y0.p = c.position, y0.ng = c.normal, y0.emitter = int32_t(c.emitter);
+                        method.label_light_path(scene, &y0, 1);
+                        const bool direction = scene.emitters()[c.emitter].is_infinite();
+                        method.complete(scene, &y0, 1, z, t, direction ? -y0.ng : normalize(y0.p - v.p), &view);
+                        contribute(c, view);
+                    });
+            }
             LightPick picks[kMaxConnections];
             // Low-discrepancy at the first vertex, over the iterations of the pixel.
             const int count = method.draw(
@@ -95,47 +116,36 @@ struct CachedAlgorithm {
             for (int n = 0; n < count; ++n) {
                 const LightPick& pick = picks[n];
                 const int s = pick.s;
-                const Rgb c = connect_candidate<Method::kDetail>(scene, pick.y, s, z, t, &view, &context.counters);
+                const Rgb c = connect_candidate<kDetail>(scene, pick.y, s, z, t, &view, &context.counters);
                 if (c.is_black()) continue;
                 const PathVertex &start = pick.y[0], &end = pick.y[s - 1];
                 const bool direction = s == 1 && scene.emitters()[uint32_t(end.emitter)].is_infinite();
                 method.complete(scene, pick.y, s, z, t, direction ? -end.ng : normalize(end.p - v.p), &view);
                 const float scale = method.inverse_density(pick);
-                // Where a light sub-path from an infinite light began says nothing about this one: x_0 is a direction.
-                const Vec3 x0 = direction ? scene.emitters().outside(v.p, -end.ng) : start.p;
-                contribute(
-                    PathContribution{
-                        c * scale, scale, s, t, pick.y, z, x0, start.ng, uint32_t(start.emitter), {}, end.survival * v.survival},
-                    view);
+                contribute(PathContribution{.value = c * scale,
+                                            .inverse_density = scale,
+                                            .technique = Technique::connect(s),
+                                            .t = t,
+                                            .y = pick.y,
+                                            .z = z,
+                                            // Where a light sub-path from an infinite light began says nothing about this one: x_0
+                                            // is a direction.
+                                            .position = direction ? scene.emitters().outside(v.p, -end.ng) : start.p,
+                                            .normal = start.ng,
+                                            .emitter = uint32_t(start.emitter),
+                                            .survival = end.survival * v.survival},
+                           view);
             }
         };
         const auto escape = [&](int t, const WalkRay& ray) {
             if (t > context.max_edges) return;
-            const Rgb c = environment_hit<Method::kDetail>(scene, z, t, ray, &view);
-            if (c.is_black()) return;
-            if (view.k >= 2) method.complete(scene, nullptr, 0, z, t, ray.direction, &view);
-            const EmitterSet& emitters = scene.emitters();
-            contribute(PathContribution{c,
-                                        1,
-                                        0,
-                                        t,
-                                        nullptr,
-                                        z,
-                                        emitters.outside(ray.origin, ray.direction),
-                                        -ray.direction,
-                                        uint32_t(emitters.environment_index()),
-                                        {},
-                                        ray.survival},
-                       view);
+            contribute_escape<kDetail>(scene, z, t, ray, &view, [&](const PathContribution& c, PathView&) {
+                if (view.k >= 2) method.complete(scene, nullptr, 0, z, t, ray.direction, &view);
+                contribute(c, view);
+            });
         };
         trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters, visit,
                           escape);
-    }
-
-    Rgb sample(SampleContext& context, const State& state) const {
-        Rgb sum;
-        trace(context, state, [&](const PathContribution& c, const PathView& view) { sum += c.value * weight(view, c.s); });
-        return sum;
     }
 };
 

@@ -1,9 +1,10 @@
 #pragma once
-// The catalog: every algorithm with its parameters, defaults, ranges and sources. One row per algorithm; the command line,
-// the documentation (`lightloom algorithms`), validation and the parameterised test suites all read it from here.
+// The catalog: every algorithm with what it is, its parameters, what kind of units it needs, how it is made and how its tables are
+// learned. One row per algorithm, written in the algorithm's own file; the command line, the documentation (`lightloom
+// algorithms`), validation, plans, workers, coordinator and the property suites all read it from here, and nothing else names an
+// algorithm.
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -13,6 +14,14 @@
 #include "common/core/result.h"
 
 namespace lightloom {
+
+class AlgorithmSettings;
+class Renderer;
+struct RendererRequest;
+struct LearnRequest;
+struct LearningPlan;
+class Tables;
+struct TablePart;
 
 struct ParameterInfo {
     std::string_view name;
@@ -24,32 +33,51 @@ struct ParameterInfo {
     std::span<const std::string_view> choices = {};
 };
 
+/// What the units of an algorithm cover.
+enum class FrameShape : uint8_t {
+    kTiles,  ///< Any tile of the frame.
+    kWhole,  ///< The whole frame: something of the unit belongs to all of its pixels (photon maps, weights of the unit's own).
+};
+
+/// From which ends an algorithm traces sub-paths of more than one edge, and so which light it can find at all.
+enum class Traces : uint8_t {
+    kCamera,  ///< Misses caustics of lights that cannot be hit.
+    kLight,   ///< Misses what the lens sees through mirrors and smooth glass.
+    kBoth,
+};
+
+/// How the tables of an algorithm are learned before it renders.
+struct LearningInfo {
+    /// What its tables consist of.
+    std::span<const TablePart* const> parts;
+    /// The training set and the rounds in which it is traced.
+    LearningPlan (*plan)(const AlgorithmSettings&);
+    /// Tables from the data of one round. kCancelled within about a second of a stop request.
+    Result<Tables> (*learn)(const LearnRequest&);
+};
+
 struct AlgorithmInfo {
     std::string_view name;
     std::string_view summary;  ///< One line.
     std::string_view source;   ///< Paper or book, with equation numbers.
     std::string_view bias;     ///< "unbiased", or what is biased or missing.
     std::span<const ParameterInfo> parameters;
-    bool splats;                ///< Traces light paths that land anywhere on the frame.
-    bool needs_tables = false;  ///< Reads tables that training units make first (common/tables).
+    Traces traces = Traces::kBoth;
+    FrameShape frame = FrameShape::kTiles;
+    bool camera_samples = true;  ///< False: all of its light is in splats.
+    /// Light paths per pixel and iteration that land anywhere on the frame; null for an algorithm that traces none.
+    double (*light_paths_per_pixel)(const AlgorithmSettings&) = nullptr;
+    /// Null for an algorithm without tables.
+    const LearningInfo* learning = nullptr;
+    Result<std::unique_ptr<Renderer>> (*make)(const RendererRequest&);
 };
 
-/// Parsed, validated parameters of one algorithm, in the order of its AlgorithmInfo::parameters.
-struct AlgorithmParameters {
-    std::vector<double> values;
-};
-
-std::span<const AlgorithmInfo> catalog();
+/// The rows, those of add_to_catalog() included, in the order in which they are listed for people.
+std::span<const AlgorithmInfo* const> catalog();
 /// kNotFound, listing the known names, for an unknown algorithm.
 Result<const AlgorithmInfo*> find_algorithm(std::string_view name);
-/// Unknown key, not a number, or out of range: kInvalidArgument naming the key, the range and the algorithm.
-Result<AlgorithmParameters> parse_parameters(const AlgorithmInfo& algorithm, const std::map<std::string, std::string>& set);
-bool has_parameter(const AlgorithmInfo& algorithm, std::string_view name);
-/// Value of a parameter that the algorithm has.
-double parameter_value(const AlgorithmInfo& algorithm, const AlgorithmParameters& parameters, std::string_view name);
-/// All parameters with their values as canonical text, so that an image says what was rendered even where defaults applied.
-std::map<std::string, std::string> complete_parameters(const AlgorithmInfo& algorithm, const AlgorithmParameters& values);
-/// N1: light paths splatted per pixel and iteration, one constant of the frame.
-double light_paths_per_pixel(const AlgorithmInfo& algorithm, const AlgorithmParameters& parameters);
+/// A row that a program brings itself, before it uses the catalog; the row must outlive the program. Tests show with it that an
+/// algorithm is one file and one row.
+void add_to_catalog(const AlgorithmInfo& row);
 
 }  // namespace lightloom

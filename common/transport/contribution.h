@@ -2,25 +2,110 @@
 // What a bidirectional algorithm finds, one connection at a time, before anything is weighted: renders add it to pixels, training
 // units keep some of it.
 
-#include "common/path/path_view.h"
-#include "common/path/vertex.h"
+#include "common/path/camera_walk.h"
+#include "common/path/light_walk.h"
+#include "common/path/technique.h"
 
 namespace lightloom {
 
-/// One way in which a camera sub-path and a light sub-path met: technique s, t with y[0 .. s-1] (s >= 2) and z[0 .. t-1]. x_0 is
-/// apart because for s <= 1 it need not be on either array.
+/// One way in which a camera sub-path and a light sub-path met: s light vertices y[0 .. s-1] (s >= 2, and s = 1 where the technique
+/// is a connection) and t camera vertices z[0 .. t-1]. x_0 is apart because for s <= 1 it need not be on either array.
 struct PathContribution {
     Rgb value;                  ///< Unweighted: f over the density of what was really drawn, all of an iteration's draws together.
     float inverse_density = 1;  ///< The same density but for roulette, as C(s) A(s) over it; splats: of one light path.
-    int s = 0, t = 0;
+    Technique technique;
+    int t = 0;
     const PathVertex *y = nullptr, *z = nullptr;
     Vec3 position, normal;  ///< Of x_0; for an infinite light a point outside of the scene and the direction of travel.
     uint32_t emitter = 0;
     Vec2 film;           ///< Connections to the lens only.
     float survival = 1;  ///< Probability that roulette left both sub-paths: `value` was divided by it.
-
-    /// A connection of a light sub-path to the lens, which may land in any pixel (not the sky behind the first camera ray).
-    bool to_lens() const { return t == 1 && s > 0; }
 };
+
+/// s = 0 on a surface: what z_{t-1} emits towards z_{t-2}, if it lies on an emitter.
+template <ViewDetail detail, class Contribute>
+void contribute_hit(const Scene& scene, const PathVertex* z, int t, PathView* view, Contribute&& contribute) {
+    const PathVertex& v = z[t - 1];
+    if (v.emitter == kNone) return;
+    const Rgb value = emitter_hit<detail>(scene, z, t, view);
+    if (value.is_black()) return;
+    contribute(PathContribution{.value = value,
+                                .technique = Technique::hit(),
+                                .t = t,
+                                .z = z,
+                                .position = v.p,
+                                .normal = v.ng,
+                                .emitter = uint32_t(v.emitter),
+                                .survival = v.survival},
+               *view);
+}
+
+/// s = 0, environment: what the sky sends along a ray that left the scene from z_{t-1}.
+template <ViewDetail detail, class Contribute>
+void contribute_escape(const Scene& scene, const PathVertex* z, int t, const WalkRay& ray, PathView* view,
+                       Contribute&& contribute) {
+    const Rgb value = environment_hit<detail>(scene, z, t, ray, view);
+    if (value.is_black()) return;
+    const EmitterSet& emitters = scene.emitters();
+    contribute(PathContribution{.value = value,
+                                .technique = Technique::hit(),
+                                .t = t,
+                                .z = z,
+                                .position = emitters.outside(ray.origin, ray.direction),
+                                .normal = -ray.direction,
+                                .emitter = uint32_t(emitters.environment_index()),
+                                .survival = ray.survival},
+               *view);
+}
+
+/// s = 1: next event estimation from z_{t-1}, with numbers of the sampler.
+template <ViewDetail detail, class Contribute>
+void contribute_next_event(const Scene& scene, const PathVertex* z, int t, CameraSampler& sampler, PathView* view,
+                           WalkCounters* counters, Contribute&& contribute) {
+    const PathVertex& v = z[t - 1];
+    NextEventSample light;
+    const double pick = sampler.rng().uniform_double();
+    if (!scene.emitters().sample_next_event(v.p, pick, sampler.next_event(t), &light)) return;
+    const Rgb value = next_event<detail>(scene, z, t, light, view, counters);
+    if (value.is_black()) return;
+    contribute(PathContribution{.value = value,
+                                .inverse_density = float(view->fwd[0] / view->next_event),
+                                .technique = Technique::next_event(),
+                                .t = t,
+                                .z = z,
+                                .position = light.position,
+                                .normal = light.normal,
+                                .emitter = light.emitter,
+                                .survival = v.survival},
+               *view);
+}
+
+/// A light sub-path y[0 .. s-1], s >= 2, that met the camera sub-path z[0 .. t-1] by `technique`.
+inline PathContribution from_light_path(const Rgb& value, Technique technique, const PathVertex* y, const PathVertex* z, int t,
+                                        Vec2 film = {}) {
+    return {.value = value,
+            .technique = technique,
+            .t = t,
+            .y = y,
+            .z = z,
+            .position = y[0].p,
+            .normal = y[0].ng,
+            .emitter = uint32_t(y[0].emitter),
+            .film = film,
+            .survival = y[technique.s - 1].survival * z[t - 1].survival};
+}
+
+/// Connects every vertex of a light sub-path y[0 .. n-1] that can be connected to the lens.
+template <class Contribute>
+void contribute_to_lens(const Scene& scene, LightSampler& sampler, const PathVertex* y, int n, PathVertex* z, PathView* view,
+                        WalkCounters* counters, Contribute&& contribute) {
+    for (int s = 2; s <= n; ++s) {
+        if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
+        Vec2 film;
+        z[0].p = scene.camera().sample_lens(sampler.rng().uniform2());
+        const Rgb value = connect_to_camera(scene, y, s, z[0].p, &film, view, counters);
+        if (!value.is_black()) contribute(from_light_path(value, Technique::lens(s), y, z, 1, film), *view);
+    }
+}
 
 }  // namespace lightloom

@@ -128,7 +128,7 @@ LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPr
         std::vector<Splat> splats;
         WalkCounters counters;
     };
-    const UnitWork& work = scope.work;
+    const RenderUnit& work = scope.work;
     LightCache cache;
     cache.paths.resize(path_count);
     std::vector<Chunk> chunks(size_t((path_count + kChunk - 1) / kChunk));

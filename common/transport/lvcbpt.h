@@ -16,25 +16,27 @@
 namespace lightloom {
 
 struct UniformSelection {
-    static constexpr bool kMerges = false;
     double light_paths_per_iteration = 1;  ///< N1 |crop|
     double connection_density = 1;         ///< N / v
     TypicalSurvival survival;
 
-    int s_min(int) const { return 0; }
-    int s_max(int k) const { return k == 1 ? 0 : k; }
-    double connect_factor(const PathView& view, int s) const {
-        const double paths = survival(s) * survival(view.k + 1 - s);
-        return paths * (s == 0 ? 1 : s == view.k ? light_paths_per_iteration : connection_density);
-    }
+    struct OnPath : PlainTechniques {
+        const UniformSelection& selection;
+
+        double survivors(int s) const { return selection.survival(s) * selection.survival(view.k + 1 - s); }
+        double next_event() const { return 0; }
+        double connect(int) const { return selection.connection_density; }
+        double lens() const { return selection.light_paths_per_iteration; }
+    };
+    OnPath on(const PathView& view) const { return {{view}, *this}; }
 };
 
-/// A selection with fewer techniques (connect_factor 0) makes an algorithm of those that remain.
 template <class Selection = UniformSelection>
 struct UniformConnections {
-    Selection selection;
+    Selection densities;
     int connections = 3;  ///< N
 
+    const Selection& selection(const UnitScope&) const { return densities; }
     static constexpr ViewDetail kDetail = ViewDetail::kFull;
     struct Index {
         std::vector<LightCandidate> candidates;

@@ -1,38 +1,75 @@
 #pragma once
-// The settings of a render as numbers: what the catalog's texts mean to transport and to training.
+// Parameters that several algorithms have, and what they mean: rows of the catalog list them, and read them from here.
 
-#include <cmath>
-
-#include "common/core/result.h"
 #include "common/path/mis.h"
 #include "common/path/random_walk.h"
-#include "common/tables/train.h"
-#include "common/transport/renderer.h"
+#include "common/transport/settings.h"
 
 namespace lightloom {
 
-/// Camera samples of a training unit; the last one may have fewer.
-inline constexpr uint64_t kTrainingUnitSamples = uint64_t(1) << 14;
+inline constexpr ParameterInfo kRouletteStart{"rr-start",
+                                              4,
+                                              2,
+                                              256,
+                                              true,
+                                              "sub-path vertices below this index never end by Russian roulette "
+                                              "[Pharr, Jakob and Humphreys 2023, 2.2.4]"};
+// The weights know a typical survival at best, so that a technique whose sub-path rarely survives is trusted too much: at 0.05,
+// door needs 1.4 (spcbpt), 1.7 (bdpt) and 2.5 (path) times the processor time for the same relMSE; at 1 the walks cost more than
+// they save.
+inline constexpr ParameterInfo kRouletteMin{"rr-min",
+                                            0.5,
+                                            0.01,
+                                            1,
+                                            false,
+                                            "smallest survival probability of Russian roulette; 1 switches roulette off "
+                                            "[measured: best of 0.05 to 1]"};
+inline constexpr std::string_view kHeuristicNames[] = {"balance", "power", "maximum"};
+inline constexpr std::string_view kSwitch[] = {"off", "on"};
+inline constexpr ParameterInfo kHeuristic{
+    "heuristic", 0, 0, 2, true, "balance [Veach 1997, eq. 9.8], power with exponent 2, or maximum", kHeuristicNames};
+inline constexpr ParameterInfo kLightPaths{
+    "light-paths",
+    0.3,
+    0.001,
+    64,
+    false,
+    "N1 and M: light sub-paths per pixel and iteration; all of them splat and fill the cache "
+    "[Su et al. 2022, section 8.1: 1e5 per iteration, 0.05 per pixel]"};
+inline constexpr ParameterInfo kCache{"cache",
+                                      20000,
+                                      1,
+                                      1e8,
+                                      true,
+                                      "smallest number of light sub-paths in a unit's cache, however few camera samples it has "
+                                      "[Davidovic et al. 2014 fill one per image]"};
+inline constexpr ParameterInfo kConnections{
+    "connections", 3, 1, 64, true, "N: connections per camera vertex [Su et al. 2022, table 3]"};
+/// The size of a training set; a time-limited job may make it smaller.
+inline constexpr std::string_view kTrainingPaths = "training-paths";
 
-struct TransportParameters {
-    RouletteRule roulette;
-    Heuristic heuristic = Heuristic::kBalance;
-    double light_paths = 0;  ///< N1, per pixel and iteration; 0 for algorithms that splat nothing.
-    bool needs_tables = false;
-    // Algorithms with a cache.
-    int connections = 1;         ///< N
-    uint64_t minimum_paths = 1;  ///< Of a unit's cache.
-    bool ris_aware = false, correlation_aware = false;
-    uint64_t training_samples = 0;
-    double energy_paths = 1;     ///< M' / D: light sub-paths that measure Q, per training sample.
-    uint64_t pilot_samples = 0;  ///< The first of them, traced without a guide; 0: all.
-    TrainingOptions training;
+inline RouletteRule roulette_of(const AlgorithmSettings& s) {
+    RouletteRule rule;
+    rule.first_vertex = int(s.value(kRouletteStart.name));
+    rule.min_survival = float(s.value(kRouletteMin.name));
+    rule.max_survival = std::max(rule.max_survival, rule.min_survival);  // rr-min=1 switches roulette off
+    return rule;
+}
+inline Heuristic heuristic_of(const AlgorithmSettings& s) { return Heuristic(int(s.value(kHeuristic.name))); }
 
-    /// How many light sub-paths the training samples before number `sample` measure Q with.
-    uint64_t energy_paths_before(uint64_t sample) const { return uint64_t(std::ceil(double(sample) * energy_paths)); }
+/// AlgorithmInfo::light_paths_per_pixel of algorithms that trace one light path per camera sample, and of those that let the user
+/// choose.
+inline double one_light_path(const AlgorithmSettings&) { return 1; }
+inline double chosen_light_paths(const AlgorithmSettings& s) { return s.value(kLightPaths.name); }
 
-    /// Unknown algorithm or parameter, value or depth out of range: a clear error.
-    static Result<TransportParameters> read(const RenderSettings& settings);
+/// What algorithms with a light-vertex cache have in common.
+struct CacheParameters {
+    int connections;         ///< N
+    uint64_t minimum_paths;  ///< Of a unit's cache.
+
+    static CacheParameters of(const AlgorithmSettings& s) {
+        return {int(s.value(kConnections.name)), uint64_t(s.value(kCache.name))};
+    }
 };
 
 }  // namespace lightloom

@@ -22,11 +22,10 @@
 #include <utility>
 
 #include "common/core/inverse_cdf.h"
-#include "common/path/correlation.h"
+#include "common/path/corrected.h"
 #include "common/path/survival.h"
 #include "common/scene/sampling.h"
 #include "common/transport/cached.h"
-#include "common/transport/parameters.h"
 #include "common/transport/subspace_view.h"
 
 namespace lightloom {
@@ -45,36 +44,70 @@ struct PreparedTables {
     }
 };
 
-struct SubspaceSelection {
-    static constexpr bool kMerges = false;
+/// What was learned decides how often a camera sub-path meets a prefix: N Gamma(i, j) / Q(i).
+struct LearnedAffinity {
     std::shared_ptr<const PreparedTables> prepared;
-    double light_paths_per_iteration = 1;  ///< N1 |crop|
-    double connections = 3;                ///< N
-    double cache_paths = 0;                ///< M of ris_aware; 0 switches that off.
-    bool correlation_aware = false;        ///< N counts as N c_s.
-    TypicalSurvival survival;
+    double connections = 3;  ///< N
 
-    int s_min(int) const { return 0; }
-    int s_max(int k) const { return k == 1 ? 0 : k; }
-    double connect_factor(const PathView& view, int s) const {
-        const double camera_paths = survival(view.k + 1 - s);
-        if (s == 0) return camera_paths;
-        if (s == view.k) return light_paths_per_iteration * survival(s);
+    double operator()(const PathView& view, int s, double share) const {
         const uint32_t i = view.light_label[s];
-        const double count = correlation_aware ? connections * correlation_factor(view, s, connections) : connections;
-        const double target = count * double(prepared->tables.column(view.eye_label[s])[i]) * double(prepared->inv_energy[i]) *
-                              view.light_throughput[s];
-        const bool limited = cache_paths > 0 && target > 0;
-        return camera_paths * (limited ? 1 / (1 / target + 1 / (cache_paths * survival(s))) : target);
+        return connections * share * double(prepared->tables.column(view.eye_label[s])[i]) * double(prepared->inv_energy[i]);
     }
 };
 
-/// A selection with fewer techniques (connect_factor 0) makes an algorithm of those that remain.
-template <class Selection = SubspaceSelection>
+/// `Affinity(view, s, share)`: draws per camera sub-path and unit of a prefix's throughput, if only a share of the N draws counts.
+template <class Affinity = LearnedAffinity>
+struct SubspaceSelection {
+    Affinity affinity;
+    double light_paths_per_iteration = 1;  ///< N1 |crop|
+    double connections = 3;                ///< N
+    double cache_paths = 0;                ///< M of ris_aware; 0 switches that off.
+    TypicalSurvival survival;
+
+    struct OnPath : PlainTechniques {
+        const SubspaceSelection& selection;
+
+        /// Draws among prefixes make up for roulette: a survivor has that much more throughput.
+        double survivors(int s) const { return s == view.k ? selection.survival(s) : selection.survival(view.k + 1 - s); }
+        double next_event() const { return 0; }
+        double connections() const { return selection.connections; }
+        double connect(int s) const { return connect(s, 1); }
+        double connect(int s, double share) const {
+            const double target = selection.affinity(view, s, share) * view.light_throughput[s];
+            const bool limited = selection.cache_paths > 0 && target > 0;
+            return limited ? 1 / (1 / target + 1 / (selection.cache_paths * selection.survival(s))) : target;
+        }
+        double lens() const { return selection.light_paths_per_iteration; }
+    };
+    OnPath on(const PathView& view) const { return {{view}, *this}; }
+};
+
+/// The selection of `spcbpt`, corrected for what its connections share.
+using SpcbptSelection = Corrected<SubspaceSelection<>>;
+
+/// What it counts besides the tables; see SubspaceSelection.
+struct SpcbptCounts {
+    double light_paths_per_iteration = 1;
+    int connections = 3;
+    double cache_paths = 0;
+    Correction correction = Correction::kUncorrected;
+    RouletteRule roulette;
+};
+
+inline SpcbptSelection spcbpt_selection(std::shared_ptr<const PreparedTables> prepared, const SpcbptCounts& c) {
+    const double connections = double(c.connections);
+    return {{LearnedAffinity{std::move(prepared), connections}, c.light_paths_per_iteration, connections, c.cache_paths,
+             TypicalSurvival(c.roulette)},
+            c.correction};
+}
+
+template <class Selection = SpcbptSelection>
 struct SubspaceConnections {
-    Selection selection;
+    Selection densities;
+    std::shared_ptr<const PreparedTables> prepared;
     int connections = 3;  ///< N
 
+    const Selection& selection(const UnitScope&) const { return densities; }
     static constexpr ViewDetail kDetail = ViewDetail::kSubspace;
 
     static_assert(kMaxConnections <= InverseCdfTable::Column::kMaxStrata &&
@@ -96,8 +129,8 @@ struct SubspaceConnections {
         std::vector<Candidate, HugePageAllocator<Candidate>> candidates;
     };
 
-    uint64_t windows() const { return uint64_t(selection.prepared->windows); }
-    SubspaceLabeller labeller(const Scene& scene) const { return {selection.prepared->tables, scene.emitters()}; }
+    uint64_t windows() const { return uint64_t(prepared->windows); }
+    SubspaceLabeller labeller(const Scene& scene) const { return {prepared->tables, scene.emitters()}; }
     void label_light_path(const Scene& scene, PathVertex* y, int n) const { labeller(scene).label_light_path(y, n); }
     void label_camera_vertex(const Scene& scene, PathVertex* v) const { labeller(scene).label_camera_vertex(v); }
     void complete(const Scene& scene, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
@@ -106,7 +139,7 @@ struct SubspaceConnections {
     float inverse_density(const LightPick& pick) const { return pick.scale / scalar_of(pick.y[pick.s - 1].alpha); }
 
     Index index(const LightCache& cache, uint64_t paths) const {
-        const SubspaceTables& tables = selection.prepared->tables;
+        const SubspaceTables& tables = prepared->tables;
         Index index;
         // Counting sort by subspace; path order within one.
         index.subspaces.assign(tables.light_count, {});
@@ -151,8 +184,8 @@ struct SubspaceConnections {
     template <class Stratified>
     int draw(const LightCache& cache, const Index& index, const PathVertex& v, Stratified&& stratified, Rng& rng,
              int longest_prefix, LightPick* picks) const {
-        const PreparedTables& prepared = *selection.prepared;
-        const InverseCdfTable::Column column = prepared.draws.column(v.label);
+        const PreparedTables& tables = *this->prepared;
+        const InverseCdfTable::Column column = tables.draws.column(v.label);
         const Vec2 u = stratified(), below = rng.uniform2();
         // u has 24 bits; the bits below come from the stream.
         const double base = double(u.x) + double(below.x) * 0x1p-24;
@@ -189,16 +222,7 @@ struct SubspaceConnections {
     }
 };
 
-template <class Selection = SubspaceSelection>
+template <class Selection = SpcbptSelection>
 using SpcbptAlgorithm = CachedAlgorithm<SubspaceConnections<Selection>>;
-
-/// `light_paths_per_iteration`: N1 |crop|.
-inline SpcbptAlgorithm<> make_spcbpt(const TransportParameters& p, std::shared_ptr<const PreparedTables> prepared,
-                                     double light_paths_per_iteration) {
-    SubspaceSelection selection{std::move(prepared),   light_paths_per_iteration,
-                                double(p.connections), p.ris_aware ? double(p.minimum_paths) : 0,
-                                p.correlation_aware,   TypicalSurvival(p.roulette)};
-    return {{std::move(selection), p.connections}, p.heuristic, p.minimum_paths};
-}
 
 }  // namespace lightloom

@@ -19,12 +19,17 @@ constexpr uint64_t kTrainingSeed = 0x7472'6169'6e69'6e67ull;
 constexpr uint64_t kChunk = kTrainingChunkSamples;
 constexpr double kSamplesPerBlock = 200;
 
-/// How the weights of the render to come will count (spcbpt.h), as far as no table decides that.
+/// Where nothing is learned yet: one draw per prefix and unit of its throughput.
+struct UnlearnedAffinity {
+    double operator()(const PathView&, int, double share) const { return share; }
+};
+/// The selection of the render to come, as far as no table decides it.
+using RenderSelection = Corrected<SubspaceSelection<UnlearnedAffinity>>;
+
+/// What Reservoir::offer() needs to know of the render.
 struct RenderCounts {
     const EmitterSet& emitters;
-    double light_paths_per_iteration = 1;  ///< N1 |crop|
-    double correlated_connections = 1;     ///< N with correlation_aware, otherwise 1: nothing to correlate.
-    TypicalSurvival survival;
+    RenderSelection selection;
 };
 
 /// Keeps one of the contributions of a sub-path, in proportion to their estimates.
@@ -45,24 +50,26 @@ class Reservoir {
         vertices_.resize(size_t(k) + 1);
         vertices_[0] = {c.position, c.normal, 0, c.emitter};
         for (int i = 1; i < k; ++i) {
-            const PathVertex& v = i < c.s ? c.y[i] : c.z[k - i];
+            const PathVertex& v = i < c.technique.s ? c.y[i] : c.z[k - i];
             vertices_[size_t(i)] = {v.p, v.ng, 0, 0};
         }
         vertices_[size_t(k)] = {c.z[0].p, {}, 0, 0};
-        view_throughput(c.y, c.s, c.z, &view);
-        view_footprint(render.emitters[c.emitter], c.y, c.s, c.z, c.t, &view);
+        view_throughput(c.y, c.technique.s, c.z, &view);
+        view_footprint(render.emitters[c.emitter], c.y, c.technique.s, c.z, c.t, &view);
         const double inverse_own = double(c.inverse_density) * scale / double(c.survival);
+        path_.next_event = path_.lens = 0;
+        const auto on = render.selection.on(view);
         const auto keep = [&](int s, double ratio) {
             if (!can_connect(view, s)) return;
-            const double density =
-                ratio * inverse_own * render.survival(s == k ? k : k + 1 - s) *
-                (s == 0   ? 1
-                 : s == k ? render.light_paths_per_iteration
-                          : view.light_throughput[s] * correlation_factor(view, s, render.correlated_connections));
-            vertices_[s == k ? 0 : size_t(s)].density += single(density);
+            const double sub_paths = ratio * inverse_own * on.survivors(s);
+            if (s == 0) return void(vertices_[0].density = single(sub_paths * on.hit()));
+            if (s == k) return void(path_.lens = single(sub_paths * on.lens()));
+            if (s == 1) path_.next_event = single(sub_paths * (view.next_event / view.fwd[0]));
+            vertices_[size_t(s)].density = single(sub_paths * on.connect(s));
         };
-        keep(c.s, 1);
-        for_each_split(view, c.s, 0, k, [&](int s, const WideProduct& chain) { keep(s, chain.value(1)); });
+        const int own = c.technique.s;
+        keep(own, 1);
+        for_each_split(view, own, 0, k, [&](int s, const WideProduct& chain) { keep(s, chain.value(1)); });
         return estimate;
     }
     /// Adds what was kept to `data`, and is empty again.
@@ -136,23 +143,26 @@ struct Blocks {
 
 }  // namespace
 
-Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const RenderSettings& settings,
-                                                    const SubspaceTables* guide) {
-    Result<TransportParameters> parameters = TransportParameters::read(settings);
-    if (!parameters.ok()) return parameters.status();
+Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const RenderSettings& settings, const Tables& guide) {
+    LL_RETURN_IF_ERROR(check_depth(settings.max_depth));
+    const AlgorithmSettings& algorithm = settings.algorithm;
+    if (!algorithm.info().learning) return failed_precondition("algorithm '" + algorithm.name() + "' learns nothing");
     TrainingGenerator generator(scene);
-    if (guide) {
-        LL_RETURN_IF_ERROR(guide->validate(scene.emitters()));
+    generator.roulette_ = roulette_of(algorithm);
+    generator.heuristic_ = heuristic_of(algorithm);
+    generator.plan_ = algorithm.info().learning->plan(algorithm);
+    generator.light_paths_per_iteration_ = algorithm.light_paths_per_iteration(scene.frame().crop.area());
+    if (!guide.empty()) {
+        LL_RETURN_IF_ERROR(guide.validate(scene.emitters()));
+        const auto subspaces = guide.get<SubspaceTables>();
+        if (!subspaces) return failed_precondition("the tables of the first round have no subspaces to guide the second one");
         // One light sub-path per camera sample, however large the caches of the render will be.
-        SubspaceTables tables = *guide;
+        SubspaceTables tables = *subspaces;
         std::fill(tables.window.begin(), tables.window.end(), uint16_t(1));
         generator.guide_ = std::make_shared<const PreparedTables>(std::move(tables));
-        parameters->minimum_paths = 1;
-        parameters->ris_aware = false;
     }
-    generator.parameters_ = *std::move(parameters);
     generator.seed_ = settings.seed ^ kTrainingSeed;
-    generator.max_depth_ = settings.max_depth;
+    generator.max_edges_ = settings.max_edges();
     return generator;
 }
 
@@ -169,9 +179,14 @@ class TrainingGenerator::Unit {
     double pixels() const { return double(crop().area()); }
     const Blocks& blocks() const { return blocks_; }
     RenderCounts render() const {
-        const TransportParameters& p = generator_.parameters_;
-        return {generator_.scene_->emitters(), p.light_paths * pixels(), p.correlation_aware ? double(p.connections) : 1,
-                TypicalSurvival(p.roulette)};
+        const LearningPlan& plan = generator_.plan_;
+        return {generator_.scene_->emitters(),
+                {{{},
+                  double(generator_.light_paths_per_iteration_),
+                  double(plan.connections),
+                  0,
+                  TypicalSurvival(generator_.roulette_)},
+                 plan.correction}};
     }
     TrainingData empty() const {
         TrainingData data;
@@ -179,8 +194,8 @@ class TrainingGenerator::Unit {
         data.block_sum.assign(size_t(data.blocks_x) * size_t(data.blocks_y), 0.0);
         return data;
     }
-    UnitWork light_work() const {
-        UnitWork work;
+    RenderUnit light_work() const {
+        RenderUnit work;
         work.tile = crop();
         work.first_light_path = work_.first_sample, work.light_path_count = work_.sample_count;
         work.group_first_iteration = work_.first_sample;  // no two units share a light sub-path
@@ -188,8 +203,8 @@ class TrainingGenerator::Unit {
     }
     /// How many light sub-paths measure Q for sample n.
     uint64_t energy_share(uint64_t n) const { return energy_paths_before(n + 1) - energy_paths_before(n); }
-    UnitScope scope(const UnitWork& work) const {
-        return {*generator_.scene_, generator_.seed_, generator_.max_depth_ + 1, generator_.parameters_.roulette, work, stop_};
+    UnitScope scope(const RenderUnit& work) const {
+        return {*generator_.scene_, generator_.seed_, generator_.max_edges_, generator_.roulette_, work, stop_};
     }
 
     /// Calls sample(context, block, data, rng) for every sample.
@@ -197,8 +212,7 @@ class TrainingGenerator::Unit {
     Result<TrainingData> trace(TrainingData all, Sample&& sample) const {
         std::vector<TrainingData> chunks(size_t((work_.sample_count + kChunk - 1) / kChunk));
         fork_join(chunks.size(), [&](size_t first_chunk, size_t last_chunk) {
-            std::vector<PathVertex> camera_path(size_t(generator_.max_depth_) + 3), light_path(size_t(generator_.max_depth_) + 2);
-            std::vector<Splat> no_splats;
+            std::vector<PathVertex> camera_path(size_t(generator_.max_edges_) + 2), light_path(size_t(generator_.max_edges_) + 1);
             for (size_t c = first_chunk; c != last_chunk && !stop_.stop_requested(); ++c) {
                 TrainingData& data = chunks[c] = empty();
                 const uint64_t begin = work_.first_sample + c * kChunk;
@@ -208,11 +222,10 @@ class TrainingGenerator::Unit {
                 for (uint64_t n = begin; n < end; ++n) {
                     SampleContext context{.scene = *generator_.scene_,
                                           .seed = generator_.seed_,
-                                          .max_edges = generator_.max_depth_ + 1,
-                                          .roulette = generator_.parameters_.roulette,
+                                          .max_edges = generator_.max_edges_,
+                                          .roulette = generator_.roulette_,
                                           .camera_path = camera_path.data(),
                                           .light_path_vertices = light_path.data(),
-                                          .splats = &no_splats,
                                           .counters = {}};
                     const Vec2 place = low_discrepancy_point(uint32_t(n), generator_.seed_);
                     context.px = crop().x0 + std::min(crop().width() - 1, int(place.x * float(crop().width())));
@@ -233,7 +246,7 @@ class TrainingGenerator::Unit {
     }
 
   private:
-    uint64_t energy_paths_before(uint64_t sample) const { return generator_.parameters_.energy_paths_before(sample); }
+    uint64_t energy_paths_before(uint64_t sample) const { return generator_.plan_.energy_paths_before(sample); }
     void trace_for_energy(SampleContext& context, uint64_t number, TrainingData* data) const {
         LightSampler sampler({generator_.seed_, Stage::kLightPool, 0, number});
         PathVertex* y = context.light_path_vertices;
@@ -265,9 +278,9 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
             },
             [&](const PathContribution& found, PathView& view) {
                 // A light path may land in any pixel, a camera sample in one: the scale of algorithms.md 0, N1.
-                const bool splat = found.to_lens();
+                const bool splat = found.technique.splats();
                 const uint32_t block = splat ? unit.blocks().at(int(found.film.x), int(found.film.y)) : camera_block;
-                const double weight = mis_weight(view, {TechniqueKind::kConnect, found.s}, generator);
+                const double weight = mis_weight(view, found.technique, generator.on(view));
                 data.block_sum[block] += (splat ? from_light : from_camera.of(found))
                                              .offer(found, view, weight, splat ? 1 / unit.pixels() : 1, block, render, rng);
             });
@@ -277,8 +290,12 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
 }
 
 Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
-    const auto generator = make_spcbpt(parameters_, guide_, unit.pixels());
-    const UnitWork work = unit.light_work();
+    const SpcbptSelection selection = spcbpt_selection(guide_, {.light_paths_per_iteration = unit.pixels(),
+                                                                .connections = plan_.connections,
+                                                                .correction = plan_.correction,
+                                                                .roulette = roulette_});
+    const SpcbptAlgorithm<> generator{{selection, guide_, plan_.connections}, heuristic_, 1};
+    const RenderUnit work = unit.light_work();
     const RenderCounts render = unit.render();
     // Light sub-paths are traced in parallel; what they bring is joined in their order.
     struct FromLight {
@@ -287,12 +304,12 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
     };
     std::vector<FromLight> from_light(work.light_path_count);
     UnitPreparation preparation;
-    const auto state =
-        generator.prepare(unit.scope(work), &preparation, [&](const PathContribution& found, PathView& view, uint64_t m, auto&) {
-            Rng rng({seed_, Stage::kTraining, 1 + uint64_t(found.s), work.first_light_path + m});
+    const auto state = generator.prepare(
+        unit.scope(work), &preparation, [&](const PathContribution& found, PathView& view, float weight, uint64_t m, auto&) {
+            Rng rng({seed_, Stage::kTraining, 1 + uint64_t(found.technique.s), work.first_light_path + m});
             const uint32_t block = unit.blocks().at(int(found.film.x), int(found.film.y));
             const double estimate =
-                from_light[m].reservoir.offer(found, view, generator.weight(view, found.s), 1 / unit.pixels(), block, render, rng);
+                from_light[m].reservoir.offer(found, view, double(weight), 1 / unit.pixels(), block, render, rng);
             from_light[m].estimates.push_back({block, estimate});
         });
     TrainingData data = unit.empty();
@@ -300,7 +317,7 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
         for (uint64_t m = 0; m < work.light_path_count; ++m) {
             const LightCache::Path path = state.cache.paths[m];
             if (unit.energy_share(work.first_light_path + m) > 0 && path.length > 0)
-                keep_light_path(state.cache.at(path.first_vertex), int(path.length), max_depth_ + 1, &data);
+                keep_light_path(state.cache.at(path.first_vertex), int(path.length), max_edges_, &data);
             for (const auto& [block, estimate] : from_light[m].estimates) data.block_sum[block] += estimate;
             from_light[m].reservoir.move_to(&data);
         }
@@ -308,56 +325,43 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
     return unit.trace(std::move(data), [&](SampleContext& context, uint32_t block, TrainingData& chunk, Rng& rng) {
         CameraReservoirs from_camera;
         generator.trace(context, state, [&](const PathContribution& found, PathView& view) {
-            chunk.block_sum[block] +=
-                from_camera.of(found).offer(found, view, generator.weight(view, found.s), 1, block, render, rng);
+            chunk.block_sum[block] += from_camera.of(found).offer(
+                found, view, double(generator.weight(state, view, found.technique)), 1, block, render, rng);
         });
         from_camera.move_to(&chunk);
     });
 }
 
-Result<TrainingData> trace_training(const Scene& scene, const RenderSettings& settings, const TrainingWork& work,
-                                    std::stop_token stop) {
-    const Result<TrainingGenerator> generator = TrainingGenerator::create(scene, settings);
-    if (!generator.ok()) return generator.status();
-    return generator->trace(work, std::move(stop));
-}
-
-Result<SubspaceTables> make_tables(const Scene& scene, const RenderSettings& settings, std::stop_token stop,
-                                   TrainingReport* report) {
-    const Result<TransportParameters> parameters = TransportParameters::read(settings);
-    if (!parameters.ok()) return parameters.status();
-    const uint64_t samples = parameters->training_samples;
-    std::optional<SubspaceTables> tables;
-    uint64_t first = 0;
-    for (const uint64_t end : {parameters->pilot_samples, samples}) {
-        if (first == end) continue;  // no pilot
-        const Result<TrainingGenerator> generator = TrainingGenerator::create(scene, settings, tables ? &*tables : nullptr);
+Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, std::stop_token stop, TrainingReport* report) {
+    const LearningInfo* learning = settings.algorithm.info().learning;
+    Tables tables;
+    if (!learning) return tables;
+    const LearningPlan plan = learning->plan(settings.algorithm);
+    for (size_t round = 0; round < plan.rounds.size(); ++round) {
+        const Tables guide = plan.rounds[round].guided ? tables : Tables();
+        const Result<TrainingGenerator> generator = TrainingGenerator::create(scene, settings, guide);
         if (!generator.ok()) return generator.status();
         TrainingData data;
-        for (; first < end; first += std::min(kTrainingUnitSamples, end - first)) {
-            const Result<TrainingData> unit = generator->trace({first, std::min(kTrainingUnitSamples, end - first), samples}, stop);
+        const uint64_t begin = plan.first_sample(round), end = begin + plan.rounds[round].samples;
+        for (uint64_t first = begin; first < end; first += std::min(kTrainingUnitSamples, end - first)) {
+            const Result<TrainingData> unit =
+                generator->trace({first, std::min(kTrainingUnitSamples, end - first), plan.samples}, stop);
             if (!unit.ok()) return unit.status();
             LL_RETURN_IF_ERROR(data.append(*unit));
         }
-        Result<SubspaceTables> trained = train_tables(data, scene.emitters(), parameters->training, {stop, {}}, report);
-        if (!trained.ok()) return trained.status();
-        tables = *std::move(trained);
+        auto learned = learning->learn({data, round, guide, scene.emitters(), settings, {stop, {}}, report});
+        if (!learned.ok()) return learned.status();
+        tables = *std::move(learned);
     }
-    return *std::move(tables);
+    return tables;
 }
 
 Result<std::unique_ptr<Renderer>> create_with_tables(std::shared_ptr<const Scene> scene, const RenderSettings& settings,
-                                                     std::stop_token stop) {
-    const Result<TransportParameters> parameters = TransportParameters::read(settings);
-    if (!parameters.ok()) return parameters.status();
-    std::shared_ptr<const SubspaceTables> tables;
-    if (parameters->needs_tables) {
-        TrainingReport report;
-        auto made = make_tables(*scene, settings, stop, &report);
-        if (!made.ok()) return made.status();
-        tables = std::make_shared<const SubspaceTables>(*std::move(made));
-    }
-    return Renderer::create(std::move(scene), settings, std::move(tables));
+                                                     std::stop_token stop, const TechniqueMask* mask) {
+    TrainingReport report;
+    const auto tables = make_tables(*scene, settings, std::move(stop), &report);
+    if (!tables.ok()) return tables.status();
+    return Renderer::create(std::move(scene), settings, *tables, mask);
 }
 
 }  // namespace lightloom

@@ -3,11 +3,11 @@
 // light that is hard to find is in them too. They never enter an image, and their random numbers are not those of the same job's.
 
 #include <cstdint>
+#include <memory>
 #include <stop_token>
 
 #include "common/scene/scene.h"
-#include "common/tables/train.h"
-#include "common/transport/parameters.h"
+#include "common/transport/learning.h"
 #include "common/transport/renderer.h"
 
 namespace lightloom {
@@ -22,19 +22,19 @@ struct TrainingWork {
     uint64_t first_sample = 0;
     uint64_t sample_count = 0;
     uint64_t total_samples = 0;  ///< Of the whole dataset: sets the size of the blocks.
+    friend bool operator==(const TrainingWork&, const TrainingWork&) = default;
 };
 
-/// Traces training units of one scene. Two rounds: a pilot by classic pairing, which needs nothing; then, guided by the pilot's
-/// tables, subspace connections, which find far more of the light that is hard to find. The tables that render are trained on the
-/// second round alone: its paths have the smaller variance, and the pilot's few would outvote them.
+/// Traces training units of one scene: without a guide by classic pairing, which needs nothing; guided by the tables of an earlier
+/// round by subspace connections, which find far more of the light that is hard to find. What renders is learned from the last
+/// round alone: its paths have the smaller variance, and the few of a pilot would outvote them.
 class TrainingGenerator {
   public:
-    /// `scene` must outlive the generator. Without `guide`: a pilot.
-    static Result<TrainingGenerator> create(const Scene& scene, const RenderSettings& settings,
-                                            const SubspaceTables* guide = nullptr);
+    /// `scene` must outlive the generator. The algorithm must be one that learns.
+    static Result<TrainingGenerator> create(const Scene& scene, const RenderSettings& settings, const Tables& guide = {});
 
     /// Camera samples first_sample .. of a sequence that is spread evenly over the frame, and as many light sub-paths: each
-    /// sample its own (pilot), or all of the unit's shared in a cache (guided). Of these, and of more where they are not enough,
+    /// sample its own (no guide), or all of the unit's shared in a cache (guided). Of these, and of more where they are not enough,
     /// energy_paths per sample are kept for Q. The result does not depend on the number of
     /// threads. kCancelled after a stop request.
     Result<TrainingData> trace(const TrainingWork& work, std::stop_token stop) const;
@@ -47,23 +47,21 @@ class TrainingGenerator {
     Result<TrainingData> trace_guided(const Unit& unit) const;
 
     const Scene* scene_;
-    TransportParameters parameters_;
+    RouletteRule roulette_;
+    LearningPlan plan_;
+    Heuristic heuristic_ = Heuristic::kBalance;
+    uint64_t light_paths_per_iteration_ = 0;  ///< Of the render to come.
     std::shared_ptr<const PreparedTables> guide_;
     uint64_t seed_ = 0;
-    int max_depth_ = 0;
+    int max_edges_ = 0;
 };
 
-/// A pilot's unit.
-Result<TrainingData> trace_training(const Scene& scene, const RenderSettings& settings, const TrainingWork& work,
-                                    std::stop_token stop);
-
-/// Training on this machine alone: traces unit by unit, as a coordinator has it done by workers, and trains. The tables
-/// have the same bytes as that coordinator's.
-Result<SubspaceTables> make_tables(const Scene& scene, const RenderSettings& settings, std::stop_token stop,
-                                   TrainingReport* report);
+/// Learning on this machine alone: traces unit by unit, as a coordinator has it done by workers, and learns. The tables
+/// have the same bytes as that coordinator's. Empty for an algorithm that needs none.
+Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, std::stop_token stop, TrainingReport* report);
 
 /// Renderer::create() for a process on its own: makes the tables first where the algorithm needs them.
 Result<std::unique_ptr<Renderer>> create_with_tables(std::shared_ptr<const Scene> scene, const RenderSettings& settings,
-                                                     std::stop_token stop);
+                                                     std::stop_token stop, const TechniqueMask* mask = nullptr);
 
 }  // namespace lightloom

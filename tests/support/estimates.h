@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <functional>
 #include <map>
+#include <optional>
 #include <sstream>
 
 #include "common/transport/bdpt.h"
-#include "common/transport/light.h"
-#include "common/transport/path.h"
 #include "common/transport/renderer.h"
 #include "common/transport/training.h"
 #include "common/transport/unit_loop.h"
@@ -29,62 +28,94 @@ inline std::vector<double> develop(const Partial& partial, const Rect& crop) {
     return image;
 }
 
-/// The whole frame as one unit.
-inline UnitWork whole_frame(const Scene& scene, uint32_t samples_per_pixel) {
-    const Rect& crop = scene.frame().crop;
-    return {0, samples_per_pixel, 0, crop, 0, uint64_t(samples_per_pixel) * uint64_t(crop.area())};
+/// Settings from text, as a user would write them; throws what the catalog has against them.
+inline RenderSettings settings_of(const std::string& algorithm, const std::map<std::string, std::string>& parameters = {},
+                                  uint64_t seed = 0, int max_depth = 5) {
+    auto settings = AlgorithmSettings::parse(algorithm, parameters);
+    if (!settings.ok()) throw std::runtime_error(settings.status().message());
+    return {*std::move(settings), seed, max_depth};
+}
+
+/// A unit of the whole frame with so many light paths per iteration.
+inline RenderUnit whole_frame(const Scene& scene, uint32_t iterations, uint64_t light_paths_per_iteration) {
+    return {.iteration_count = iterations, .tile = scene.frame().crop, .light_path_count = iterations * light_paths_per_iteration};
+}
+/// The one that the algorithm's plan would make.
+inline RenderUnit whole_frame(const Scene& scene, const AlgorithmSettings& algorithm, uint32_t iterations) {
+    RenderUnit unit = whole_frame(scene, iterations, algorithm.light_paths_per_iteration(scene.frame().crop.area()));
+    unit.splats_only = !algorithm.info().camera_samples;
+    return unit;
 }
 
 /// Training and caches that suit 32 x 32 pixels, for the rows of the catalog that have them; what is set already stays.
 inline std::map<std::string, std::string> with_small_training(const std::string& algorithm,
                                                               std::map<std::string, std::string> parameters) {
-    const Result<const AlgorithmInfo*> row = find_algorithm(algorithm);
+    const auto row = AlgorithmSettings::parse(algorithm, {});
     if (!row.ok()) return parameters;
     for (const auto& [name, value] : {std::pair<const char*, const char*>{"training-paths", "1500"},
                                       {"cache", "1500"},
                                       {"light-subspaces", "40"},
                                       {"eye-subspaces", "30"}})
-        if (has_parameter(**row, name)) parameters.insert({name, value});
+        if (row->has(name)) parameters.insert({name, value});
     return parameters;
 }
 
-/// A list of algorithms as the tables of test scenes hold it, space-separated. Methods with tables sample what `bdpt` samples:
-/// where that is in the list, every one of the catalog is.
+/// Whether an algorithm samples every path of a scene, of which the algorithms that do are listed, space-separated. Those that
+/// trace both sub-paths sample what `bdpt` samples.
+inline bool complete(const AlgorithmInfo& row, const std::string& list) {
+    std::istringstream words(list);
+    for (std::string name; words >> name;)
+        if (name == row.name || (name == "bdpt" && row.traces == Traces::kBoth)) return true;
+    return false;
+}
+/// The rows of the catalog for which that holds.
 inline std::vector<std::string> algorithms_of(const std::string& list) {
     std::vector<std::string> names;
-    std::istringstream words(list);
-    for (std::string name; words >> name;) names.push_back(name);
-    if (std::find(names.begin(), names.end(), "bdpt") != names.end())
-        for (const AlgorithmInfo& row : catalog())
-            if (row.needs_tables) names.emplace_back(row.name);
+    for (const AlgorithmInfo* row : catalog())
+        if (complete(*row, list)) names.emplace_back(row->name);
     return names;
 }
 
 /// Makes the image of one seed.
 using ImageOfSeed = std::function<std::vector<double>(uint64_t seed)>;
 
-/// A production algorithm from the catalog. Every seed makes its own tables.
+/// What a renderer makes of one unit.
+inline std::vector<double> image_of(const Result<std::unique_ptr<Renderer>>& renderer, const Scene& scene, const RenderUnit& unit) {
+    if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
+    const Result<Partial> partial = (*renderer)->render(unit, {});
+    if (!partial.ok()) throw std::runtime_error(partial.status().message());
+    EXPECT_EQ(partial->dropped_count, 0u);
+    return develop(*partial, scene.frame().crop);
+}
+
+/// A production algorithm from the catalog, with all of its techniques or some. Every seed makes its own tables.
 inline ImageOfSeed catalog_image(std::shared_ptr<const Scene> scene, const std::string& algorithm, int max_depth,
-                                 uint32_t samples_per_pixel, std::map<std::string, std::string> parameters = {}) {
+                                 uint32_t iterations, std::map<std::string, std::string> parameters = {},
+                                 const std::optional<TechniqueMask>& mask = {}) {
     return [=](uint64_t seed) {
-        RenderSettings settings{algorithm, with_small_training(algorithm, parameters), seed, max_depth};
-        Result<std::unique_ptr<Renderer>> renderer = create_with_tables(scene, settings, {});
-        if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
-        Result<Partial> partial = (*renderer)->render(whole_frame(*scene, samples_per_pixel), {});
-        if (!partial.ok()) throw std::runtime_error(partial.status().message());
-        EXPECT_EQ(partial->dropped_count, 0u);
-        return develop(*partial, scene->frame().crop);
+        const RenderSettings settings = settings_of(algorithm, with_small_training(algorithm, parameters), seed, max_depth);
+        return image_of(create_with_tables(scene, settings, {}, mask ? &*mask : nullptr), *scene,
+                        whole_frame(*scene, settings.algorithm, iterations));
     };
 }
 
-/// Any algorithm through the production loop.
-template <UnitAlgorithm A>
-ImageOfSeed algorithm_image(std::shared_ptr<const Scene> scene, const A& algorithm, int max_depth, uint32_t samples_per_pixel) {
+/// The same with given tables for all seeds.
+inline ImageOfSeed table_image(std::shared_ptr<const Scene> scene, const RenderSettings& settings, const Tables& tables,
+                               uint32_t iterations, const std::optional<TechniqueMask>& mask = {}) {
     return [=](uint64_t seed) {
-        RenderSettings settings;
-        settings.seed = seed;
-        settings.max_depth = max_depth;
-        Result<Partial> partial = render_unit(algorithm, *scene, settings, {}, whole_frame(*scene, samples_per_pixel), {});
+        RenderSettings own = settings;
+        own.seed = seed;
+        return image_of(Renderer::create(scene, own, tables, mask ? &*mask : nullptr), *scene,
+                        whole_frame(*scene, own.algorithm, iterations));
+    };
+}
+
+/// Any algorithm through the production loop, with one light path per sample.
+template <class A>
+ImageOfSeed algorithm_image(std::shared_ptr<const Scene> scene, const A& algorithm, int max_depth, uint32_t iterations) {
+    return [=](uint64_t seed) {
+        const Result<Partial> partial = render_unit(algorithm, *scene, seed, max_depth + 1, {},
+                                                    whole_frame(*scene, iterations, uint64_t(scene->frame().crop.area())), {});
         if (!partial.ok()) throw std::runtime_error(partial.status().message());
         EXPECT_EQ(partial->dropped_count, 0u);
         return develop(*partial, scene->frame().crop);
@@ -146,23 +177,23 @@ inline bool compare(const RegionMeans& a, const RegionMeans& b, const std::strin
 /// Light paths per iteration as production sets it.
 inline BdptSelection bdpt_selection(const Scene& scene) { return {double(scene.frame().crop.area())}; }
 
-/// bdpt with some of its techniques switched off; the weights of the others sum to one again.
-struct MaskedSelection {
-    static constexpr bool kMerges = false;
-    BdptSelection all;
-    bool hits = true, next_event = true, connections = true,
-         light_tracing = true;           ///< s = 0, s = 1, 2 <= s < k, s = k
-    int min_k = 1, max_k = kMaxEdges;    ///< Lengths that exist.
-    int max_light_vertices = kMaxEdges;  ///< Light sub-paths are cut here: techniques beyond do not exist.
-    int only_s = -1;                     ///< Only this technique; -1: all that are on.
-
-    int s_min(int k) const { return all.s_min(k); }
-    int s_max(int k) const { return std::min(all.s_max(k), max_light_vertices); }
-    bool enabled(int k, int s) const {
-        if (k < min_k || k > max_k || s > s_max(k) || (only_s >= 0 && s != only_s)) return false;
-        return s == 0 ? hits : s == 1 ? next_event : s == k ? light_tracing : connections;
+/// Estimates of the path lengths 1 .. max_length, each from an image of its own: images of different depths share samples, so
+/// that their difference would do for some algorithms and be far noisier than the length for others. One set of tables per seed.
+inline std::vector<RegionMeans> lengths_of(const std::shared_ptr<const Scene>& scene, const std::string& name, int max_length,
+                                           uint32_t iterations, int seeds, uint64_t first_seed) {
+    std::vector<RegionMeans> lengths(static_cast<size_t>(max_length));
+    for (uint64_t seed = first_seed; seed < first_seed + uint64_t(seeds); ++seed) {
+        RenderSettings settings = settings_of(name, with_small_training(name, {}), seed, max_length - 1);
+        TrainingReport report;
+        const auto tables = make_tables(*scene, settings, {}, &report);
+        if (!tables.ok()) throw std::runtime_error(tables.status().message());
+        for (int k = 1; k <= max_length; ++k) {
+            settings.max_depth = k - 1;
+            lengths[size_t(k - 1)].add(table_image(scene, settings, *tables, iterations, TechniqueMask::length(k))(seed),
+                                       scene->frame().crop);
+        }
     }
-    double connect_factor(const PathView& view, int s) const { return enabled(view.k, s) ? all.connect_factor(view, s) : 0; }
-};
+    return lengths;
+}
 
 }  // namespace lightloom::testing

@@ -8,7 +8,7 @@
 #include "common/path/connect.h"
 #include "common/path/mis.h"
 #include "common/transport/light_cache.h"
-#include "common/transport/subspace_view.h"
+#include "common/transport/renderer.h"
 
 namespace lightloom::testing {
 
@@ -147,15 +147,36 @@ inline std::optional<std::vector<PathVertex>> rebuild_camera(const Scene& scene,
     return z;
 }
 
+/// The merge of y_{s-1} with z_{t-1}: the unweighted contribution divided by the kernel 1 / (pi r^2), and the path's view.
+inline Rgb merge(const Scene& scene, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view) {
+    const PathVertex &a = y[s - 1], &b = z[t - 1];
+    const BsdfEval e = b.bsdf.eval(b.wo_local, b.shading.to_local(a.wo), TransportMode::kRadiance);
+    const Rgb contribution = b.alpha * e.f * a.alpha;
+    if (contribution.is_black()) return {};
+    const int i = s - 1, k = s + t - 2;
+    view->k = k;
+    view_light_prefix(y, s, view);
+    view_camera_suffix(z, t, k, view);
+    view->delta[i] = false;
+    view->fwd[i] = a.fwd;
+    view->rev[i] = b.fwd;
+    view->rev[i - 1] = double(e.pdf_fwd) * a.to_previous;
+    if (t >= 3) view->fwd[i + 1] = double(e.pdf_rev) * b.to_previous;
+    const Emitter& emitter = scene.emitters()[uint32_t(y[0].emitter)];
+    view->next_event = scene.emitters().pdf_next_event(emitter, y[1].p, y[0].p, y[0].ng, y[1].wo);
+    return contribution;
+}
+
 struct Rebuilt {
     Rgb contribution;  ///< Unweighted.
     PathView view;
 };
 
-/// The path as technique s would have produced it; nothing when that technique cannot. With a labeller: as a method that
-/// selects by subspaces would have, x_0 of s = 1 from a light sub-path, the view with throughput and labels.
-inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, int s, const SubspaceLabeller* labeller = nullptr) {
-    const int k = path.k();
+/// The path as a technique would have produced it; nothing when that technique cannot. With `weights`: as that algorithm would
+/// have, the view with what it adds.
+inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, Technique technique,
+                                      const PathWeights* weights = nullptr) {
+    const int k = path.k(), s = technique.s;
     const Emitter& e = scene.emitters()[uint32_t(path.x[0].emitter)];
     const auto smooth = [&](int i) { return !path.x[size_t(i)].delta && path.x[size_t(i)].bsdf.has_smooth_lobe(); };
     Rebuilt r;
@@ -163,62 +184,82 @@ inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, 
     std::optional<std::vector<PathVertex>> y, z;
     const int t = k + 1 - s;
     Vec3 towards;  // from z_{t-1} to x_{s-1}
-    if (s == 0) {
-        if (e.is_delta()) return std::nullopt;
-        WalkRay ray;
-        z = rebuild_camera(scene, path, path.infinite ? k : k + 1, &ray, path.infinite);
-        if (!z) return std::nullopt;
-        towards = ray.direction;
-        r.contribution = path.infinite ? environment_hit<ViewDetail::kSubspace>(scene, z->data(), k, ray, &r.view)
-                                       : emitter_hit<ViewDetail::kSubspace>(scene, z->data(), k + 1, &r.view);
-    } else if (s == 1) {
-        if (k < 2 || !smooth(1)) return std::nullopt;
-        z = rebuild_camera(scene, path, k, nullptr, false);
-        if (!z) return std::nullopt;
-        const PathVertex& ref = z->back();
-        NextEventSample light;
-        light.emitter = uint32_t(path.x[0].emitter);
-        light.wi = towards = path.infinite ? -path.x[0].ng : normalize(path.x[0].p - ref.p);
-        light.position = path.infinite ? ref.p + light.wi * (2 * scene.emitters().scene_radius()) : path.x[0].p;
-        light.normal = e.is_area() ? path.x[0].ng : -light.wi;
-        light.radiance = scene.emitters().emitted(e, light.normal, -light.wi);
-        light.geometry = e.is_infinite()
-                             ? 1.0f
-                             : (e.is_area() ? abs_dot(light.normal, light.wi) : 1.0f) / length_squared(light.position - ref.p);
-        if (labeller != nullptr) {
-            y = rebuild_light(scene, path, 1);
-            if (!y) return std::nullopt;
-            r.contribution = connect_candidate<ViewDetail::kSubspace>(scene, y->data(), 1, z->data(), k, &r.view, &counters);
-        } else {
+    switch (technique.kind) {
+        case TechniqueKind::kHit: {
+            if (e.is_delta()) return std::nullopt;
+            WalkRay ray;
+            z = rebuild_camera(scene, path, path.infinite ? k : k + 1, &ray, path.infinite);
+            if (!z) return std::nullopt;
+            towards = ray.direction;
+            r.contribution = path.infinite ? environment_hit<ViewDetail::kSubspace>(scene, z->data(), k, ray, &r.view)
+                                           : emitter_hit<ViewDetail::kSubspace>(scene, z->data(), k + 1, &r.view);
+            break;
+        }
+        case TechniqueKind::kNextEvent: {
+            if (k < 2 || !smooth(1)) return std::nullopt;
+            z = rebuild_camera(scene, path, k, nullptr, false);
+            if (!z) return std::nullopt;
+            const PathVertex& ref = z->back();
+            NextEventSample light;
+            light.emitter = uint32_t(path.x[0].emitter);
+            light.wi = towards = path.infinite ? -path.x[0].ng : normalize(path.x[0].p - ref.p);
+            light.position = path.infinite ? ref.p + light.wi * (2 * scene.emitters().scene_radius()) : path.x[0].p;
+            light.normal = e.is_area() ? path.x[0].ng : -light.wi;
+            light.radiance = scene.emitters().emitted(e, light.normal, -light.wi);
+            light.geometry = e.is_infinite()
+                                 ? 1.0f
+                                 : (e.is_area() ? abs_dot(light.normal, light.wi) : 1.0f) / length_squared(light.position - ref.p);
             light.pdf = scene.emitters().pdf_next_event(e, ref.p, light.position, light.normal, light.wi);
             if (!(light.pdf > 0)) return std::nullopt;
             r.contribution = next_event<ViewDetail::kSubspace>(scene, z->data(), k, light, &r.view, &counters);
+            y = rebuild_light(scene, path, 1);
+            if (!y) return std::nullopt;
+            break;
         }
-    } else if (s < k) {
-        if (!smooth(s - 1) || !smooth(s)) return std::nullopt;
-        y = rebuild_light(scene, path, s);
-        z = rebuild_camera(scene, path, t, nullptr, false);
-        if (!y || !z) return std::nullopt;
-        towards = normalize(y->back().p - z->back().p);
-        r.contribution = connect<ViewDetail::kSubspace>(scene, y->data(), s, z->data(), t, &r.view, &counters);
-    } else {
-        if (k < 2 || !smooth(k - 1)) return std::nullopt;
-        y = rebuild_light(scene, path, k);
-        if (!y) return std::nullopt;
-        z.emplace(1);
-        (*z)[0].p = path.lens;
-        towards = normalize(y->back().p - path.lens);
-        Vec2 film;
-        r.contribution = connect_to_camera(scene, y->data(), k, path.lens, &film, &r.view, &counters);
+        case TechniqueKind::kConnect: {
+            if (s < 1 || s >= k || !smooth(s) || (s > 1 && !smooth(s - 1))) return std::nullopt;
+            y = rebuild_light(scene, path, s);
+            z = rebuild_camera(scene, path, t, nullptr, false);
+            if (!y || !z) return std::nullopt;
+            towards = s == 1 && path.infinite ? -path.x[0].ng : normalize(y->back().p - z->back().p);
+            r.contribution = connect_candidate<ViewDetail::kSubspace>(scene, y->data(), s, z->data(), t, &r.view, &counters);
+            break;
+        }
+        case TechniqueKind::kLens: {
+            if (k < 2 || !smooth(k - 1)) return std::nullopt;
+            y = rebuild_light(scene, path, k);
+            if (!y) return std::nullopt;
+            z.emplace(1);
+            (*z)[0].p = path.lens;
+            towards = normalize(y->back().p - path.lens);
+            Vec2 film;
+            r.contribution = connect_to_camera(scene, y->data(), k, path.lens, &film, &r.view, &counters);
+            break;
+        }
+        case TechniqueKind::kMerge: {
+            if (s < 1 || s >= k || !smooth(s)) return std::nullopt;
+            y = rebuild_light(scene, path, s + 1);
+            z = rebuild_camera(scene, path, k + 1 - s, nullptr, false);
+            if (!y || !z) return std::nullopt;
+            r.contribution = merge(scene, y->data(), s + 1, z->data(), k + 1 - s, &r.view);
+            break;
+        }
     }
     if (r.contribution.is_black()) return std::nullopt;
-    if (labeller != nullptr && k >= 2) {
-        if (y) labeller->label_light_path(y->data(), int(y->size()));
+    if (weights != nullptr && k >= 2 && technique.kind != TechniqueKind::kMerge) {
+        if (y) weights->label_light_path(scene, y->data(), int(y->size()));
         for (size_t j = 1; j < z->size(); ++j)
-            if ((*z)[j].bsdf.has_smooth_lobe()) labeller->label_camera_vertex(&(*z)[j]);
-        labeller->complete(y ? y->data() : nullptr, s, z->data(), int(z->size()), towards, &r.view);
+            if ((*z)[j].bsdf.has_smooth_lobe()) weights->label_camera_vertex(scene, &(*z)[j]);
+        weights->complete(scene, y ? y->data() : nullptr, s, z->data(), int(z->size()), towards, &r.view);
     }
     return r;
+}
+
+/// Calls visit(technique) for everything that could have made a path of k edges, whoever has such a technique.
+template <class Visit>
+void for_each_technique(int k, Visit&& visit) {
+    for (int s = 0; s <= k; ++s) for_each_technique_of_split(s, k, visit);
+    for (int i = 1; i < k; ++i) visit(Technique::merge(i));
 }
 
 }  // namespace lightloom::testing

@@ -1,0 +1,41 @@
+#pragma once
+// Corrections of the weights for what their densities do not say: how many of a technique's n samples count. A correction is a
+// function of the path, so weights with it sum to one as well; none of them touches a mean.
+
+#include "common/path/correlation.h"
+#include "common/path/mis.h"
+
+namespace lightloom {
+
+enum class Correction : uint8_t {
+    kUncorrected,
+    kCorrelation,  ///< Connections that share a camera sub-path [Grittmann, Georgiev and Slusallek 2021]; correlation.h.
+};
+
+/// A selection of which n c_s connections count instead of n. Inner::OnPath says how many there are, connections(), and what
+/// sigma is if only a share of them counts, connect(s, share). Its view must have what view_footprint() writes.
+template <class Inner>
+struct Corrected {
+    Inner inner;
+    Correction correction = Correction::kUncorrected;
+
+    struct OnPath : Inner::OnPath {
+        Correction correction;
+
+        double connect(int s) const { return Inner::OnPath::connect(s, share(s)); }
+
+      private:
+        double share(int s) const {
+            switch (correction) {
+                case Correction::kUncorrected: return 1;
+                // One factor at a time costs as much per weight as there are possible connections times edges; products that
+                // grow along the path would round otherwise, and the bytes of every image with them.
+                case Correction::kCorrelation: return correlation_factor(this->view, s, this->connections());
+            }
+            return 1;
+        }
+    };
+    OnPath on(const PathView& view) const { return OnPath{{inner.on(view)}, correction}; }
+};
+
+}  // namespace lightloom

@@ -1,0 +1,65 @@
+#pragma once
+// Leaving techniques out: the weights of those that remain sum to one again, so an image without them has the same mean wherever
+// the others can make the same paths. For measurements and tests; what a user renders with has no mask.
+
+#include <algorithm>
+
+#include "common/path/mis.h"
+
+namespace lightloom {
+
+struct TechniqueMask {
+    bool on[kTechniqueKinds] = {true, true, true, true, true};  ///< By TechniqueKind.
+    int only_s = -1;                                            ///< Only this split; -1: all.
+    int min_k = 1, max_k = kMaxEdges;                           ///< Lengths of paths, in edges, that exist.
+    int max_light_vertices = kMaxEdges;                         ///< Light sub-paths are cut there.
+
+    static TechniqueMask without(TechniqueKind kind) {
+        TechniqueMask mask;
+        mask.on[int(kind)] = false;
+        return mask;
+    }
+    static TechniqueMask length(int k) { return {.min_k = k, .max_k = k}; }
+
+    bool allows(int k, Technique t) const {
+        const int light_vertices = t.kind == TechniqueKind::kMerge ? t.s + 1 : t.s;
+        return on[int(t.kind)] && k >= min_k && k <= max_k && light_vertices <= max_light_vertices && (only_s < 0 || t.s == only_s);
+    }
+};
+
+template <class Selection>
+struct Masked {
+    Selection inner;
+    TechniqueMask mask;
+
+    struct OnPath : Selection::OnPath {
+        using Inner = typename Selection::OnPath;
+        TechniqueMask mask;
+        int k;
+
+        double hit() const {
+            return allow(Technique::hit(), [&] { return Inner::hit(); });
+        }
+        double next_event() const {
+            return allow(Technique::next_event(), [&] { return Inner::next_event(); });
+        }
+        double connect(int s) const {
+            return allow(Technique::connect(s), [&] { return Inner::connect(s); });
+        }
+        double lens() const {
+            return allow(Technique::lens(k), [&] { return Inner::lens(); });
+        }
+        double merge(int i) const {
+            return allow(Technique::merge(i), [&] { return Inner::merge(i); });
+        }
+
+      private:
+        template <class Value>
+        double allow(Technique t, Value&& value) const {
+            return mask.allows(k, t) ? value() : 0;
+        }
+    };
+    OnPath on(const PathView& view) const { return OnPath{{inner.on(view)}, mask, view.k}; }
+};
+
+}  // namespace lightloom

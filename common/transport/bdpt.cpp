@@ -1,0 +1,32 @@
+#include "common/transport/bdpt.h"
+
+#include "common/transport/unit_renderer.h"
+
+namespace lightloom {
+
+extern const AlgorithmInfo kBdptRow;
+
+namespace {
+
+constexpr ParameterInfo kParameters[] = {kRouletteStart, kRouletteMin, kHeuristic};
+
+Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
+    return make_unit_renderer(r, [&](auto&& select) {
+        const auto selection = select(BdptSelection{double(r.light_paths_per_iteration())});
+        return BdptAlgorithm<std::remove_cvref_t<decltype(selection)>>{selection, heuristic_of(r.settings.algorithm)};
+    });
+}
+
+}  // namespace
+
+const AlgorithmInfo kBdptRow{
+    .name = "bdpt",
+    .summary = "bidirectional path tracing, every camera sample paired with one light sub-path",
+    .source = "Veach 1997, chapter 10",
+    .bias = "unbiased; misses specular-diffuse-specular paths from lights that cannot be hit",
+    .parameters = kParameters,
+    .light_paths_per_pixel = one_light_path,
+    .make = make,
+};
+
+}  // namespace lightloom

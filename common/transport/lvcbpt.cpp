@@ -1,0 +1,70 @@
+#include "common/transport/lvcbpt.h"
+
+#include "common/tables/subspace_tables.h"
+#include "common/transport/learning.h"
+#include "common/transport/unit_renderer.h"
+
+namespace lightloom {
+
+extern const AlgorithmInfo kLvcbptRow;
+
+namespace {
+
+constexpr ParameterInfo kParameters[] = {
+    kRouletteStart,
+    kRouletteMin,
+    kHeuristic,
+    kLightPaths,
+    kCache,
+    kConnections,
+    {kTrainingPaths, 20000, 1, 1e8, true, "light sub-paths that count the vertices per path before rendering"},
+};
+constexpr const TablePart* kParts[] = {&SubspaceTables::kPart};
+
+LearningPlan plan(const AlgorithmSettings& s) {
+    const uint64_t samples = uint64_t(s.value(kTrainingPaths));
+    return {.samples = samples, .rounds = {{samples}}, .connections = CacheParameters::of(s).connections};
+}
+
+/// One subspace on each side: uniform selection, of which only the vertices per path are learned.
+Result<Tables> learn(const LearnRequest& r) {
+    const CacheParameters p = CacheParameters::of(r.settings.algorithm);
+    TrainingOptions options;
+    options.light_subspaces = options.eye_subspaces = 1;
+    options.connections = p.connections;
+    options.nominal_paths = double(p.minimum_paths);
+    options.seed = r.settings.seed;
+    auto tables = train_tables(r.data, r.emitters, options, r.control, r.report);
+    if (!tables.ok()) return tables.status();
+    return Tables(*std::move(tables));
+}
+
+constexpr LearningInfo kLearning{.parts = kParts, .plan = plan, .learn = learn};
+
+Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
+    const AlgorithmSettings& settings = r.settings.algorithm;
+    const CacheParameters p = CacheParameters::of(settings);
+    const double vertices_per_path = r.tables.get<SubspaceTables>()->vertices_per_path;
+    return make_unit_renderer(r, [&](auto&& select) {
+        const auto selection =
+            select(UniformSelection{double(r.light_paths_per_iteration()), double(p.connections) / vertices_per_path,
+                                    TypicalSurvival(roulette_of(settings))});
+        return LvcbptAlgorithm<std::remove_cvref_t<decltype(selection)>>{
+            {selection, p.connections}, heuristic_of(settings), p.minimum_paths};
+    });
+}
+
+}  // namespace
+
+const AlgorithmInfo kLvcbptRow{
+    .name = "lvcbpt",
+    .summary = "bidirectional path tracing with a light-vertex cache, vertices drawn uniformly",
+    .source = "Davidovic, Krivanek, Hasan and Slusallek 2014, section 4.1",
+    .bias = "unbiased; misses what bdpt misses",
+    .parameters = kParameters,
+    .light_paths_per_pixel = chosen_light_paths,
+    .learning = &kLearning,
+    .make = make,
+};
+
+}  // namespace lightloom

@@ -1,0 +1,32 @@
+#include "common/transport/path.h"
+
+#include "common/transport/unit_renderer.h"
+
+namespace lightloom {
+
+extern const AlgorithmInfo kPathRow;
+
+namespace {
+
+constexpr ParameterInfo kParameters[] = {kRouletteStart, kRouletteMin, kHeuristic};
+
+Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
+    return make_unit_renderer(r, [&](auto&& select) {
+        const auto selection = select(PathSelection{});
+        return PathAlgorithm<std::remove_cvref_t<decltype(selection)>>{selection, heuristic_of(r.settings.algorithm)};
+    });
+}
+
+}  // namespace
+
+const AlgorithmInfo kPathRow{
+    .name = "path",
+    .summary = "unidirectional path tracing with next event estimation",
+    .source = "Kajiya 1986; Veach 1997, section 9.3",
+    .bias = "unbiased; misses caustics of lights that cannot be hit",
+    .parameters = kParameters,
+    .traces = Traces::kCamera,
+    .make = make,
+};
+
+}  // namespace lightloom

@@ -1,0 +1,92 @@
+#include "common/transport/settings.h"
+
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+#include "common/path/path_view.h"
+
+namespace lightloom {
+namespace {
+
+/// The value of a parameter from its text, or why it has none.
+Result<double> parse_value(const AlgorithmInfo& algorithm, const ParameterInfo& p, const std::string& text) {
+    double v = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), v);
+    bool number = error == std::errc() && end == text.data() + text.size() && std::isfinite(v);
+    std::string names;
+    for (size_t c = 0; c < p.choices.size(); ++c) {
+        names += (c ? ", " : " (") + std::string(p.choices[c]);
+        if (p.choices[c] == text) v = double(c), number = true;
+    }
+    if (number && v >= p.min_value && v <= p.max_value && !(p.integer && v != std::floor(v))) return v;
+    std::ostringstream message;
+    message << "parameter " << p.name << "=" << text << " of '" << algorithm.name << "' must be "
+            << (p.integer ? "an integer" : "a number") << " from " << p.min_value << " to " << p.max_value << names
+            << (names.empty() ? "" : ")");
+    return invalid_argument(message.str());
+}
+
+}  // namespace
+
+AlgorithmSettings::AlgorithmSettings() : AlgorithmSettings(*catalog().front()) {}
+
+AlgorithmSettings::AlgorithmSettings(const AlgorithmInfo& info) : info_(&info), chosen_(info.parameters.size(), false) {
+    for (const ParameterInfo& p : info.parameters) values_.push_back(p.default_value);
+}
+
+Result<AlgorithmSettings> AlgorithmSettings::parse(std::string_view name, const std::map<std::string, std::string>& set) {
+    const auto info = find_algorithm(name);
+    if (!info.ok()) return invalid_argument(info.status().message());
+    AlgorithmSettings settings(**info);
+    for (const auto& [key, text] : set) {
+        const size_t i = settings.index(key);
+        if (i == settings.values_.size())
+            return invalid_argument("algorithm '" + settings.name() + "' has no parameter '" + key +
+                                    "'; `lightloom algorithms` lists them");
+        const auto value = parse_value(**info, (*info)->parameters[i], text);
+        if (!value.ok()) return value.status();
+        settings.values_[i] = *value;
+        settings.chosen_[i] = true;
+    }
+    return settings;
+}
+
+size_t AlgorithmSettings::index(std::string_view parameter) const {
+    size_t i = 0;
+    while (i < info_->parameters.size() && info_->parameters[i].name != parameter) ++i;
+    return i;
+}
+
+double AlgorithmSettings::value(std::string_view parameter) const { return values_.at(index(parameter)); }
+
+bool AlgorithmSettings::chosen(std::string_view parameter) const { return has(parameter) && chosen_[index(parameter)]; }
+
+AlgorithmSettings AlgorithmSettings::with(std::string_view parameter, double value) const {
+    AlgorithmSettings changed = *this;
+    changed.values_.at(index(parameter)) = value;
+    return changed;
+}
+
+std::map<std::string, std::string> AlgorithmSettings::text() const {
+    std::map<std::string, std::string> out;
+    for (size_t i = 0; i < values_.size(); ++i) {
+        char text[64];
+        const auto end = std::to_chars(text, text + sizeof text, values_[i]).ptr;
+        out[std::string(info_->parameters[i].name)] = std::string(text, end);
+    }
+    return out;
+}
+
+uint64_t AlgorithmSettings::light_paths_per_iteration(int64_t crop_pixels) const {
+    const double paths = light_paths_per_pixel() * double(crop_pixels);
+    return paths > 0 ? std::max<uint64_t>(1, uint64_t(std::llround(paths))) : 0;
+}
+
+Status check_depth(int max_depth) {
+    if (max_depth >= 0 && max_depth + 1 <= kMaxEdges) return {};
+    return invalid_argument("max depth must lie between 0 and " + std::to_string(kMaxEdges - 1) + ", not " +
+                            std::to_string(max_depth));
+}
+
+}  // namespace lightloom

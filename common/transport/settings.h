@@ -1,0 +1,66 @@
+#pragma once
+// Settings of a render: checked once, where text comes in, and carried as a typed object from then on.
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/core/result.h"
+#include "common/transport/catalog.h"
+
+namespace lightloom {
+
+/// An algorithm of the catalog with a value for each of its parameters. What exists is valid.
+class AlgorithmSettings {
+  public:
+    /// The catalog's first algorithm with its defaults.
+    AlgorithmSettings();
+    /// kInvalidArgument for an algorithm that the catalog does not have (naming those that it has), for a parameter that is another
+    /// algorithm's, and for a value that is no number or name of a choice or is out of range.
+    static Result<AlgorithmSettings> parse(std::string_view name, const std::map<std::string, std::string>& set);
+
+    const AlgorithmInfo& info() const { return *info_; }
+    std::string name() const { return std::string(info_->name); }
+    bool has(std::string_view parameter) const { return index(parameter) < values_.size(); }
+    /// Of a parameter that the algorithm has.
+    double value(std::string_view parameter) const;
+    /// Whether the text that these settings come from named the parameter.
+    bool chosen(std::string_view parameter) const;
+    /// The same with one parameter changed to a value in its range.
+    AlgorithmSettings with(std::string_view parameter, double value) const;
+    /// All parameters with their values as canonical text, so that an image says what was rendered even where defaults applied.
+    std::map<std::string, std::string> text() const;
+
+    /// N1: light paths per pixel and iteration; 0 for an algorithm that traces none.
+    double light_paths_per_pixel() const { return info_->light_paths_per_pixel ? info_->light_paths_per_pixel(*this) : 0; }
+    /// N1 |crop| as a whole number, at least one where the algorithm traces light: a constant of the frame, so that the weights of
+    /// every group reckon with what the group really traces.
+    uint64_t light_paths_per_iteration(int64_t crop_pixels) const;
+
+    /// The same algorithm with the same values, however they came about.
+    friend bool operator==(const AlgorithmSettings& a, const AlgorithmSettings& b) {
+        return a.info_ == b.info_ && a.values_ == b.values_;
+    }
+
+  private:
+    explicit AlgorithmSettings(const AlgorithmInfo& info);
+    size_t index(std::string_view parameter) const;
+
+    const AlgorithmInfo* info_;
+    std::vector<double> values_;  ///< By place in info_->parameters.
+    std::vector<bool> chosen_;
+};
+
+struct RenderSettings {
+    AlgorithmSettings algorithm;
+    uint64_t seed = 0;
+    int max_depth = 5;  ///< Bounces; paths have at most max_depth + 1 edges.
+
+    int max_edges() const { return max_depth + 1; }
+};
+
+/// kInvalidArgument when the depth is out of range.
+Status check_depth(int max_depth);
+
+}  // namespace lightloom

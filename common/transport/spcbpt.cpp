@@ -1,0 +1,119 @@
+#include "common/transport/spcbpt.h"
+
+#include "common/transport/learning.h"
+#include "common/transport/unit_renderer.h"
+
+namespace lightloom {
+
+extern const AlgorithmInfo kSpcbptRow;
+
+namespace {
+
+constexpr std::string_view kTrainers[] = {"mm", "adam", "contribution"};
+
+constexpr ParameterInfo kParameters[] = {
+    kRouletteStart,
+    kRouletteMin,
+    kHeuristic,
+    kLightPaths,
+    kCache,
+    kConnections,
+    {"light-subspaces", 1000, 1, 16384, true, "N_L: upper bound of the light subspaces [Su et al. 2022, section 8.1]"},
+    {"eye-subspaces", 1000, 1, 16384, true, "N_E: upper bound of the eye subspaces [Su et al. 2022, section 8.1]"},
+    {"source-share", 0.2, 0, 1, false, "share of N_L that divides the lights themselves [Su et al. 2022, section 7.2.1]"},
+    {kTrainingPaths, 500000, 1, 1e8, true,
+     "D: camera samples of the training set, each with a light sub-path [Su et al. 2022: 1e6]"},
+    {"energy-paths", 1, 0.01, 16, false,
+     "M' over D: light sub-paths that measure Q, per camera sample of the training set [Su et al. 2022: 2]"},
+    {"pilot", 0.2, 0, 1, false,
+     "share of the training set that is traced first, to guide the tracing of the rest; 0: no second round [own; measured]"},
+    {"direction-weight", 0.05, 0, 10, false, "k_d: weight of directions in the distance of sub-paths [Su et al. 2022, eq. 18]"},
+    {"mix", 0.1, 0.001, 1, false,
+     "share of Gamma that is not learned: half uniform, half in proportion to Q "
+     "[Su et al. 2022, section 7.3: uniform alone]"},
+    {"trainer", 0, 0, 2, true,
+     "of Gamma: mm (majorise-minimise with a held-out prior; own), adam "
+     "[Su et al. 2022, section 7.3], contribution (their figure 6)",
+     kTrainers},
+    {"windows", 1, 1, 32, true,
+     "J_max: light-only windows that rarely hit subspaces may keep "
+     "[in place of the reuse of Su et al. 2022, section 7.4]"},
+    {"reuse-target", 200, 1, 1e6, false,
+     "M0: light prefixes that a subspace should hold, as far as windows allow "
+     "[Su et al. 2022, section 7.4]"},
+    {"correlation-aware", 1, 0, 1, true,
+     "weights know that the N connections of a vertex share its camera sub-path [Grittmann et al. 2021]", kSwitch},
+    {"ris-aware", 0, 0, 1, true,
+     "weights know that a cache of M paths limits what a subspace can deliver "
+     "[Nabata et al. 2020, eq. 9]",
+     kSwitch},
+};
+static_assert(SubspaceTables::kMaxSubspaces == 16384 && SubspaceTables::kMaxWindow == 32, "the ranges above");
+constexpr const TablePart* kParts[] = {&SubspaceTables::kPart};
+
+Correction correction_of(const AlgorithmSettings& s) {
+    return s.value("correlation-aware") != 0 ? Correction::kCorrelation : Correction::kUncorrected;
+}
+
+LearningPlan plan(const AlgorithmSettings& s) {
+    const uint64_t samples = uint64_t(s.value(kTrainingPaths));
+    return {.samples = samples,
+            .energy_paths = s.value("energy-paths"),
+            .rounds = rounds_with_pilot(samples, s.value("pilot")),
+            .connections = CacheParameters::of(s).connections,
+            .correction = correction_of(s)};
+}
+
+Result<Tables> learn(const LearnRequest& r) {
+    const AlgorithmSettings& s = r.settings.algorithm;
+    const CacheParameters p = CacheParameters::of(s);
+    TrainingOptions options;
+    options.light_subspaces = uint32_t(s.value("light-subspaces"));
+    options.eye_subspaces = uint32_t(s.value("eye-subspaces"));
+    options.source_share = s.value("source-share");
+    options.direction_weight = s.value("direction-weight");
+    options.mix = s.value("mix");
+    options.trainer = GammaTrainer(int(s.value("trainer")));
+    options.connections = p.connections;
+    options.reuse_windows = int(s.value("windows"));
+    options.reuse_target = s.value("reuse-target");
+    options.nominal_paths = double(p.minimum_paths);
+    options.seed = r.settings.seed;
+    auto tables = train_tables(r.data, r.emitters, options, r.control, r.report);
+    if (!tables.ok()) return tables.status();
+    return Tables(*std::move(tables));
+}
+
+constexpr LearningInfo kLearning{.parts = kParts, .plan = plan, .learn = learn};
+
+Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
+    const AlgorithmSettings& settings = r.settings.algorithm;
+    const CacheParameters p = CacheParameters::of(settings);
+    const auto prepared = std::make_shared<const PreparedTables>(*r.tables.get<SubspaceTables>());
+    const SpcbptSelection densities =
+        spcbpt_selection(prepared, {.light_paths_per_iteration = double(r.light_paths_per_iteration()),
+                                    .connections = p.connections,
+                                    .cache_paths = settings.value("ris-aware") != 0 ? double(p.minimum_paths) : 0,
+                                    .correction = correction_of(settings),
+                                    .roulette = roulette_of(settings)});
+    return make_unit_renderer(r, [&](auto&& select) {
+        const auto selection = select(densities);
+        return SpcbptAlgorithm<std::remove_cvref_t<decltype(selection)>>{
+            {selection, prepared, p.connections}, heuristic_of(settings), p.minimum_paths};
+    });
+}
+
+}  // namespace
+
+const AlgorithmInfo kSpcbptRow{
+    .name = "spcbpt",
+    .summary = "subspace-based probabilistic connections: learns which light sub-paths matter to which camera sub-paths",
+    .source = "Su, Li and Wang 2022",
+    .bias = "unbiased; misses what bdpt misses",
+    .parameters = kParameters,
+    .light_paths_per_pixel = chosen_light_paths,
+    .learning = &kLearning,
+    .make = make,
+};
+
+}  // namespace lightloom
