@@ -8,7 +8,6 @@
 
 #include "common/core/atomic_file.h"
 #include "common/path/path_view.h"
-#include "common/transport/catalog.h"
 #include "server/job_record.h"
 #include "server/results.h"
 
@@ -90,10 +89,6 @@ void Coordinator::changed(JobRecord& job) {
 Result<JobSpec> Coordinator::canonical_spec(const JobSpec& spec) const {
     JobSpec out = spec;
     out.frame = {};
-    const auto algorithm = find_algorithm(spec.algorithm);
-    if (!algorithm.ok()) return invalid_argument(algorithm.status().message());
-    const auto parameters = parse_parameters(**algorithm, spec.parameters);
-    if (!parameters.ok()) return parameters.status();
     if ((spec.samples_per_pixel > 0) == (spec.time_limit_seconds > 0))
         return invalid_argument("a job needs either a number of samples per pixel or a time limit");
     if (spec.samples_per_pixel > JobSpec::kMaxSamplesPerPixel)
@@ -155,7 +150,7 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     job.directory = options_.directory / "jobs" / job.id;
     jobs_.push_back(std::move(record));
     requests_[request_id] = &job;
-    spdlog::info("{}: accepted, {} {}", job.id, spec.algorithm, job.spec.scene_root.hex().substr(0, 12));
+    spdlog::info("{}: accepted, {} {}", job.id, spec.algorithm.name(), job.spec.scene_root.hex().substr(0, 12));
     start_task(job, &job.prepare_task, "to prepare this job: its scene or frame is too large",
                [this, &job](std::stop_token stop) { return prepare(job, stop); });
     return job.info(options_.clock());

@@ -108,7 +108,7 @@ class Coordinator {
     /// changed(), for those as well that wait for this job's tables.
     void prepared_further(JobRecord& job);
     Status take_over_tables(JobRecord& job);
-    void open_training(JobRecord& job, UnitKind kind, const TrainingWork& work);
+    void open_training(JobRecord& job, UnitKind kind, uint32_t round, const TrainingWork& work);
     void open_first_round(JobRecord& job);
     class Tracing;  ///< What learning asks of the coordinator for one job.
     Status learn(JobRecord& job, std::stop_token stop);

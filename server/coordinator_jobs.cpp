@@ -9,7 +9,6 @@
 #include <system_error>
 
 #include "common/core/atomic_file.h"
-#include "common/transport/catalog.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
 #include "server/results.h"
@@ -65,23 +64,18 @@ Status Coordinator::prepare(JobRecord& job, std::stop_token stop) {
     const Rect& crop = facts->frame.crop;
     if (crop.empty() || crop.area() > kMaxPartialPixels)
         return invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) + " pixels");
-    const auto algorithm = find_algorithm(spec.algorithm);
-    const auto parameters = parse_parameters(**algorithm, spec.parameters);
     spec.frame = facts->frame;
-    spec.parameters = complete_parameters(**algorithm, *parameters);
     if (spec.max_depth < 0) spec.max_depth = facts->max_depth;
-    if ((*algorithm)->needs_tables) return prepare_tables(job, std::move(spec), *std::move(facts), true);
+    if (spec.algorithm.info().learning) return prepare_tables(job, std::move(spec), *std::move(facts), true);
     plan_units(job, std::move(spec), *std::move(facts), {});
     return {};
 }
 
 void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables) {
     const FrameLayout frame = facts.frame;
-    const auto algorithm = find_algorithm(spec.algorithm);
-    const auto parameters = parse_parameters(**algorithm, spec.parameters);
-    const Plan plan(frame, light_paths_per_pixel(**algorithm, *parameters));
-    const double unit_light_paths = light_paths_per_pixel(**algorithm, *parameters) * plan.max_group_iterations() *
-                                    double(frame.crop.area()) / plan.tile_count();
+    const Plan plan(frame, spec.algorithm);
+    const double unit_light_paths = double(spec.algorithm.light_paths_per_iteration(frame.crop.area())) *
+                                    plan.max_group_iterations() / plan.tile_count();
     std::optional<UnitTable> units;
     units.emplace(plan, spec.samples_per_pixel, 1, options_.shuffle_seed);
     auto reducer = std::make_shared<Reducer>(frame, plan.tile_count());

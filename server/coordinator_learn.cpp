@@ -5,7 +5,6 @@
 
 #include <chrono>
 
-#include "common/transport/parameters.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
 #include "server/learn_tables.h"
@@ -36,7 +35,7 @@ class Coordinator::Tracing final : public TracingPort {
             if (!alive()) return over();
             TrainingRound& round = *job_.round;
             if (!round.complete()) continue;
-            TracedRound traced{.kind = round.kind(), .work = round.work(), .data = {}, .worker_seconds = round.traced_seconds()};
+            TracedRound traced{.kind = round.kind(), .round = round.number(), .work = round.work(), .data = {}, .worker_seconds = round.traced_seconds()};
             const TimePoint begin = job_.round_begin;
             auto parts = round.take();
             lock.unlock();
@@ -57,7 +56,7 @@ class Coordinator::Tracing final : public TracingPort {
             job_.round->put_back(std::move(parts));
             for (const auto& [unit, why] : bad) {
                 ++job_.rejected;
-                coordinator_.unit_failed(job_, {unit, 0, job_.round->kind()}, job_.round->refuse(unit), why);
+                coordinator_.unit_failed(job_, job_.round->key(unit), job_.round->refuse(unit), why);
                 if (!alive()) return over();  // the unit has failed too often
             }
         }
@@ -107,8 +106,14 @@ class Coordinator::Tracing final : public TracingPort {
         coordinator_.prepared_further(job_);
     }
 
-    Status open_guided_round(const SubspaceTables& pilot, const TrainingWork& work) override {
-        auto bytes = std::make_shared<const std::string>(serialize(pilot));
+    Status open_round(uint32_t round, const Tables& guide, const TrainingWork& work) override {
+        if (guide.empty()) {
+            const std::lock_guard lock(coordinator_.mutex_);
+            if (!alive()) return over();
+            coordinator_.open_training(job_, UnitKind::kTraining, round, work);
+            return {};
+        }
+        auto bytes = std::make_shared<const std::string>(serialize(guide));
         const Digest digest = sha256(*bytes);
         {
             const std::lock_guard lock(coordinator_.mutex_);
@@ -122,7 +127,7 @@ class Coordinator::Tracing final : public TracingPort {
             coordinator_.drop_tables(digest);
             return over();
         }
-        coordinator_.open_training(job_, UnitKind::kTraining, work);
+        coordinator_.open_training(job_, UnitKind::kTraining, round, work);
         return {};
     }
 
@@ -173,9 +178,8 @@ Status Coordinator::finish_tables(JobRecord& job, LearnedTables learned) {
 }
 
 void Coordinator::open_first_round(JobRecord& job) {
-    const auto parameters = TransportParameters::read(render_settings(job.spec));  // was read before: valid
-    const uint64_t samples = parameters->training_samples, pilot = parameters->pilot_samples;
-    open_training(job, pilot > 0 ? UnitKind::kPilot : UnitKind::kTraining, {0, pilot > 0 ? pilot : samples, samples});
+    const AlgorithmSettings& algorithm = job.spec.algorithm;
+    open_training(job, UnitKind::kTraining, 0, algorithm.info().learning->plan(algorithm).work(0));
 }
 
 }  // namespace lightloom

@@ -8,21 +8,11 @@
 #include <chrono>
 #include <thread>
 
-#include "common/transport/catalog.h"
-#include "common/transport/parameters.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
 #include "server/training_budget.h"
 
 namespace lightloom {
-namespace {
-
-uint64_t training_samples(const JobSpec& spec) {
-    const auto algorithm = find_algorithm(spec.algorithm);
-    return uint64_t(parameter_value(**algorithm, *parse_parameters(**algorithm, spec.parameters), kTrainingPaths));
-}
-
-}  // namespace
 
 void Coordinator::discard_training(JobRecord& job) {
     discarded_.push_back(std::make_shared<SceneFacts>(std::exchange(job.facts, {})));
@@ -35,8 +25,8 @@ void Coordinator::discard_round(JobRecord& job) {
     job.round.reset();
 }
 
-void Coordinator::open_training(JobRecord& job, UnitKind kind, const TrainingWork& work) {
-    job.round.emplace(kind, work, options_.shuffle_seed);
+void Coordinator::open_training(JobRecord& job, UnitKind kind, uint32_t round, const TrainingWork& work) {
+    job.round.emplace(kind, round, work, options_.shuffle_seed);
     job.round_begin = {};
     job.phase = kind == UnitKind::kProbe ? PreparePhase::kProbing : PreparePhase::kTracing;
     prepared_further(job);
@@ -48,9 +38,9 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
     const std::lock_guard lock(mutex_);
     if (job.state != JobState::kPreparing) return {};
     // Who chose the training set knows what it costs; and what a probe has chosen already stays.
-    const bool chosen = job.submitted.parameters.contains(kTrainingPaths) || job.capped_by_time_limit;
+    const bool chosen = job.submitted.algorithm.chosen(kTrainingPaths) || job.capped_by_time_limit;
     const bool open_size = spec.time_limit_seconds > 0 && !chosen;
-    const uint64_t samples = training_samples(spec);
+    const uint64_t samples = uint64_t(spec.algorithm.value(kTrainingPaths));
     job.table_key = table_key(options_.identity, spec);
     job.spec = std::move(spec);
     job.facts = std::move(facts);
@@ -62,7 +52,7 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
     if (probes) {
         const auto roomy = uint64_t(std::min(job.spec.time_limit_seconds * kProbeSamplesPerSecond, double(kTrainingUnitSamples)));
         const uint64_t probe = std::min(std::max(kProbeSamples, roomy), samples);
-        open_training(job, UnitKind::kProbe, {0, probe, probe});
+        open_training(job, UnitKind::kProbe, 0, {0, probe, probe});
     } else {
         open_first_round(job);
     }
@@ -137,7 +127,7 @@ Status Coordinator::take_over_tables(JobRecord& job) {
 
 bool Coordinator::adopt_cached_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts) {
     const Digest key = table_key(options_.identity, spec);
-    auto entry = table_cache_.find(key);
+    auto entry = table_cache_.find(key, spec.algorithm.info().learning->parts);
     if (!entry) return false;
     spdlog::info("{}: tables {} of an earlier job are used again", job.id, entry->info.asset.digest.hex().substr(0, 12));
     entry->info.capped_by_time_limit = job.capped_by_time_limit;
@@ -248,10 +238,12 @@ bool Coordinator::repair_tables(const std::string& job_id) {
     std::shared_ptr<const std::string> guide;
     AssetReference asset;
     Digest cache_key;
+    std::span<const TablePart* const> parts;
     {
         const std::lock_guard lock(mutex_);
         job = find_job(job_id);
-        if (!job || is_terminal(job->state)) return false;
+        if (!job || is_terminal(job->state) || !job->spec.algorithm.info().learning) return false;
+        parts = job->spec.algorithm.info().learning->parts;
         guide = job->guide_bytes;
         asset = guide ? job->guide : job->tables.asset;
         cache_key = job->tables.cache_key;
@@ -261,7 +253,7 @@ bool Coordinator::repair_tables(const std::string& job_id) {
     const std::lock_guard only_one(repair_mutex_);
     if (assets_.read(digest).ok()) return false;  // the worker's own trouble, or repaired meanwhile
     assets_.remove(digest);
-    const auto entry = guide ? std::nullopt : table_cache_.find(cache_key);
+    const auto entry = guide ? std::nullopt : table_cache_.find(cache_key, parts);
     const bool cached = entry && entry->info.asset.digest == digest;
     const Status stored = guide    ? assets_.put(digest, *guide)
                           : cached ? assets_.put(digest, entry->bytes)

@@ -163,7 +163,7 @@ Result<PartialExpectation> Coordinator::expected_partial(const UnitReference& re
     if (!job || job->state != JobState::kRunning) return not_running(reference.job_id);
     const auto unit = reference.key.kind == UnitKind::kRender ? job->units->find(reference.key) : std::nullopt;
     if (!unit) return invalid_argument("job " + reference.job_id + " has leased no such unit");
-    return PartialExpectation{job->spec.frame, unit->tile, unit->iteration_count, unit->light_path_count};
+    return PartialExpectation{job->spec.frame, unit->render.tile, unit->render.samples_per_pixel(), unit->render.light_path_count};
 }
 
 Result<SubmitAck> Coordinator::submit_payload(const std::string& worker_id, const UnitReference& unit,
@@ -233,7 +233,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     }
     const UnitCounters counters = partial.counters;
     const uint64_t dropped = partial.dropped_count;
-    const double splats_per_path = unit.light_path_count > 0 ? double(partial.splats.size()) / double(unit.light_path_count) : 0;
+    const double splats_per_path = unit.render.light_path_count > 0 ? double(partial.splats.size()) / double(unit.render.light_path_count) : 0;
     const auto refused = reducer->add(unit, std::move(partial));
 
     const std::lock_guard lock(mutex_);
@@ -251,7 +251,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     }
     if (!own.ok()) return SubmitAck{SubmitOutcome::kRejected, own.message()};
     if (job->state != JobState::kRunning) return SubmitAck{SubmitOutcome::kStale, "the job failed meanwhile: " + job->message};
-    if (unit.light_path_count > 0 && splats_per_path > job->splats_per_path.value_or(-1)) {
+    if (unit.render.light_path_count > 0 && splats_per_path > job->splats_per_path.value_or(-1)) {
         job->splats_per_path = splats_per_path;
         size_window(*job);
     }

@@ -2,34 +2,25 @@
 
 #include <algorithm>
 
-#include "common/transport/catalog.h"
 #include "common/transport/parameters.h"
 #include "server/training_budget.h"
 
 namespace lightloom {
 namespace {
 
-/// The spec with another size of the training set, in canonical text.
-JobSpec with_training_samples(const JobSpec& spec, uint64_t samples) {
-    JobSpec out = spec;
-    out.parameters[kTrainingPaths] = std::to_string(samples);
-    const auto algorithm = find_algorithm(out.algorithm);
-    const auto parameters = parse_parameters(**algorithm, out.parameters);
-    out.parameters = complete_parameters(**algorithm, *parameters);
-    return out;
-}
+LearningPlan plan_of(const AlgorithmSettings& algorithm) { return algorithm.info().learning->plan(algorithm); }
 
 Result<AffordableSet> affordable_set(const JobSpec& spec, const TracedRound& probe, const EmitterSet& emitters,
                                      const WorkerRegistry::Crew& crew, const std::function<TimePoint()>& clock,
                                      const std::stop_token& stop) {
-    const auto parameters = TransportParameters::read(render_settings(spec));
-    if (!parameters.ok()) return parameters.status();
+    const RenderSettings settings = render_settings(spec);
+    const LearningPlan plan = plan_of(spec.algorithm);
     const TimePoint begin = clock();
     TrainingReport report;
-    const auto tables = train_tables(probe.data, emitters, parameters->training, {stop, {}}, &report);
+    const auto tables = spec.algorithm.info().learning->learn({probe.data, 0, {}, emitters, settings, {stop, {}}, &report});
     if (!tables.ok()) return tables.status();
     AffordableSet set;
-    set.wanted = parameters->training_samples;
+    set.wanted = plan.samples;
     set.probe_samples = probe.data.samples;
     set.probe_traced_seconds = probe.worker_seconds;
     set.probe_learned_seconds = seconds_between(begin, clock());
@@ -44,15 +35,14 @@ Result<AffordableSet> affordable_set(const JobSpec& spec, const TracedRound& pro
                                             .learn_seconds_per_sample = kLearningOverTracing * per_sample * threads},
                                            budget, most);
     };
-    const auto has_pilot = [&](uint64_t n) {
-        const auto p = TransportParameters::read(render_settings(with_training_samples(spec, n)));
-        return p.ok() && p->pilot_samples > 0;
-    };
+    const auto with_samples = [&](uint64_t n) { return spec.algorithm.with(kTrainingPaths, double(n)); };
+    const auto has_pilot = [&](uint64_t n) { return plan_of(with_samples(n)).rounds.size() > 1; };
     set.samples = affordable(has_pilot(set.wanted), set.wanted);
     // A set too small for two rounds costs what one round costs.
     if (has_pilot(set.wanted) && !has_pilot(set.samples))
         set.samples = affordable(false, std::min(set.wanted, kTrainingUnitSamples));
-    set.spec = with_training_samples(spec, set.samples);
+    set.spec = spec;
+    set.spec.algorithm = with_samples(set.samples);
     return set;
 }
 
@@ -60,9 +50,10 @@ Result<AffordableSet> affordable_set(const JobSpec& spec, const TracedRound& pro
 
 Result<std::optional<LearnedTables>> learn_tables(JobSpec spec, const EmitterSet& emitters, TracingPort& port,
                                                   const std::function<TimePoint()>& clock, std::stop_token stop) {
-    TablesInfo info;  // of both rounds
+    TablesInfo info;  // of all rounds
+    Tables guide;
     for (;;) {
-        const auto round = port.collect();
+        auto round = port.collect();
         if (!round.ok()) return round.status();
         if (round->kind == UnitKind::kProbe) {
             const auto set = affordable_set(spec, *round, emitters, port.crew(), clock, stop);
@@ -73,30 +64,31 @@ Result<std::optional<LearnedTables>> learn_tables(JobSpec spec, const EmitterSet
             spec = set->spec;
             continue;
         }
-        const auto parameters = TransportParameters::read(render_settings(spec));
-        if (!parameters.ok()) return parameters.status();
         port.learning_begins();
         TrainingReport report;
-        auto tables = train_tables(round->data, emitters, parameters->training,
-                                   {stop, [&](double share) { port.learning_goes_on(share); }}, &report);
+        auto tables = spec.algorithm.info().learning->learn(
+            {round->data, round->round, guide, emitters, render_settings(spec),
+             {stop, [&](double share) { port.learning_goes_on(share); }}, &report});
         if (!tables.ok()) return tables.status();
         info.training_samples += round->data.samples;
         info.trace_seconds += round->seconds;
         info.classifier_seconds += report.classifier_seconds;
         info.energy_seconds += report.energy_seconds;
         info.gamma_seconds += report.gamma_seconds;
-        if (round->kind == UnitKind::kTraining) {
-            info.light_subspaces = tables->light_count;
-            info.eye_subspaces = tables->eye_count;
+        const LearningPlan plan = plan_of(spec.algorithm);
+        const size_t next = round->round + 1;
+        if (next == plan.rounds.size()) {
+            info.light_subspaces = report.light_subspaces;
+            info.eye_subspaces = report.eye_subspaces;
             info.uniform_loss = report.gamma.uniform_loss;
             info.loss = report.gamma.loss;
             info.prior_strength = report.gamma.prior_strength;
             info.note = report.note;
             return std::optional(LearnedTables{*std::move(tables), std::move(spec), std::move(info)});
         }
-        const TrainingWork& pilot = round->work;
-        const uint64_t rest = pilot.total_samples - pilot.sample_count;
-        LL_RETURN_IF_ERROR(port.open_guided_round(*tables, {pilot.sample_count, rest, pilot.total_samples}));
+        guide = plan.rounds[next].guided ? *std::move(tables) : Tables();
+        round->data = {};  // before the next round's comes
+        LL_RETURN_IF_ERROR(port.open_round(uint32_t(next), guide, plan.work(next)));
     }
 }
 

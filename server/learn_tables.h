@@ -1,6 +1,6 @@
 #pragma once
-// Learning the tables of one job: chooses the size of the training set where a time limit asks for it, and trains in one or two
-// rounds (see TrainingGenerator). Who traces the rounds, and what else becomes of the job, is behind TracingPort: there are no
+// Learning the tables of one job: chooses the size of the training set where a time limit asks for it, and learns in the
+// rounds of the algorithm's plan. Who traces the rounds, and what else becomes of the job, is behind TracingPort: there are no
 // locks, no workers and no other jobs here.
 
 #include <cstdint>
@@ -19,6 +19,7 @@ namespace lightloom {
 /// A round of training units that is complete.
 struct TracedRound {
     UnitKind kind = UnitKind::kTraining;
+    uint32_t round = 0;  ///< Of the algorithm's LearningPlan.
     TrainingWork work;
     TrainingData data;          ///< Joined in the order of the units.
     double worker_seconds = 0;  ///< That workers took for the units, together.
@@ -37,23 +38,23 @@ struct AffordableSet {
 class TracingPort {
   public:
     virtual ~TracingPort() = default;
-    /// Waits for the round that is open: a probe, a pilot or the set itself.
+    /// Waits for the round that is open: a probe or one of the plan.
     virtual Result<TracedRound> collect() = 0;
     /// Who could trace another one.
     virtual WorkerRegistry::Crew crew() const = 0;
     /// After a probe. True: the first round of that set is open. False: nothing is left to learn, because the set's tables exist
     /// or another job makes them.
     virtual Result<bool> settle(const AffordableSet& set) = 0;
-    /// What was collected of a pilot or the set is being learned from.
+    /// What was collected of a round is being learned from.
     virtual void learning_begins() = 0;
     /// So much of the time for that has passed, about.
     virtual void learning_goes_on(double share) = 0;
-    /// Publishes the pilot's tables and opens the round that they guide.
-    virtual Status open_guided_round(const SubspaceTables& pilot, const TrainingWork& work) = 0;
+    /// Opens another round, having published the tables that guide it, if there are any.
+    virtual Status open_round(uint32_t round, const Tables& guide, const TrainingWork& work) = 0;
 };
 
 struct LearnedTables {
-    SubspaceTables tables;
+    Tables tables;
     JobSpec spec;     ///< Whose tables they are.
     TablesInfo info;  ///< What learning knows of them; nothing of assets, caches and whether a limit made the set smaller.
 };

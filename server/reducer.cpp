@@ -26,8 +26,8 @@ Result<std::vector<Reducer::Refusal>> Reducer::add_locked(const WorkUnit& unit, 
         refused.push_back({unit.key, internal_error("the unit was merged twice")});
         return refused;
     }
-    if (partial.tile != unit.tile || partial.samples_per_pixel != unit.iteration_count ||
-        partial.light_paths != unit.light_path_count) {
+    if (partial.tile != unit.render.tile || partial.samples_per_pixel != unit.render.samples_per_pixel() ||
+        partial.light_paths != unit.render.light_path_count) {
         refused.push_back({unit.key, data_loss("the partial is of another unit")});
         return refused;
     }
@@ -59,7 +59,7 @@ Status Reducer::add_to_current(const WorkUnit& unit, const Partial& partial, std
     for (const DroppedSample& sample : partial.dropped)
         if (dropped_.size() < kMaxDropped) dropped_.push_back({unit.key, sample});
     if (++current_units_ < tile_count_) return {};
-    LL_RETURN_IF_ERROR(sums_->all.fold(sums_->current, unit.iteration_count));
+    LL_RETURN_IF_ERROR(sums_->all.fold(sums_->current, unit.render.iteration_count));
     counters_ += std::exchange(current_counters_, {});
     sums_->current = GroupSum(frame_);
     current_units_ = 0;

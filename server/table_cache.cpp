@@ -8,7 +8,6 @@
 #include <type_traits>
 
 #include "common/core/atomic_file.h"
-#include "common/tables/subspace_tables.h"
 #include "common/work/cache_trim.h"
 
 namespace lightloom {
@@ -125,7 +124,7 @@ TableCache::TableCache(fs::path directory, uint64_t max_bytes) : directory_(std:
 
 fs::path TableCache::path_of(const Digest& key) const { return directory_ / (key.hex() + kExtension); }
 
-std::optional<TableCache::Entry> TableCache::find(const Digest& key) const {
+std::optional<TableCache::Entry> TableCache::find(const Digest& key, std::span<const TablePart* const> known) const {
     if (directory_.empty()) return std::nullopt;
     const fs::path path = path_of(key);
     auto bytes = read_file(path.string());
@@ -133,7 +132,7 @@ std::optional<TableCache::Entry> TableCache::find(const Digest& key) const {
     const auto parts = split(*bytes);
     Status status = parts.status();
     if (parts.ok() && parts->key_line != key.hex()) status = data_loss("the entry is that of another job");
-    if (status.ok()) status = parse_tables(parts->tables).status();
+    if (status.ok()) status = parse_tables(parts->tables, known).status();
     Result<TablesInfo> info = status.ok() ? info_from(parts->info_line) : status;
     status = info.status();
     std::error_code ignored;

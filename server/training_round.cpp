@@ -2,14 +2,13 @@
 
 #include <algorithm>
 
-#include "common/transport/parameters.h"
 
 namespace lightloom {
 
-TrainingRound::TrainingRound(UnitKind kind, const TrainingWork& work, std::optional<uint64_t> shuffle_seed)
-    : kind_(kind),
+TrainingRound::TrainingRound(UnitKind kind, uint32_t number, const TrainingWork& work, std::optional<uint64_t> shuffle_seed)
+    : kind_(kind), number_(number),
       work_(work),
-      units_(Plan::training(kind, work), work.sample_count, UINT32_MAX, shuffle_seed),
+      units_(Plan::training(kind, number, work), work.sample_count, UINT32_MAX, shuffle_seed),
       parts_(units_.group_total()) {}
 
 uint64_t TrainingRound::samples_done() const {
@@ -34,7 +33,7 @@ UnitTable::Failures TrainingRound::refuse(uint32_t unit) {
     bytes_ -= parts_[unit].bytes;
     traced_seconds_ -= parts_[unit].seconds;
     parts_[unit] = {};
-    return units_.reopen({unit, 0, kind_});
+    return units_.reopen(key(unit));
 }
 
 Result<TrainingData> join(std::vector<TrainingRound::Part> parts, std::stop_token stop) {
@@ -48,8 +47,8 @@ Result<TrainingData> join(std::vector<TrainingRound::Part> parts, std::stop_toke
 }
 
 uint64_t energy_paths(const JobSpec& spec, const TrainingWork& work) {
-    const auto p = TransportParameters::read(render_settings(spec));
-    return p->energy_paths_before(work.first_sample + work.sample_count) - p->energy_paths_before(work.first_sample);
+    const LearningPlan plan = spec.algorithm.info().learning->plan(spec.algorithm);
+    return plan.energy_paths_before(work.first_sample + work.sample_count) - plan.energy_paths_before(work.first_sample);
 }
 
 uint64_t largest_training_payload(const JobSpec& spec, const TrainingWork& work) {

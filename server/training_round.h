@@ -22,9 +22,12 @@ class TrainingRound {
         double seconds = 0;  ///< That the worker took.
     };
 
-    TrainingRound(UnitKind kind, const TrainingWork& work, std::optional<uint64_t> shuffle_seed);
+    TrainingRound(UnitKind kind, uint32_t number, const TrainingWork& work, std::optional<uint64_t> shuffle_seed);
 
     UnitKind kind() const { return kind_; }
+    /// Of the algorithm's LearningPlan.
+    uint32_t number() const { return number_; }
+    UnitKey key(uint32_t unit) const { return {unit, 0, kind_, number_}; }
     const TrainingWork& work() const { return work_; }
     UnitTable& units() { return units_; }
     const UnitTable& units() const { return units_; }
@@ -49,6 +52,7 @@ class TrainingRound {
 
   private:
     UnitKind kind_;
+    uint32_t number_;
     TrainingWork work_;
     UnitTable units_;
     std::vector<Part> parts_;  // by unit

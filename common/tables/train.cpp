@@ -256,6 +256,7 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
                         std::to_string(data.paths.size() + data.light_paths.size()) +
                         " training paths left the range of single precision and were left out";
     LL_RETURN_IF_ERROR(tables.validate(emitters));
+    report->light_subspaces = tables.light_count, report->eye_subspaces = tables.eye_count;
     return tables;
 }
 

@@ -32,6 +32,7 @@ struct TrainingOptions {
 
 struct TrainingReport {
     GammaReport gamma;
+    uint32_t light_subspaces = 0, eye_subspaces = 0;  ///< That there are; see SubspaceTables.
     uint64_t paths = 0, nodes = 0;
     uint64_t out_of_range = 0;  ///< Paths and light sub-paths that were left out; see TrainingData::in_range().
     double classifier_seconds = 0, energy_seconds = 0, gamma_seconds = 0;

@@ -2,6 +2,7 @@
 // How an algorithm learns its tables: the size of its training set, the rounds in which that is traced, and what tables come of the
 // data of a round. A row of the catalog answers with these (LearningInfo).
 
+#include <cstdint>
 #include <vector>
 
 #include "common/path/corrected.h"
@@ -13,6 +14,14 @@ namespace lightloom {
 
 /// Camera samples of a training unit; the last one may have fewer.
 inline constexpr uint64_t kTrainingUnitSamples = uint64_t(1) << 14;
+
+/// Which part of the dataset a unit traces.
+struct TrainingWork {
+    uint64_t first_sample = 0;
+    uint64_t sample_count = 0;
+    uint64_t total_samples = 0;  ///< Of the whole dataset: sets the size of the blocks.
+    friend bool operator==(const TrainingWork&, const TrainingWork&) = default;
+};
 
 struct LearningRound {
     uint64_t samples = 0;
@@ -33,6 +42,7 @@ struct LearningPlan {
         for (size_t i = 0; i < round; ++i) first += rounds[i].samples;
         return first;
     }
+    TrainingWork work(size_t round) const { return {first_sample(round), rounds[round].samples, samples}; }
     /// How many light sub-paths the samples before number `sample` measure Q with.
     uint64_t energy_paths_before(uint64_t sample) const;
 };

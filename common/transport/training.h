@@ -17,14 +17,6 @@ struct PreparedTables;
 /// What one thread traces at a time.
 inline constexpr uint64_t kTrainingChunkSamples = 512;
 
-/// Which part of the dataset a unit traces.
-struct TrainingWork {
-    uint64_t first_sample = 0;
-    uint64_t sample_count = 0;
-    uint64_t total_samples = 0;  ///< Of the whole dataset: sets the size of the blocks.
-    friend bool operator==(const TrainingWork&, const TrainingWork&) = default;
-};
-
 /// Traces training units of one scene: without a guide by classic pairing, which needs nothing; guided by the tables of an earlier
 /// round by subspace connections, which find far more of the light that is hard to find. What renders is learned from the last
 /// round alone: its paths have the smaller variance, and the few of a pilot would outvote them.

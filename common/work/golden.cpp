@@ -184,28 +184,23 @@ Status hash_units(SceneDescription description, Sha256& hash) {
     auto built = Scene::build(std::move(description));
     if (!built.ok()) return built.status();
     const std::shared_ptr<const Scene> scene = std::move(built).value();
-    for (const AlgorithmInfo& algorithm : catalog()) {
-        RenderSettings settings{.algorithm = std::string(algorithm.name), .seed = 1, .max_depth = 6};
+    for (const AlgorithmInfo* row : catalog()) {
         // Tables and caches large enough to run every line, small enough for a registration that nobody waits for.
-        for (const auto& [name, value] : {std::pair{"training-paths", "2000"}, std::pair{"cache", "500"},
-                                          std::pair{"light-subspaces", "40"}, std::pair{"eye-subspaces", "20"}})
-            if (has_parameter(algorithm, name)) settings.parameters[name] = value;
-        const auto parameters = parse_parameters(algorithm, settings.parameters);
-        if (!parameters.ok()) return parameters.status();
-        std::shared_ptr<const SubspaceTables> tables;
-        if (algorithm.needs_tables) {
-            TrainingReport report;
-            auto made = make_tables(*scene, settings, {}, &report);
-            if (!made.ok()) return made.status();
-            const std::string bytes = serialize(*made);
-            hash.update(bytes.data(), bytes.size());
-            tables = std::make_shared<const SubspaceTables>(std::move(*made));
-        }
-        const auto renderer = Renderer::create(scene, settings, tables);
+        auto algorithm = AlgorithmSettings::parse(row->name, {});
+        if (!algorithm.ok()) return algorithm.status();
+        for (const auto& [name, value] : {std::pair{"training-paths", 2000}, std::pair{"cache", 500},
+                                          std::pair{"light-subspaces", 40}, std::pair{"eye-subspaces", 20}})
+            if (algorithm->has(name)) *algorithm = algorithm->with(name, value);
+        const RenderSettings settings{.algorithm = *algorithm, .seed = 1, .max_depth = 6};
+        TrainingReport report;
+        const auto tables = make_tables(*scene, settings, {}, &report);
+        if (!tables.ok()) return tables.status();
+        const std::string bytes = serialize(*tables);
+        hash.update(bytes.data(), bytes.size());
+        const auto renderer = Renderer::create(scene, settings, *tables);
         if (!renderer.ok()) return renderer.status();
-        const Rect tile{0, 0, kGoldenSize, kGoldenSize};
-        const std::vector<WorkUnit> units = split_group({0, 0, 4}, {tile}, light_paths_per_pixel(algorithm, *parameters));
-        const auto partial = (*renderer)->render(unit_work(units.front()), {});
+        const Plan plan(scene->frame(), *algorithm);
+        const auto partial = (*renderer)->render(plan.units({0, 0, 4}).front().render, {});
         if (!partial.ok()) return partial.status();
         const auto encoded = encode_partial(*partial, scene->frame());
         if (!encoded.ok()) return encoded.status();

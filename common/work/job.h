@@ -42,7 +42,6 @@ enum class UnitKind : uint8_t {
     kRender,    ///< A partial of the image.
     kTraining,  ///< Paths that the job's tables are learned from; never part of an image.
     kProbe,     ///< The same, only to measure how many of them a time-limited job can afford.
-    kPilot,     ///< The same, for the first tables, which guide the tracing of kTraining; see TrainingGenerator.
 };
 
 /// Identity of a unit inside a job. Units of one group complete one another: their techniques' weights sum to one only
@@ -51,19 +50,14 @@ struct UnitKey {
     uint32_t group = 0;
     uint32_t tile = 0;
     UnitKind kind = UnitKind::kRender;
+    uint32_t round = 0;  ///< kTraining: of the algorithm's LearningPlan.
     friend auto operator<=>(const UnitKey&, const UnitKey&) = default;
 };
 
 struct WorkUnit {
     UnitKey key;
-    uint64_t first_iteration = 0;
-    uint32_t iteration_count = 0;  ///< Camera samples per pixel of the tile.
-    Rect tile;
-    /// Light paths that this unit traces and splats: a share of N1 * iterations * pixels proportional to the tile, fixed by
-    /// the plan. `first_light_path` numbers them within the group.
-    uint64_t first_light_path = 0;
-    uint64_t light_path_count = 0;
-    TrainingWork training = {};  ///< All kinds but kRender.
+    RenderUnit render = {};      ///< kRender. Light paths: a share of the group's that is proportional to the tile.
+    TrainingWork training = {};  ///< The other kinds.
 };
 
 /// One full-frame group of iterations.
@@ -73,32 +67,30 @@ struct Group {
     uint32_t iteration_count = 0;
 };
 
-/// What light transport needs of a unit.
-inline UnitWork unit_work(const WorkUnit& unit) {
-    return {.first_iteration = unit.first_iteration,
-            .iteration_count = unit.iteration_count,
-            .group_first_iteration = unit.first_iteration,
-            .tile = unit.tile,
-            .first_light_path = unit.first_light_path,
-            .light_path_count = unit.light_path_count};
-}
+/// What the plan of an image must know besides the frame.
+struct PlanOptions {
+    uint64_t light_paths_per_iteration = 0;  ///< N1 |crop|; 0 for algorithms that splat nothing.
+    bool whole_frame = false;                ///< No tiles.
+    bool splats_only = false;                ///< Units without camera samples.
+};
+/// As the row of the algorithm says.
+PlanOptions plan_options(const FrameLayout& frame, const AlgorithmSettings& algorithm);
 
-/// The units of a group: one per tile, in order. Light paths: the group's total, round(light_paths_per_pixel * iterations *
-/// pixels), is shared out in proportion to the tiles' areas with exact cumulative rounding.
-std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& tiles, double light_paths_per_pixel);
+/// The units of a group: one per tile, in order. The group's light paths, so many per iteration, are shared out in proportion to the
+/// tiles' areas with exact cumulative rounding.
+std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& tiles, const PlanOptions& options);
 
-/// The plan is a pure function of frame, N1 and the number of iterations. Group sizes grow geometrically: a group is at
+/// The plan is a pure function of frame, options and the number of iterations. Group sizes grow geometrically: a group is at
 /// most 5 % of all iterations before it (at least one iteration, at most what makes about 2^18 camera samples), so that a
 /// job stopped at any group boundary wastes little, and rendering it again with that number of iterations makes the very
 /// same groups.
 class Plan {
   public:
-    /// `light_paths_per_pixel` is N1, in light paths per pixel and iteration (0 for algorithms that splat nothing).
-    /// `whole_frame` forbids tiles (stratified pairing, photon maps).
-    Plan(const FrameLayout& frame, double light_paths_per_pixel, bool whole_frame = false);
+    Plan(const FrameLayout& frame, const PlanOptions& options);
+    Plan(const FrameLayout& frame, const AlgorithmSettings& algorithm) : Plan(frame, plan_options(frame, algorithm)) {}
     /// The plan of a part of a training set, `work`: group i is the unit of its samples i * kTrainingUnitSamples onwards, its
     /// iterations are samples.
-    static Plan training(UnitKind kind, const TrainingWork& work);
+    static Plan training(UnitKind kind, uint32_t round, const TrainingWork& work);
 
     /// Group `index` of an unbounded job.
     Group group(uint32_t index) const;
@@ -115,10 +107,11 @@ class Plan {
   private:
     Plan() = default;
 
-    double light_paths_per_pixel_ = 0;
+    PlanOptions options_;
     std::vector<Rect> tiles_;
     uint32_t max_group_iterations_ = 1;
     UnitKind kind_ = UnitKind::kRender;
+    uint32_t round_ = 0;
     TrainingWork training_;
 };
 

@@ -9,6 +9,7 @@ namespace {
 constexpr int64_t kUnitSamples = int64_t(1) << 18;  // camera samples that a unit should have
 constexpr int kTileWidth = 512;                     // about; tiles are equal parts of the crop window
 constexpr int kMinTileRows = 256;
+constexpr int64_t kWholeFrameIterations = 8;  // that the groups of whole frames may grow to, however large these are
 
 int ceil_div(int64_t a, int64_t b) { return int((a + b - 1) / b); }
 
@@ -33,13 +34,16 @@ uint32_t group_size(uint64_t done, uint32_t cap) { return uint32_t(std::clamp<ui
 
 }  // namespace
 
-std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& tiles, double light_paths_per_pixel) {
+PlanOptions plan_options(const FrameLayout& frame, const AlgorithmSettings& algorithm) {
+    return {.light_paths_per_iteration = algorithm.light_paths_per_iteration(frame.crop.area()),
+            .whole_frame = algorithm.info().frame == FrameShape::kWhole,
+            .splats_only = !algorithm.info().camera_samples};
+}
+
+std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& tiles, const PlanOptions& options) {
     int64_t area = 0;
     for (const Rect& tile : tiles) area += tile.area();
-    const double exact = light_paths_per_pixel * double(group.iteration_count) * double(area);
-    // At least one, however few there should be: the weights count on light paths, and a group without any would lack their
-    // share.
-    const uint64_t total = exact > 0 ? std::max<uint64_t>(1, uint64_t(std::floor(exact + 0.5))) : 0;
+    const uint64_t total = options.light_paths_per_iteration * group.iteration_count;
     // Cumulative rounding in integers: the shares differ from the exact proportion by less than one path and sum to the
     // total whatever the tiles are.
     std::vector<WorkUnit> units;
@@ -50,29 +54,33 @@ std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& t
         pixels += tiles[t].area();
         const uint64_t last = uint64_t((unsigned __int128)(total)*uint64_t(pixels) / uint64_t(area));
         units.push_back({.key = {group.index, t},
-                         .first_iteration = group.first_iteration,
-                         .iteration_count = group.iteration_count,
-                         .tile = tiles[t],
-                         .first_light_path = first,
-                         .light_path_count = last - first});
+                         .render = {.first_iteration = group.first_iteration,
+                                    .iteration_count = group.iteration_count,
+                                    .group_first_iteration = group.first_iteration,
+                                    .tile = tiles[t],
+                                    .first_light_path = first,
+                                    .light_path_count = last - first,
+                                    .splats_only = options.splats_only}});
         first = last;
     }
     return units;
 }
 
-Plan::Plan(const FrameLayout& frame, double light_paths_per_pixel, bool whole_frame)
-    : light_paths_per_pixel_(light_paths_per_pixel),
-      tiles_(make_tiles(frame.crop, whole_frame)) {
+Plan::Plan(const FrameLayout& frame, const PlanOptions& options)
+    : options_(options), tiles_(make_tiles(frame.crop, options.whole_frame)) {
     int64_t largest = 1;
     for (const Rect& tile : tiles_) largest = std::max(largest, tile.area());
-    max_group_iterations_ = uint32_t(std::max<int64_t>(1, kUnitSamples / largest));
+    // A unit of a whole large frame is large, and so is its partial: it should not be of one iteration for ever.
+    const int64_t least = options.whole_frame ? kWholeFrameIterations : 1;
+    max_group_iterations_ = uint32_t(std::max(least, kUnitSamples / largest));
 }
 
-Plan Plan::training(UnitKind kind, const TrainingWork& work) {
+Plan Plan::training(UnitKind kind, uint32_t round, const TrainingWork& work) {
     Plan plan;
     plan.tiles_.resize(1);
     plan.max_group_iterations_ = uint32_t(kTrainingUnitSamples);
     plan.kind_ = kind;
+    plan.round_ = round;
     plan.training_ = work;
     return plan;
 }
@@ -120,10 +128,10 @@ uint32_t Plan::group_count(uint64_t iterations) const {
 
 std::vector<WorkUnit> Plan::units(const Group& group) const {
     if (kind_ != UnitKind::kRender) {
-        return {{.key = {group.index, 0, kind_},
+        return {{.key = {group.index, 0, kind_, round_},
                  .training = {training_.first_sample + group.first_iteration, group.iteration_count, training_.total_samples}}};
     }
-    return split_group(group, tiles_, light_paths_per_pixel_);
+    return split_group(group, tiles_, options_);
 }
 
 }  // namespace lightloom

@@ -13,8 +13,7 @@ constexpr bool one_below(Ours ours, Theirs theirs) {
     return int(ours) + 1 == int(theirs);
 }
 static_assert(one_below(UnitKind::kRender, v1::UNIT_KIND_RENDER) && one_below(UnitKind::kTraining, v1::UNIT_KIND_TRAINING) &&
-              one_below(UnitKind::kProbe, v1::UNIT_KIND_PROBE) && one_below(UnitKind::kPilot, v1::UNIT_KIND_PILOT) &&
-              one_below(UnitKind::kPilot, v1::UnitKind_MAX));
+              one_below(UnitKind::kProbe, v1::UNIT_KIND_PROBE) && one_below(UnitKind::kProbe, v1::UnitKind_MAX));
 static_assert(one_below(JobState::kPreparing, v1::JOB_STATE_PREPARING) && one_below(JobState::kRunning, v1::JOB_STATE_RUNNING) &&
               one_below(JobState::kFinishing, v1::JOB_STATE_FINISHING) &&
               one_below(JobState::kSucceeded, v1::JOB_STATE_SUCCEEDED) && one_below(JobState::kFailed, v1::JOB_STATE_FAILED) &&
@@ -57,12 +56,13 @@ void put_key(const UnitKey& in, v1::UnitKey* out) {
     out->set_group(in.group);
     out->set_tile(in.tile);
     out->set_kind(v1::UnitKind(int(in.kind) + 1));
+    out->set_round(in.round);
 }
 
 Result<UnitKey> get_key(const v1::UnitKey& in) {
-    if (in.kind() < v1::UNIT_KIND_RENDER || in.kind() > v1::UNIT_KIND_PILOT)
+    if (in.kind() < v1::UNIT_KIND_RENDER || in.kind() > v1::UNIT_KIND_PROBE)
         return invalid_argument("a unit of unknown kind; install the same build on both hosts");
-    return UnitKey{in.group(), in.tile(), UnitKind(int(in.kind()) - 1)};
+    return UnitKey{in.group(), in.tile(), UnitKind(int(in.kind()) - 1), in.round()};
 }
 
 void put_asset(const AssetReference& in, v1::AssetReference* out) {
@@ -250,11 +250,12 @@ Result<JobInfo> get(const v1::Job& in) {
 
 void put(const WorkUnit& in, v1::WorkUnit* out) {
     put_key(in.key, out->mutable_key());
-    out->set_first_iteration(in.first_iteration);
-    out->set_iteration_count(in.iteration_count);
-    put_rect(in.tile, out->mutable_tile());
-    out->set_first_light_path(in.first_light_path);
-    out->set_light_path_count(in.light_path_count);
+    out->set_first_iteration(in.render.first_iteration);
+    out->set_iteration_count(in.render.iteration_count);
+    put_rect(in.render.tile, out->mutable_tile());
+    out->set_first_light_path(in.render.first_light_path);
+    out->set_light_path_count(in.render.light_path_count);
+    out->set_splats_only(in.render.splats_only);
     out->set_first_training_sample(in.training.first_sample);
     out->set_training_sample_count(in.training.sample_count);
     out->set_training_sample_total_count(in.training.total_samples);
@@ -264,11 +265,13 @@ Result<WorkUnit> get(const v1::WorkUnit& in) {
     const auto key = get_key(in.key());
     if (!key.ok()) return key.status();
     return WorkUnit{.key = *key,
-                    .first_iteration = in.first_iteration(),
-                    .iteration_count = in.iteration_count(),
-                    .tile = get_rect(in.tile()),
-                    .first_light_path = in.first_light_path(),
-                    .light_path_count = in.light_path_count(),
+                    .render = {.first_iteration = in.first_iteration(),
+                               .iteration_count = in.iteration_count(),
+                               .group_first_iteration = in.first_iteration(),
+                               .tile = get_rect(in.tile()),
+                               .first_light_path = in.first_light_path(),
+                               .light_path_count = in.light_path_count(),
+                               .splats_only = in.splats_only()},
                     .training = {in.first_training_sample(), in.training_sample_count(), in.training_sample_total_count()}};
 }
 
