@@ -7,19 +7,10 @@
 #include <cmath>
 
 #include "common/core/rng.h"
-#include "common/metrics/significance.h"
 #include "common/work/golden.h"
 
 namespace lightloom::client {
 namespace {
-
-TEST(Distributions, QuantilesAreThoseOfTables) {
-    EXPECT_NEAR(student_quantile(0.05, 1), 12.7062, 1e-4);
-    EXPECT_NEAR(student_quantile(0.05, 10), 2.228139, 1e-6);
-    EXPECT_NEAR(student_quantile(0.01, 30), 2.749996, 1e-6);
-    EXPECT_NEAR(student_quantile(0.05, std::numeric_limits<double>::infinity()), 1.959964, 1e-6);
-    EXPECT_NEAR(1 - std::pow(1 - sidak(0.05, 7), 7), 0.05, 1e-12);
-}
 
 TEST(WeightedMean, MatchesItsDefinition) {
     const double values[] = {3, 5, 10}, weights[] = {1, 1, 2};

@@ -9,6 +9,7 @@
 
 #include "common/core/rng.h"
 #include "common/metrics/flip.h"
+#include "common/metrics/significance.h"
 
 namespace lightloom {
 namespace {
@@ -203,6 +204,30 @@ TEST(Flip, HdrSeesWhatClampingHides) {
     EXPECT_GT(mean(flip.map), 0.01);
     EXPECT_LT(flip.start_exposure, flip.stop_exposure);
     EXPECT_EQ(flip.exposures, int(std::ceil(flip.stop_exposure - flip.start_exposure)));
+}
+
+TEST(Significance, IsThatOfTables) {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    EXPECT_NEAR(student_quantile(0.05, 1), 12.7062, 1e-4);
+    EXPECT_NEAR(student_quantile(0.05, 10), 2.228139, 1e-6);
+    EXPECT_NEAR(student_quantile(0.01, 30), 2.749996, 1e-6);
+    EXPECT_NEAR(student_quantile(0.05, kInfinity), 1.959964, 1e-6);
+    EXPECT_NEAR(student_p_value(-12.7062, 1), 0.05, 1e-6);
+    EXPECT_NEAR(student_p_value(1.959964, kInfinity), 0.05, 1e-7);
+    EXPECT_NEAR(normal_p_value(-1.959964), 0.05, 1e-7);
+    EXPECT_NEAR(1 - std::pow(1 - sidak(0.05, 7), 7), 0.05, 1e-12);
+}
+
+TEST(Significance, HasAnAnswerAtTheEndsOfItsRange) {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity(), kNan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(normal_p_value(0), 1);
+    EXPECT_EQ(normal_p_value(kInfinity), 0);
+    EXPECT_EQ(student_p_value(0, 3), 1);
+    EXPECT_EQ(student_p_value(kInfinity, 3), 0);
+    // Far out in the tail nothing cancels to zero.
+    EXPECT_GT(normal_p_value(12), 1e-33);
+    EXPECT_TRUE(std::isnan(normal_p_value(kNan)));
+    EXPECT_TRUE(std::isnan(student_p_value(kNan, 3)));
 }
 
 }  // namespace
