@@ -144,6 +144,7 @@ int bench(BenchOptions& options) {
     if (options.scene.resolution.empty()) {
         options.scene.resolution = std::to_string(reference->frame.width) + "x" + std::to_string(reference->frame.height);
     }
+    options.scene.algorithm = choices->front().name;  // Runs name their own: the scene is not asked for one.
     auto local = load_scene(options.scene);
     if (!local.ok()) return report_error(local.status());
     std::vector<std::filesystem::path> inputs = files_of(*local);

@@ -88,16 +88,16 @@ int reference(ReferenceOptions& options) {
         auto parsed = parse_algorithm(options.cross_check);
         if (!parsed.ok()) return report_error(parsed.status());
         checker_choice = std::move(parsed).value();
-        if (checker_choice.name == options.job.algorithm) {
-            return report_error(
-                invalid_argument("--cross-check " + checker_choice.name + " is what makes the reference; name another algorithm"));
-        }
     }
     auto local = load_scene(options.job);
     if (!local.ok()) return report_error(local.status());
     if (Status s = check_outputs(options.job, {".json"}, &*local); !s.ok()) return report_error(s);
     auto spec = make_spec(options.job, *local);
     if (!spec.ok()) return report_error(spec.status());
+    if (checker_choice.name == spec->algorithm) {
+        return report_error(
+            invalid_argument("--cross-check " + checker_choice.name + " is what makes the reference; name another algorithm"));
+    }
     if (spec->max_depth < 0) spec->max_depth = local->imported.description.max_depth;
     const auto algorithm = find_algorithm(spec->algorithm);
     spec->parameters = complete_parameters(**algorithm, *parse_parameters(**algorithm, spec->parameters));
