@@ -141,6 +141,7 @@ int bench(BenchOptions& options) {
     if (options.scene.resolution.empty()) {
         options.scene.resolution = std::to_string(reference->frame.width) + "x" + std::to_string(reference->frame.height);
     }
+    options.scene.algorithm = choices->front().name;  // Runs name their own: the scene is not asked for one.
     const auto built = build_job(options.scene, options.threads, [&](const LocalScene& local) {
         std::vector<std::filesystem::path> inputs = files_of(local);
         inputs.push_back(options.reference);

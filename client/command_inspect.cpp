@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "client/commands.h"
+#include "client/default_algorithm.h"
 #include "client/inspect_tables.h"
 #include "client/job_options.h"
 #include "client/output_files.h"
@@ -77,7 +78,9 @@ nlohmann::json describe(const SceneDescription& d, const SceneSummary& s, const 
     out["memory_bytes"] = {{"geometry", s.geometry_bytes}, {"acceleration", s.acceleration_bytes}, {"images", s.image_bytes}};
     out["seconds"] = {{"import", import_seconds}, {"build", s.build_seconds}};
     out["files"] = files;
-    out["replaced"] = {{"integrator", d.integrator}, {"film_filename", d.film.file_name}};
+    out["integrator"] = d.integrator;
+    out["algorithm"] = default_algorithm(d.integrator).name;
+    out["replaced"] = {{"film_filename", d.film.file_name}};
     out["ignored"] = d.warnings;
     return out;
 }
@@ -104,7 +107,7 @@ void print(const SceneDescription& d, const SceneSummary& s, const std::string& 
     std::printf("\n  memory     geometry %s, acceleration structure %s, images %s\n", megabytes(s.geometry_bytes).c_str(),
                 megabytes(s.acceleration_bytes).c_str(), megabytes(s.image_bytes).c_str());
     std::printf("  time       %.3f s to read, %.3f s to build\n", import_seconds, s.build_seconds);
-    if (!d.integrator.empty()) std::printf("  replaced   Integrator %s, by --algorithm\n", import::quoted(d.integrator).c_str());
+    std::printf("  algorithm  %s\n", default_algorithm(d.integrator).reason.c_str());
     if (!d.film.file_name.empty())
         std::printf("  replaced   Film's \"string filename\" %s, by -o\n", import::quoted(d.film.file_name).c_str());
     std::printf("  ignored    %s\n", d.warnings.empty() ? "nothing" : "");

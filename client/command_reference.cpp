@@ -85,10 +85,6 @@ int reference(ReferenceOptions& options) {
         auto parsed = parse_algorithm(options.cross_check);
         if (!parsed.ok()) return report_error(parsed.status());
         checker_choice = std::move(parsed).value();
-        if (checker_choice.name == options.job.algorithm) {
-            return report_error(
-                invalid_argument("--cross-check " + checker_choice.name + " is what makes the reference; name another algorithm"));
-        }
     }
     auto built = build_job(options.job, options.threads,
                            [&](const LocalScene& local) { return check_outputs(options.job, {".json"}, &local); });

@@ -24,7 +24,7 @@ namespace lightloom::client {
 namespace {
 
 constexpr const char* kFooter = R"(Examples:
-  lightloom render room.pbrt                                  the scene's own samples per pixel, to room.exr
+  lightloom render room.pbrt                                  the scene's own Integrator and samples per pixel, to room.exr
   lightloom render room.pbrt -o out.exr --png out.png --algorithm bdpt --spp 64
   lightloom render room.pbrt --time 60                        stop after a minute of rendering
   lightloom render room.pbrt --spp 4 --resolution 320x180     a quick look

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "client/commands.h"
+#include "client/default_algorithm.h"
 #include "common/cli/numbers.h"
 #include "common/path/path_view.h"
 #include "common/scene/scene.h"
@@ -22,7 +23,10 @@ double seconds_since(Clock::time_point begin) { return std::chrono::duration<dou
 void add_render_settings(CLI::App& command, JobOptions& options) {
     command.add_option("SCENE", options.scene, "pbrt-v4 scene file; everything that it refers to lies beside or below it")
         ->required();
-    command.add_option("-a,--algorithm", options.algorithm, "Name from `lightloom algorithms`")->capture_default_str();
+    command
+        .add_option("-a,--algorithm", options.algorithm,
+                    "Name from `lightloom algorithms` (default: what the scene's Integrator asks for)")
+        ->check([](const std::string& name) { return name.empty() ? "an empty name" : std::string(); });
     command.add_option("--set", options.settings, "Parameter of the algorithm, KEY=VALUE; may be repeated")
         ->take_all()
         ->allow_extra_args(false);
@@ -70,6 +74,8 @@ Result<LocalScene> load_scene(const JobOptions& options) {
     if (!options.quiet) {
         for (const std::string& warning : scene.imported.description.warnings)
             std::fprintf(stderr, "lightloom: warning: %s\n", warning.c_str());
+        if (options.algorithm.empty())
+            std::fprintf(stderr, "lightloom: %s\n", default_algorithm(scene.imported.description.integrator).reason.c_str());
     }
     begin = Clock::now();
     scene.directory = std::filesystem::path(options.scene).parent_path();
@@ -94,7 +100,7 @@ Status check_bound(const JobOptions& options, const JobSpec& spec) {
 
 Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
     JobSpec spec;
-    spec.algorithm = options.algorithm;
+    spec.algorithm = options.algorithm.empty() ? default_algorithm(scene.imported.description.integrator).name : options.algorithm;
     for (const std::string& setting : options.settings) {
         const size_t equals = setting.find('=');
         if (equals == std::string::npos || equals == 0) return invalid_argument("--set takes KEY=VALUE, not \"" + setting + "\"");

@@ -13,10 +13,10 @@ namespace lightloom::client {
 
 struct JobOptions {
     std::string scene;
-    std::string output;   ///< Empty: the scene's name with .exr, in the current directory.
-    std::string png;      ///< Empty: none.
-    double exposure = 0;  ///< Of the PNG, in stops.
-    std::string algorithm = "path";
+    std::string output;              ///< Empty: the scene's name with .exr, in the current directory.
+    std::string png;                 ///< Empty: none.
+    double exposure = 0;             ///< Of the PNG, in stops.
+    std::string algorithm;           ///< Empty: what the scene asks for, see default_algorithm().
     uint32_t samples_per_pixel = 0;  ///< 0: the scene's (unless there is a time limit).
     double time_seconds = 0;
     int max_depth = -1;
@@ -42,13 +42,13 @@ struct LocalScene {
     double import_seconds = 0, digest_seconds = 0;
 };
 /// Imports (so that mistakes show before anything is sent) and digests the files. Prints the scene's warnings to standard
-/// error; with `strict` they are errors.
+/// error (with `strict` they are errors), and which algorithm it asks for where the options name none.
 Result<LocalScene> load_scene(const JobOptions& options);
 
 /// The files that the scene consists of.
 std::vector<std::filesystem::path> files_of(const LocalScene& scene);
 
-/// What the options ask for, with the scene's samples per pixel where they leave the bound open.
+/// What the options ask for, with the scene's algorithm and samples per pixel where they leave these open.
 Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene);
 /// kInvalidArgument where the scene, not the options, asks for more samples than a job may have.
 Status check_bound(const JobOptions& options, const JobSpec& spec);

@@ -25,13 +25,6 @@ std::string new_id(const char* prefix) {
     return text;
 }
 
-bool same_request(const JobSpec& a, const JobSpec& b) {
-    return a.algorithm == b.algorithm && a.parameters == b.parameters && a.seed == b.seed &&
-           a.samples_per_pixel == b.samples_per_pixel && a.time_limit_seconds == b.time_limit_seconds &&
-           a.max_depth == b.max_depth && a.width == b.width && a.height == b.height && a.scene_root == b.scene_root &&
-           a.first_hit_layers == b.first_hit_layers;
-}
-
 Status no_job(const std::string& id) {
     return not_found("no job " + id + "; `lightloom list` shows those that exist (the oldest that ended are forgotten)");
 }

@@ -7,6 +7,7 @@
 #include "common/core/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "common/film/png.h"
+#include "common/work/job_fields.h"
 
 namespace lightloom {
 
@@ -26,10 +27,47 @@ std::string shell_word(const std::string& word) {
     return out + "'";
 }
 
+template <class T>
+Json value_json(const T& value) {
+    return value;
+}
+
+Json value_json(const Digest& digest) { return digest.hex(); }
+
+Json value_json(const FrameLayout& frame) {
+    const Rect& crop = frame.crop;
+    return {{"width", frame.width}, {"height", frame.height}, {"crop", {crop.x0, crop.y0, crop.x1, crop.y1}}};
+}
+
+/// The fields of a spec whose roles are among the chosen ones.
+template <class Chosen>
+Json fields_json(const JobSpec& spec, const Chosen& chosen) {
+    Json json = Json::object();
+    for_each_job_field([&]<unsigned Roles, class T>(const JobField<Roles, T>& field) {
+        if (chosen(Roles)) json[std::string(field.name)] = value_json(spec.*field.member);
+    });
+    return json;
+}
+
+/// The settings first, then what is asked for beyond them, last scene and frame.
+Json spec_json(const JobSpec& spec, const std::string& scene) {
+    using namespace job_role;
+    const auto rest_of_manifest = [&](bool tables) {
+        return fields_json(spec, [tables](unsigned roles) {
+            return (roles & kManifest) && !(roles & kSettings) && bool(roles & kTables) == tables;
+        });
+    };
+    Json json = settings_json(spec);
+    json.update(rest_of_manifest(false));
+    json["scene"] = scene;
+    json.update(rest_of_manifest(true));
+    return json;
+}
+
 }  // namespace
 
 Json settings_json(const JobSpec& spec) {
-    return {{"algorithm", spec.algorithm}, {"parameters", spec.parameters}, {"seed", spec.seed}, {"max_depth", spec.max_depth}};
+    return fields_json(spec, [](unsigned roles) { return bool(roles & job_role::kSettings); });
 }
 
 Json to_json(const TablesInfo& t) {
@@ -82,16 +120,8 @@ std::string to_json(const Manifest& m) {
                      {"colour", "float"},
                      {"samples_per_pixel", m.iterations},
                      {"groups", m.groups},
-                     {"spec_digest", spec.image_digest().hex()}};
-    const Rect& crop = spec.frame.crop;
-    json["spec"] = settings_json(spec);
-    json["spec"].update(Json{
-        {"requested_samples_per_pixel", spec.samples_per_pixel},
-        {"time_limit_seconds", spec.time_limit_seconds},
-        {"layers", spec.first_hit_layers},
-        {"scene", m.scene_main},
-        {"scene_root", spec.scene_root.hex()},
-        {"frame", {{"width", spec.frame.width}, {"height", spec.frame.height}, {"crop", {crop.x0, crop.y0, crop.x1, crop.y1}}}}});
+                     {"spec_digest", spec.spec_digest().hex()}};
+    json["spec"] = spec_json(spec, m.scene_main);
     json["build"] = {{"build_id", m.identity.build_id},
                      {"math_profile", m.identity.math_profile},
                      {"golden_digest", m.identity.golden_digest.hex()}};
@@ -149,7 +179,7 @@ Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, 
                         {exr_attribute::kSamples, std::to_string(developed.iterations)},
                         {"lightloom.groups", std::to_string(developed.groups)},
                         {exr_attribute::kScene, spec.scene_root.hex()},
-                        {"lightloom.specDigest", spec.image_digest().hex()}};
+                        {"lightloom.specDigest", spec.spec_digest().hex()}};
     return encode_exr(image);
 }
 

@@ -9,6 +9,7 @@
 
 #include "common/core/atomic_file.h"
 #include "common/work/cache_trim.h"
+#include "common/work/job_fields.h"
 
 namespace lightloom {
 namespace {
@@ -20,14 +21,6 @@ constexpr std::string_view kMagic = "lightloom-table-cache 1 ";
 constexpr const char* kExtension = ".tables";
 /// In the names under which write_file_atomically() begins an entry.
 constexpr const char* kTemporary = ".tables.tmp-";
-
-/// Length-prefixed, so that no two sets of values can have the same text.
-void put(std::string& out, std::string_view name, std::string_view value) {
-    out += name;
-    out += ' ' + std::to_string(value.size()) + ' ';
-    out += value;
-    out += '\n';
-}
 
 /// JSON has no other numbers; a null in their place would make the entry a damaged one.
 double finite(double value) { return std::isfinite(value) ? value : 0; }
@@ -96,18 +89,10 @@ Result<Parts> split(std::string_view bytes) {
 
 Digest table_key(const BuildIdentity& identity, const JobSpec& spec) {
     std::string text = "lightloom-tables-key 2\n";
-    put(text, "build", identity.build_id);
-    put(text, "profile", identity.math_profile);
-    put(text, "golden", identity.golden_digest.hex());  // builds of the same sources that compute otherwise
-    put(text, "algorithm", spec.algorithm);
-    for (const auto& [name, value] : spec.parameters) put(text, "set " + name, value);
-    put(text, "seed", std::to_string(spec.seed));
-    put(text, "max_depth", std::to_string(spec.max_depth));
-    put(text, "scene_root", spec.scene_root.hex());
-    const Rect& crop = spec.frame.crop;
-    for (const int32_t n : {spec.frame.width, spec.frame.height, crop.x0, crop.y0, crop.x1, crop.y1})
-        put(text, "frame", std::to_string(n));
-    return sha256(text);
+    append_text(text, "build", identity.build_id);
+    append_text(text, "profile", identity.math_profile);
+    append_text(text, "golden", identity.golden_digest.hex());  // builds of the same sources that compute otherwise
+    return sha256(text + fields_text<job_role::kTables>(spec));
 }
 
 Result<std::string> tables_of_file(std::string bytes) {

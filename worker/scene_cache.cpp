@@ -186,7 +186,7 @@ Result<std::shared_ptr<const SubspaceTables>> RendererCache::tables(const UnitLe
 }
 
 Result<std::shared_ptr<const Renderer>> RendererCache::renderer(const UnitLease& lease, std::stop_token stop) {
-    const Digest image = lease.spec.image_digest();
+    const Digest image = lease.spec.spec_digest();
     const std::lock_guard lock(mutex_);
     for (auto item = renderer_entries_.begin(); item != renderer_entries_.end(); ++item) {
         if (item->image != image || item->tables != lease.tables.digest) continue;
@@ -207,7 +207,7 @@ Result<std::shared_ptr<const Renderer>> RendererCache::renderer(const UnitLease&
 }
 
 Result<TrainingTracer> RendererCache::tracer(const UnitLease& lease, std::stop_token stop) {
-    const Digest image = lease.spec.image_digest();
+    const Digest image = lease.spec.spec_digest();
     const std::lock_guard lock(mutex_);
     if (tracer_ && tracer_image_ == image && tracer_guide_ == lease.tables.digest) return tracer_;
     const auto built = scene(lease.spec, stop);

@@ -190,7 +190,7 @@ void set_integrator(Context* context, const std::string& kind, const ParameterLi
     context->scene.max_depth = std::min(depth, kMaxDepth);
     if (p.one_bool("regularize", false))
         context->diagnostics.warn(p.where(), p.what() + ": regularize is ignored, it would blur the picture's glossy light");
-    const std::string reason = "algorithm and parameters come from the command line";
+    const std::string reason = "the parameters of an algorithm come from the command line";
     for (const std::string_view name :
          {"lightsampler", "samplelights", "samplebsdf", "visualizestrategies", "visualizeweights", "bootstrapsamples", "chains",
           "mutationsperpixel", "largestepprobability", "sigma", "photonsperiteration", "radius", "seed"})

@@ -175,7 +175,7 @@ struct SceneDescription {
     FilmDescription film;
     int max_depth = 5;                  ///< Bounces, as in pbrt: paths have up to max_depth + 1 edges.
     int samples_per_pixel = 16;         ///< What the file asks for; the command line may override.
-    std::string integrator;             ///< As in the scene file, empty if it has none; the command line's --algorithm replaces it.
+    std::string integrator;             ///< As in the scene file, empty if it has none; the client takes its default from it.
     std::vector<std::string> warnings;  ///< Named warnings: "file:line: what was ignored and why that matters".
 };
 

@@ -15,6 +15,7 @@
 
 namespace lightloom {
 
+/// A new field must be entered in common/work/job_fields.h, which says what it decides; it does not compile otherwise.
 struct JobSpec {
     static constexpr uint32_t kMaxSamplesPerPixel = 1u << 24;
 
@@ -30,8 +31,12 @@ struct JobSpec {
     bool first_hit_layers = false;   ///< Also write albedo, normal and depth of the first hit.
 
     /// Digest of everything that decides the bytes of the image except how many iterations are rendered.
-    Digest image_digest() const;
+    Digest spec_digest() const;
+    friend bool operator==(const JobSpec&, const JobSpec&) = default;
 };
+
+/// True unless they differ in what those who submit give; what the coordinator fills in does not count.
+bool same_request(const JobSpec& a, const JobSpec& b);
 
 /// What light transport needs of a spec.
 inline RenderSettings render_settings(const JobSpec& spec) {

@@ -10,9 +10,11 @@
 #include <nlohmann/json.hpp>
 
 #include "client/commands.h"
+#include "client/default_algorithm.h"
 #include "client/run_job.h"
 #include "common/cli/numbers.h"
 #include "common/core/atomic_file.h"
+#include "common/transport/catalog.h"
 #include "server/data_lock.h"
 #include "server/results.h"
 #include "server/status_http.h"
@@ -40,6 +42,24 @@ TEST(CommandLine, NumbersAreDecimalAndInRange) {
     EXPECT_TRUE(accepts(whole_number(), "18446744073709551615"));
     std::string text = "3e6";
     EXPECT_EQ(real(text), "\"3e6\" is no number from -30 to 2592000");
+}
+
+TEST(DefaultAlgorithm, IsTheScenesIntegratorAsFarAsTheCatalogHasIt) {
+    const auto chosen = [](const std::string& integrator) { return client::default_algorithm(integrator).name; };
+    EXPECT_EQ(chosen("path"), "path");
+    EXPECT_EQ(chosen("volpath"), "path");
+    EXPECT_EQ(chosen("bdpt"), "bdpt");
+    EXPECT_EQ(chosen("lightpath"), "light");
+    for (const char* other : {"", "mlt", "sppm", "simplepath", "simplevolpath", "randomwalk", "light", "spcbpt"})
+        EXPECT_EQ(chosen(other), "bdpt") << other;
+    const auto says = [](const std::string& integrator, const std::string& reason) {
+        EXPECT_EQ(client::default_algorithm(integrator).reason, reason);
+        EXPECT_TRUE(find_algorithm(client::default_algorithm(integrator).name).ok()) << "what else would render it?";
+    };
+    says("volpath", "the scene's Integrator \"volpath\" asks for path; --algorithm overrides");
+    says("lightpath", "the scene's Integrator \"lightpath\" asks for light; --algorithm overrides");
+    says("sppm", "no algorithm for the scene's Integrator \"sppm\": rendering with bdpt; --algorithm overrides");
+    says("", "the scene names no Integrator: rendering with bdpt; --algorithm overrides");
 }
 
 TEST(Outputs, ThatAreLinksAreTriedOutWhereTheyPoint) {

@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
 
 #include "client/grpc_job_port.h"
 #include "common/core/atomic_file.h"
@@ -330,12 +331,70 @@ TEST(Processes, ASocketBelongsToTheServerThatHasIt) {
     EXPECT_EQ(list(), 0);
 }
 
+/// Every command that renders takes the scene's Integrator for its default and says so in one line; the job names its algorithm.
+TEST(Processes, TheScenesIntegratorIsTheDefault) {
+    const Service service;
+    const auto text = read_file(std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/furnace-sphere.pbrt");  // which includes no file
+    const std::string directive = "Integrator \"path\"", note = "Integrator \"";
+    ASSERT_NE(text->find(directive), std::string::npos);
+    const std::string scene = service.path("own.pbrt");
+    const auto ask_for = [&](const std::string& integrator) {
+        std::ofstream(scene) << std::string(*text).replace(text->find(directive), directive.size(),
+                                                           "Integrator \"" + integrator + "\"");
+    };
+    // The lines of a command's output that are about the integrator.
+    int count = 0;
+    const auto lines = [&](std::vector<std::string> arguments, std::vector<std::string> more) {
+        const std::string name = "run" + std::to_string(count++);
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        EXPECT_EQ(Process("lightloom", arguments, service.path(name + ".log")).wait(), 0) << service.log(name);
+        std::istringstream log(service.log(name));
+        std::vector<std::string> found;
+        for (std::string line; std::getline(log, line);)
+            if (line.find(note) != std::string::npos) found.push_back(line);
+        return found;
+    };
+    const auto render = [&](std::vector<std::string> more) {
+        return lines({"render", scene, "--spp", "1", "--resolution", "8x8", "-o", service.path("own.exr")}, std::move(more));
+    };
+    const auto rendered = [&] { return service.manifest("own")["spec"]["algorithm"].get<std::string>(); };
+    const std::vector<std::string> none;
+    ask_for("sppm");
+    const std::string with_bdpt = "no algorithm for the scene's Integrator \"sppm\": rendering with bdpt; --algorithm overrides";
+    EXPECT_EQ(render({}), std::vector{"lightloom: " + with_bdpt});
+    EXPECT_EQ(rendered(), "bdpt");
+    EXPECT_EQ(lines({"inspect", scene}, {}), std::vector{"  algorithm  " + with_bdpt});
+    ask_for("volpath");
+    const std::vector with_path{std::string("lightloom: the scene's Integrator \"volpath\" asks for path; --algorithm overrides")};
+    EXPECT_EQ(render({}), with_path);
+    EXPECT_EQ(rendered(), "path");
+    EXPECT_EQ(render({"-q"}), none);
+    EXPECT_EQ(rendered(), "path");
+    EXPECT_EQ(render({"--algorithm", "light"}), none);
+    EXPECT_EQ(rendered(), "light");
+    EXPECT_EQ(lines({"replay", scene, "--pixel", "1,1"}, {}), with_path);
+    EXPECT_EQ(lines({"reference", scene, "--spp", "1", "--resolution", "8x8", "-o", service.path("ref.exr")}, {}), with_path);
+    EXPECT_EQ(Json::parse(*read_file(service.path("ref.json")))["algorithm"], "path");
+    EXPECT_EQ(
+        Process("lightloom", {"reference", scene, "--spp", "99", "-o", service.path("own-check.exr"), "--cross-check", "path"},
+                service.path("check.log"))
+            .wait(),
+        2)
+        << "the scene's own algorithm cannot check itself";
+    EXPECT_EQ(lines({"submit", scene, "--server", service.address(), "--spp", "1", "--detach"}, {}), with_path);
+    const auto jobs = service.jobs().list_jobs();
+    ASSERT_TRUE(jobs.ok()) << jobs.status().message();
+    ASSERT_EQ(jobs->size(), 1u);
+    EXPECT_EQ(jobs->front().spec.algorithm, "path") << "a service is told, it does not guess";
+}
+
 TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {
     const TempDirectory directory;
     const std::string log = (directory.path / "log").string();
     const auto run = [&](std::vector<std::string> arguments) { return Process("lightloom", arguments, log).wait(); };
     EXPECT_EQ(run({"render", "no-such-scene.pbrt"}), 2);
     EXPECT_EQ(run({"render", kScene, "--algorithm", "no-such"}), 2);
+    EXPECT_EQ(run({"render", kScene, "--algorithm", ""}), 2) << "not the default";
     EXPECT_EQ(run({"render", kScene, "--set", "no-such=1"}), 2);
     EXPECT_EQ(run({"render", kScene, "--set", "rr-min=1", "--set", "rr-min=0.5"}), 2);
     for (const char* seed : {"-1", " -1", "010", "18446744073709551616", "1.5"})

@@ -85,7 +85,7 @@ struct TableService : FakeService {
 inline const std::string& traced(const UnitLease& lease) {
     static std::map<std::tuple<Digest, uint64_t, uint64_t>, std::string> memory;
     const TrainingWork& work = lease.unit.training;
-    std::string& payload = memory[{lease.spec.image_digest(), work.first_sample, work.total_samples}];
+    std::string& payload = memory[{lease.spec.spec_digest(), work.first_sample, work.total_samples}];
     if (payload.empty()) payload = serialize(*trace_training(*golden(), render_settings(lease.spec), work, {}));
     return payload;
 }

@@ -260,8 +260,9 @@ TEST(ImportOptions, CameraFilmAndDepth) {
     EXPECT_EQ(d.max_depth, 9);
 }
 
-/// The command line says which algorithm renders and where the picture goes; the description keeps what the file says, to show it.
-TEST(ImportOptions, IntegratorAndFileNameAreKeptForShow) {
+/// What an integrator means is the client's business, and the command line says where the picture goes; the description keeps what
+/// the file says.
+TEST(ImportOptions, IntegratorAndFileNameAreKept) {
     for (const std::string name : {"path", "volpath", "bdpt", "sppm"}) {
         const auto scene = import_text(
             "PixelFilter \"box\" Integrator \"" + name + "\" Film \"rgb\" \"string filename\" \"foo.exr\" WorldBegin", {}, true);

@@ -166,15 +166,15 @@ TEST(JobSpec, DigestChangesWithEverythingThatChangesTheImageAndOnlyThat) {
     JobSpec spec;
     spec.frame = frame(64, 48);
     spec.max_depth = 5;
-    const Digest base = spec.image_digest();
+    const Digest base = spec.spec_digest();
     JobSpec other = spec;
     other.samples_per_pixel = 99;
     other.time_limit_seconds = 3;
-    EXPECT_EQ(other.image_digest(), base);
+    EXPECT_EQ(other.spec_digest(), base);
     const auto differs = [&](auto change) {
         JobSpec changed = spec;
         change(changed);
-        EXPECT_NE(changed.image_digest(), base);
+        EXPECT_NE(changed.spec_digest(), base);
     };
     differs([](JobSpec& s) { s.algorithm = "bdpt"; });
     differs([](JobSpec& s) { s.parameters["a"] = "1"; });
@@ -300,7 +300,7 @@ TEST(Wire, SpecAndUnitsSurviveTheRoundTrip) {
     wire::put(lease, &message);
     const auto back = wire::get(message);
     ASSERT_TRUE(back.ok());
-    EXPECT_EQ(back->spec.image_digest(), spec.image_digest());
+    EXPECT_EQ(back->spec.spec_digest(), spec.spec_digest());
     EXPECT_EQ(back->spec.max_depth, -1);
     EXPECT_EQ(back->unit.key, lease.unit.key);
     EXPECT_EQ(back->unit.tile, lease.unit.tile);

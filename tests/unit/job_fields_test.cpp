@@ -1,0 +1,142 @@
+// The one list of a job's fields against everything that enumerates them. A member of JobSpec that is not in the list does not
+// compile; one that the wire or the command for a replay forgets fails here, and so does a role that is not kept.
+
+#include "common/work/job_fields.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <vector>
+
+#include "common/work/wire.h"
+#include "server/results.h"
+#include "server/table_cache.h"
+
+namespace lightloom {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const BuildIdentity kIdentity{"build", "profile", sha256("golden")};
+const std::string kMain = "room.pbrt";
+
+/// No field has the value that a forgotten one would have.
+JobSpec full_spec() {
+    JobSpec spec;
+    spec.algorithm = "lvcbpt";
+    spec.parameters = {{"cache", "500"}, {"rr-min", "0.25"}};
+    spec.seed = ~0ull;
+    spec.samples_per_pixel = 7;
+    spec.time_limit_seconds = 1.5;
+    spec.max_depth = 9;
+    spec.width = 64;
+    spec.height = 48;
+    spec.scene_root = sha256("scene");
+    spec.frame = {64, 48, {1, 2, 33, 44}};
+    spec.first_hit_layers = true;
+    return spec;
+}
+
+std::string manifest_spec(const JobSpec& spec) {
+    Manifest manifest;
+    manifest.job.spec = spec;
+    manifest.scene_main = kMain;
+    return Json::parse(to_json(manifest))["spec"].dump();
+}
+
+/// Of a unit: a sample is also named by its place in the frame, which is no option of its own.
+std::string replay(const JobSpec& spec) { return replay_command(spec, kMain, {{3, 1}, {5, 6, true}}); }
+
+// Other values than the given one, each different in another part of it.
+std::vector<std::string> others(const std::string& value) { return {value + "x"}; }
+std::vector<std::map<std::string, std::string>> others(const std::map<std::string, std::string>& value) {
+    auto more = value, less = value, changed = value;
+    more["another"] = "1";
+    less.erase(less.begin());
+    changed.begin()->second += "1";
+    return {more, less, changed};
+}
+std::array<bool, 1> others(bool value) { return {!value}; }
+std::vector<Digest> others(Digest value) {
+    value.bytes[31] ^= 1;
+    return {value};
+}
+std::vector<FrameLayout> others(const FrameLayout& value) {
+    std::vector<FrameLayout> frames(6, value);
+    ++frames[0].width, ++frames[1].height;
+    ++frames[2].crop.x0, ++frames[3].crop.y0, ++frames[4].crop.x1, ++frames[5].crop.y1;
+    return frames;
+}
+template <class T>
+requires std::is_arithmetic_v<T> std::vector<T> others(T value) { return {T(value - 1)}; }
+
+TEST(JobFields, EachDecidesWhatItsRolesSayAndTravels) {
+    const JobSpec base = full_spec();
+    for_each_job_field([&]<unsigned Roles, class T>(const JobField<Roles, T>& field) {
+        const auto has = [](unsigned role) { return (Roles & role) != 0; };
+        for (const T& value : others(base.*field.member)) {
+            SCOPED_TRACE(std::string(field.name));
+            JobSpec changed = base;
+            changed.*field.member = value;
+            ASSERT_FALSE(changed == base);
+            EXPECT_EQ(!same_request(changed, base), has(job_role::kRequest));
+            EXPECT_EQ(changed.spec_digest() != base.spec_digest(), has(job_role::kImage));
+            EXPECT_EQ(table_key(kIdentity, changed) != table_key(kIdentity, base), has(job_role::kTables));
+            EXPECT_EQ(manifest_spec(changed) != manifest_spec(base), has(job_role::kManifest));
+            EXPECT_EQ(settings_json(changed) != settings_json(base), has(job_role::kSettings));
+            EXPECT_EQ(replay(changed) != replay(base), has(job_role::kReplay));
+            const auto settings = [](const JobSpec& spec) {
+                const RenderSettings s = render_settings(spec);
+                return std::tuple(s.algorithm, s.parameters, s.seed, s.max_depth);
+            };
+            EXPECT_EQ(settings(changed) != settings(base), has(job_role::kSettings));
+
+            v1::JobSpec message;
+            wire::put(changed, &message);
+            const auto back = wire::get(message);
+            ASSERT_TRUE(back.ok()) << back.status().message();
+            EXPECT_TRUE(*back == changed);
+        }
+    });
+    EXPECT_EQ(size_t(v1::JobSpec::descriptor()->field_count()), std::tuple_size_v<decltype(kJobFields)>);
+}
+
+/// With as many rows as members, no member is in the list twice exactly if none is missing.
+TEST(JobFields, NoneIsInTheListTwice) {
+    std::set<std::string_view> names;
+    std::vector<JobSpec> specs{full_spec()};
+    for_each_job_field([&](const auto& field) {
+        EXPECT_TRUE(names.insert(field.name).second) << field.name;
+        JobSpec changed = full_spec();
+        changed.*field.member = others(changed.*field.member).front();
+        for (const JobSpec& other : specs) EXPECT_FALSE(other == changed) << field.name;
+        specs.push_back(changed);
+    });
+}
+
+/// Images name the digest of their spec, and tables lie under their key: neither may change unless what it stands for does. The
+/// values are those of the versions that wrote every field out.
+TEST(JobFields, TextsAreThoseOfEarlierVersions) {
+    JobSpec spec = full_spec();
+    EXPECT_EQ(spec.spec_digest().hex(), "e87d5dc631d9bad5dd7b7278f0b350a3ad752927b8676dfbc4a65cfc85a79f06");
+    const std::string key = "4d0b883b361e076052a972e7be5ce035e4572cd6bcf49dc83987c95ea0cb081c";
+    EXPECT_EQ(table_key(kIdentity, spec).hex(), key);
+    EXPECT_EQ(manifest_spec(spec),
+              R"({"algorithm":"lvcbpt","parameters":{"cache":"500","rr-min":"0.25"},"seed":18446744073709551615,"max_depth":9,)"
+              R"("requested_samples_per_pixel":7,"time_limit_seconds":1.5,"layers":true,"scene":"room.pbrt",)"
+              R"("scene_root":"4f48f7207cebf92638debb5694e4a8677350cf88a9e98e73c6c466b6b1d43890",)"
+              R"("frame":{"width":64,"height":48,"crop":[1,2,33,44]}})");
+    EXPECT_EQ(settings_json(spec).dump(),
+              R"({"algorithm":"lvcbpt","parameters":{"cache":"500","rr-min":"0.25"},"seed":18446744073709551615,"max_depth":9})");
+    EXPECT_EQ(replay(spec),
+              "lightloom replay room.pbrt --algorithm lvcbpt --set cache=500 --set rr-min=0.25 --seed 18446744073709551615 "
+              "--max-depth 9 --resolution 64x48 --spp 7 --unit 3,1");
+    spec.first_hit_layers = false;
+    EXPECT_EQ(spec.spec_digest().hex(), "816904b5125d11187cf1e71fc7232f951d4a523ad81bd5785a97ecf4104bc29a");
+    EXPECT_EQ(table_key(kIdentity, spec).hex(), key) << "tables know nothing of layers";
+}
+
+}  // namespace
+}  // namespace lightloom
