@@ -1,7 +1,5 @@
 #include "client/grpc_job_port.h"
 
-#include <grpcpp/client_context.h>
-
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
@@ -9,7 +7,7 @@
 #include <mutex>
 #include <thread>
 
-#include "common/work/wire.h"
+#include "common/work/grpc_call.h"
 
 namespace lightloom {
 namespace {
@@ -22,11 +20,6 @@ constexpr int kUploadAttempts = 5;
 /// Between looks at what another client is sending.
 constexpr auto kUploadInterval = std::chrono::milliseconds(500);
 constexpr size_t kDigestsPerCall = 1000;
-
-void set_deadline(grpc::ClientContext& context, double seconds) {
-    context.set_deadline(std::chrono::system_clock::now() +
-                         std::chrono::duration_cast<std::chrono::system_clock::duration>(Seconds(seconds)));
-}
 
 std::string seconds_text(double seconds) { return std::to_string(std::lround(seconds)) + " s"; }
 
@@ -78,22 +71,29 @@ class SilenceLimit {
 /// For a call after an interruption, such as that for the image of a job that had just ended: only a later one could stop it.
 std::stop_token unless_requested(const std::stop_token& stop) { return stop.stop_requested() ? std::stop_token() : stop; }
 
-/// `stop` cancels the call.
-Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientContext& context, double silence_seconds,
-                            const std::stop_token& stop) {
+/// The bytes that a method streams.
+template <class Request>
+Result<std::string> collect(v1::JobService::Stub& stub,
+                            std::unique_ptr<grpc::ClientReader<v1::Chunk>> (v1::JobService::Stub::*method)(grpc::ClientContext*,
+                                                                                                           const Request&),
+                            const Request& request, const GrpcJobPortOptions& options) {
+    const double silence_seconds = options.silence_seconds;
+    const std::stop_token stop = unless_requested(options.stop);
+    grpc::ClientContext context;
+    const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
+    const auto reader = (stub.*method)(&context, request);
     SilenceLimit silence(context, silence_seconds);
     std::string bytes;
     v1::Chunk chunk;
-    while (reader.Read(&chunk)) {
+    while (reader->Read(&chunk)) {
         silence.heard();
         if (chunk.offset_bytes() != bytes.size()) {
-            context.TryCancel();
-            (void)reader.Finish();
-            return data_loss("the coordinator sent a chunk out of order");
+            abandon(context, *reader);
+            return chunk_out_of_order();
         }
         bytes += chunk.data();
     }
-    const grpc::Status status = reader.Finish();
+    const grpc::Status status = reader->Finish();
     if (status.ok()) return bytes;
     constexpr const char* kLater = "; nothing is lost, `lightloom fetch` tries again";
     if (stop.stop_requested()) return Status(StatusCode::kCancelled, std::string("interrupted") + kLater);
@@ -106,6 +106,11 @@ Result<std::string> collect(grpc::ClientReader<v1::Chunk>& reader, grpc::ClientC
     return wire::from_grpc(status);
 }
 
+Result<JobInfo> job_info(const Result<v1::Job>& answer) {
+    if (!answer.ok()) return answer.status();
+    return wire::get(*answer);
+}
+
 }  // namespace
 
 GrpcJobPort::GrpcJobPort(std::shared_ptr<grpc::Channel> channel, GrpcJobPortOptions options)
@@ -115,52 +120,28 @@ GrpcJobPort::GrpcJobPort(std::shared_ptr<grpc::Channel> channel, GrpcJobPortOpti
       assets_(v1::AssetService::NewStub(channel_)) {}
 
 Result<JobInfo> GrpcJobPort::submit_job(const std::string& request_id, const JobSpec& spec) {
-    grpc::ClientContext context;
-    set_deadline(context, 30);
     v1::SubmitJobRequest request;
     request.set_request_id(request_id);
     wire::put(spec, request.mutable_spec());
-    v1::Job response;
-    const grpc::Status status = jobs_->SubmitJob(&context, request, &response);
-    if (!status.ok()) return wire::from_grpc(status);
-    return wire::get(response);
+    return job_info(call(*jobs_, &v1::JobService::Stub::SubmitJob, request, 30));
 }
 
 Result<JobInfo> GrpcJobPort::get_job(const std::string& job_id) {
-    grpc::ClientContext context;
-    set_deadline(context, 10);
     v1::GetJobRequest request;
     request.set_job_id(job_id);
-    v1::Job response;
-    const grpc::Status status = jobs_->GetJob(&context, request, &response);
-    if (!status.ok()) return wire::from_grpc(status);
-    return wire::get(response);
+    return job_info(call(*jobs_, &v1::JobService::Stub::GetJob, request, 10));
 }
 
 Result<std::vector<JobInfo>> GrpcJobPort::list_jobs() {
-    grpc::ClientContext context;
-    set_deadline(context, 10);
-    v1::ListJobsResponse response;
-    const grpc::Status status = jobs_->ListJobs(&context, {}, &response);
-    if (!status.ok()) return wire::from_grpc(status);
-    std::vector<JobInfo> jobs;
-    for (const v1::Job& item : response.jobs()) {
-        auto info = wire::get(item);
-        if (!info.ok()) return info.status();
-        jobs.push_back(*std::move(info));
-    }
-    return jobs;
+    const auto response = call(*jobs_, &v1::JobService::Stub::ListJobs, {}, 10);
+    if (!response.ok()) return response.status();
+    return get_all<JobInfo>(response->jobs());
 }
 
 Result<JobInfo> GrpcJobPort::cancel_job(const std::string& job_id) {
-    grpc::ClientContext context;
-    set_deadline(context, 10);
     v1::CancelJobRequest request;
     request.set_job_id(job_id);
-    v1::Job response;
-    const grpc::Status status = jobs_->CancelJob(&context, request, &response);
-    if (!status.ok()) return wire::from_grpc(status);
-    return wire::get(response);
+    return job_info(call(*jobs_, &v1::JobService::Stub::CancelJob, request, 10));
 }
 
 Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
@@ -180,8 +161,7 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<voi
         while (reader->Read(&message)) {
             const auto info = wire::get(message);
             if (!info.ok()) {
-                context.TryCancel();
-                (void)reader->Finish();
+                abandon(context, *reader);
                 return info.status();
             }
             on_change(*info);
@@ -199,56 +179,37 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<voi
 }
 
 Result<std::string> GrpcJobPort::image(const std::string& job_id, ImageKind kind) {
-    grpc::ClientContext context;
-    const std::stop_token stop = unless_requested(options_.stop);
-    const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
     v1::GetImageRequest request;
     request.set_job_id(job_id);
     request.set_kind(kind == ImageKind::kFinal ? v1::IMAGE_KIND_FINAL : v1::IMAGE_KIND_PREVIEW);
-    const auto reader = jobs_->GetImage(&context, request);
-    return collect(*reader, context, options_.silence_seconds, stop);
+    return collect(*jobs_, &v1::JobService::Stub::GetImage, request, options_);
 }
 
 Result<std::string> GrpcJobPort::manifest(const std::string& job_id) {
-    grpc::ClientContext context;
-    const std::stop_token stop = unless_requested(options_.stop);
-    const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
     v1::GetManifestRequest request;
     request.set_job_id(job_id);
-    const auto reader = jobs_->GetManifest(&context, request);
-    return collect(*reader, context, options_.silence_seconds, stop);
+    return collect(*jobs_, &v1::JobService::Stub::GetManifest, request, options_);
 }
 
 Result<std::vector<Digest>> GrpcJobPort::find_missing(const std::vector<Digest>& digests) {
     std::vector<Digest> missing;
     for (size_t begin = 0; begin < digests.size(); begin += kDigestsPerCall) {
-        grpc::ClientContext context;
-        set_deadline(context, 30);
         v1::FindMissingRequest request;
         for (size_t i = begin; i < std::min(begin + kDigestsPerCall, digests.size()); ++i)
             wire::put(digests[i], request.add_digests());
-        v1::FindMissingResponse response;
-        const grpc::Status status = assets_->FindMissing(&context, request, &response);
-        if (!status.ok()) return wire::from_grpc(status);
-        for (const v1::Digest& item : response.missing()) {
-            const auto digest = wire::get(item);
-            if (!digest.ok()) return digest.status();
-            missing.push_back(*digest);
-        }
+        const auto response = call(*assets_, &v1::AssetService::Stub::FindMissing, request, 30);
+        if (!response.ok()) return response.status();
+        const auto found = get_all<Digest>(response->missing());
+        if (!found.ok()) return found.status();
+        missing.insert(missing.end(), found->begin(), found->end());
     }
     return missing;
 }
 
 Result<v1::QueryWriteResponse> GrpcJobPort::query_write(const Digest& digest) {
-    grpc::ClientContext context;
-    set_deadline(context, 10);
-    const std::stop_callback cancel(options_.stop, [&] { context.TryCancel(); });
     v1::QueryWriteRequest request;
     wire::put(digest, request.mutable_digest());
-    v1::QueryWriteResponse response;
-    const grpc::Status status = assets_->QueryWrite(&context, request, &response);
-    if (!status.ok()) return wire::from_grpc(status);
-    return response;
+    return call(*assets_, &v1::AssetService::Stub::QueryWrite, request, 10, options_.stop);
 }
 
 Status GrpcJobPort::write(const Digest& digest, uint64_t size, uint64_t offset, const Source& source) {
@@ -264,8 +225,7 @@ Status GrpcJobPort::write(const Digest& digest, uint64_t size, uint64_t offset, 
     while (open && offset < size) {
         const auto bytes = source(offset);
         if (!bytes.ok()) {
-            context.TryCancel();
-            (void)writer->Finish();
+            abandon(context, *writer);
             return bytes.status();
         }
         message.mutable_chunk()->set_offset_bytes(offset);
