@@ -8,6 +8,7 @@
 
 #include "client/commands.h"
 #include "common/cli/log.h"
+#include "common/cli/start.h"
 #include "common/work/identity.h"
 
 namespace {
@@ -30,7 +31,7 @@ int main(int argc, char** argv) {
     app.set_version_flag("--version", lightloom::kBuildId);
     app.require_subcommand(1);
     std::string level = "warn";
-    app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
+    lightloom::add_log_option(app, level);
     app.parse_complete_callback([&] {
         if (!lightloom::set_up_logging("lightloom", level)) throw CLI::ValidationError("--log", "unknown level " + level);
     });

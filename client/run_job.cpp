@@ -1,8 +1,5 @@
 #include "client/run_job.h"
 
-#include <signal.h>
-#include <unistd.h>
-
 #include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -13,6 +10,7 @@
 #include "client/commands.h"
 #include "client/output_files.h"
 #include "client/progress.h"
+#include "common/cli/start.h"
 #include "common/film/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "common/film/png.h"
@@ -108,19 +106,8 @@ Result<ImageFiles> as_half(const ImageFiles& files, const std::string& name) {
 std::stop_token interrupt_token() {
     static std::stop_source source;
     static const bool installed = [] {
-        sigset_t signals;
-        sigemptyset(&signals);
-        sigaddset(&signals, SIGINT);
-        sigaddset(&signals, SIGTERM);
-        pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-        // The thread outlives main, so it has a share of its own in the state that the static's destructor lets go.
-        std::thread([signals, stop = source]() mutable {
-            int signal = 0;
-            sigwait(&signals, &signal);
-            stop.request_stop();
-            sigwait(&signals, &signal);
-            _exit(kCancelled);
-        }).detach();
+        // The thread that waits outlives main, so it has a share of its own in the state that the static's destructor lets go.
+        StopSignals().on_stop([stop = source]() mutable { stop.request_stop(); }, kCancelled);
         return true;
     }();
     (void)installed;

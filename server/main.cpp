@@ -1,8 +1,6 @@
 // lightloom-server: the coordinator as a process.
 
-#include <signal.h>
 #include <spdlog/spdlog.h>
-
 #include <tbb/global_control.h>
 #include <unistd.h>
 
@@ -12,8 +10,8 @@
 #include <optional>
 #include <thread>
 
-#include "common/cli/log.h"
 #include "common/cli/numbers.h"
+#include "common/cli/start.h"
 #include "common/film/atomic_file.h"
 #include "common/work/identity.h"
 #include "server/data_lock.h"
@@ -22,8 +20,7 @@
 #include "server/local_ports.h"
 #include "server/scene_reader.h"
 #include "server/status_http.h"
-#include "worker/scene_cache.h"
-#include "worker/worker.h"
+#include "worker/fetching_worker.h"
 
 namespace lightloom {
 namespace {
@@ -45,13 +42,10 @@ Exit codes: 0 stopped as asked, 1 failed to start, 2 bad command line.)";
 class OwnWorker {
   public:
     OwnWorker(Coordinator& coordinator, const BuildIdentity& identity, uint32_t threads, const std::filesystem::path& cache)
-        : parallelism_(tbb::global_control::max_allowed_parallelism, std::max(threads, 1u)),
+        : parallelism_(tbb::global_control::max_allowed_parallelism, threads),
           port_(coordinator),
-          fetcher_(port_, cache),
-          worker_(
-              port_, {.identity = identity, .thread_count = threads, .host = "coordinator", .process_id = uint64_t(::getpid())},
-              [this](const UnitLease& lease, std::stop_token stop) { return renderers_.renderer(lease, stop); },
-              [this](const UnitLease& lease, std::stop_token stop) { return renderers_.tracer(lease, stop); }),
+          worker_(port_, cache,
+                  {.identity = identity, .thread_count = threads, .host = "coordinator", .process_id = uint64_t(::getpid())}),
           thread_([this](std::stop_token stop) {
               if (const Status s = worker_.run(stop); !s.ok()) spdlog::error("the coordinator's own worker: {}", s.message());
           }) {}
@@ -59,10 +53,7 @@ class OwnWorker {
   private:
     tbb::global_control parallelism_;
     LocalWorkerPort port_;
-    SceneFetcher fetcher_;
-    RendererCache renderers_{[this](const JobSpec& spec, std::stop_token s) { return fetcher_.scene(spec, s); },
-                             [this](const AssetReference& tables, std::stop_token s) { return fetcher_.tables(tables, s); }};
-    Worker worker_;
+    FetchingWorker worker_;
     std::jthread thread_;
 };
 
@@ -99,40 +90,24 @@ int main(int argc, char** argv) {
         ->capture_default_str();
     app.add_option("--port-file", port_file, "Write \"GRPC_PORT STATUS_PORT\" here once both listen (a unix: socket has port 0)");
     app.add_flag("--allow-plaintext", plaintext, "Listen on other than loopback addresses");
-    app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
+    add_log_option(app, level);
     app.add_option("--shuffle-leases", shuffle, "")->group("")->check(whole_number());  // tests: lease units in a random order
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : 2;
-    }
-    if (!set_up_logging("lightloom-server", level)) {
-        std::cerr << "unknown log level \"" << level << "\"\n";
-        return 2;
-    }
+    if (const auto ended = parse_and_log(app, argc, argv, level)) return *ended;
     for (const auto& [option, address] : {std::pair{"--listen", &listen}, {"--status", &status}}) {
         if ((address == &status && status == "off") || (address == &listen && listen.starts_with("unix:"))) continue;
         const auto parsed = parse_host_port(*address, option);
         if (!parsed.ok()) {
             std::cerr << parsed.status().message() << '\n';
-            return 2;
+            return kBadCommandLine;
         }
         if (!plaintext && !is_loopback(*parsed)) {
             std::cerr << "refusing to listen beyond loopback without --allow-plaintext: connections have no protection\n";
-            return 2;
+            return kBadCommandLine;
         }
     }
-    sigset_t signals;
-    sigemptyset(&signals);
-    sigaddset(&signals, SIGINT);
-    sigaddset(&signals, SIGTERM);
-    pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-
+    const StopSignals signals;
     const auto identity = build_identity();
-    if (!identity.ok()) {
-        spdlog::error("the golden unit failed on this host: {}", identity.status().message());
-        return 1;
-    }
+    if (!identity.ok()) return log_failure(identity.status(), kNoIdentity);
     CoordinatorOptions options;
     options.directory = data;
     options.identity = *identity;
@@ -144,27 +119,18 @@ int main(int argc, char** argv) {
     options.table_cache_bytes = table_cache_mb << 20;
     std::error_code error;
     std::filesystem::create_directories(data, error);
-    if (error) {
-        spdlog::error("{}: {}", data, error.message());
-        return 1;
-    }
+    if (error) return log_failure(internal_error(error.message()), data + ": ");
     const auto lock = DataLock::take(data);
-    if (!lock.ok()) {
-        spdlog::error("{}", lock.status().message());
-        return 1;
-    }
+    if (!lock.ok()) return log_failure(lock.status());
     Coordinator coordinator(std::move(options));
     auto server = GrpcServer::start(coordinator, listen);
-    if (!server.ok()) {
-        spdlog::error("{}", server.status().message());
-        return 1;
-    }
+    if (!server.ok()) return log_failure(server.status());
     std::unique_ptr<StatusHttp> http;
     if (status != "off") {
         auto started = StatusHttp::start(coordinator, status);
         if (!started.ok()) {
-            spdlog::error("{}", started.status().message());
-            return started.status().code() == StatusCode::kInvalidArgument ? 2 : 1;
+            const int failed = log_failure(started.status());
+            return started.status().code() == StatusCode::kInvalidArgument ? kBadCommandLine : failed;
         }
         http = std::move(started).value();
     }
@@ -176,13 +142,9 @@ int main(int argc, char** argv) {
     if (!port_file.empty()) {
         const std::string ports =
             std::to_string(tcp ? (*server)->port() : 0) + " " + std::to_string(http ? http->port() : 0) + "\n";
-        if (const Status written = write_file_atomically(port_file, ports); !written.ok()) {
-            spdlog::error("{}", written.message());
-            return 1;
-        }
+        if (const Status written = write_file_atomically(port_file, ports); !written.ok()) return log_failure(written);
     }
-    int signal = 0;
-    sigwait(&signals, &signal);
+    signals.wait();
     spdlog::info("stopping");
-    return 0;
+    return kStopped;
 }

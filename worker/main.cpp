@@ -1,6 +1,5 @@
 // lightloom-worker: renders units for a coordinator.
 
-#include <signal.h>
 #include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
@@ -8,15 +7,14 @@
 #include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <filesystem>
-#include <iostream>
-#include <thread>
+#include <stop_token>
 
-#include "common/cli/log.h"
 #include "common/cli/numbers.h"
+#include "common/cli/start.h"
 #include "common/work/channel.h"
 #include "common/work/identity.h"
+#include "worker/fetching_worker.h"
 #include "worker/grpc_worker_port.h"
-#include "worker/scene_cache.h"
 
 namespace {
 
@@ -50,65 +48,33 @@ int main(int argc, char** argv) {
     app.footer(kFooter);
     std::string server = "127.0.0.1:50051", level = "info", golden_override;
     std::string cache = default_cache().string();
-    uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
+    uint32_t threads = processor_count();
     app.add_option("--server", server, "HOST:PORT of the coordinator")->capture_default_str();
     app.add_option("--threads", threads, "Threads to render with")->check(whole_number_between(1, 1024))->capture_default_str();
     app.add_option("--cache", cache, "Directory for scene files, and for tables up to 1 GB; may be shared by the workers of a host")
         ->capture_default_str();
-    app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
+    add_log_option(app, level);
     app.add_option("--pretend-golden-digest", golden_override, "")->group("");  // tests of the refusal
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : 2;
-    }
-    if (!set_up_logging("lightloom-worker", level)) {
-        std::cerr << "unknown log level \"" << level << "\"\n";
-        return 2;
-    }
-    // Signals are taken by one thread of their own; all others inherit the blocked mask.
-    sigset_t signals;
-    sigemptyset(&signals);
-    sigaddset(&signals, SIGINT);
-    sigaddset(&signals, SIGTERM);
-    pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+    if (const auto ended = parse_and_log(app, argc, argv, level)) return *ended;
     std::stop_source stop;
-    std::thread([signals, stop]() mutable {
-        int signal = 0;
-        sigwait(&signals, &signal);
+    const auto leave = [stop]() mutable {
         spdlog::info("stopping: no new units, the running one is finished");
         stop.request_stop();
-        sigwait(&signals, &signal);
-        _exit(1);  // asked twice
-    }).detach();
+    };
+    StopSignals().on_stop(leave, kFailedToRun);
 
     const tbb::global_control parallelism(tbb::global_control::max_allowed_parallelism, threads);
     auto identity = build_identity();
-    if (!identity.ok()) {
-        spdlog::error("the golden unit failed on this host: {}", identity.status().message());
-        return 1;
-    }
+    if (!identity.ok()) return log_failure(identity.status(), kNoIdentity);
     if (!golden_override.empty()) {
         const auto digest = Digest::from_hex(golden_override);
-        if (!digest.ok()) return 2;
+        if (!digest.ok()) return kBadCommandLine;
         identity->golden_digest = *digest;
     }
     GrpcWorkerPort port(open_channel(server));
-    SceneFetcher fetcher(port, cache);
-    if (const Status usable = fetcher.check_directory(); !usable.ok()) {
-        spdlog::error("--cache {}", usable.message());
-        return 1;
-    }
-    RendererCache renderers([&](const JobSpec& spec, std::stop_token s) { return fetcher.scene(spec, s); },
-                            [&](const AssetReference& tables, std::stop_token s) { return fetcher.tables(tables, s); });
-    Worker worker(
-        port, {.identity = *identity, .thread_count = threads, .host = host_name(), .process_id = uint64_t(::getpid())},
-        [&](const UnitLease& lease, std::stop_token s) { return renderers.renderer(lease, s); },
-        [&](const UnitLease& lease, std::stop_token s) { return renderers.tracer(lease, s); });
+    FetchingWorker worker(
+        port, cache, {.identity = *identity, .thread_count = threads, .host = host_name(), .process_id = uint64_t(::getpid())});
+    if (const Status usable = worker.check_directory(); !usable.ok()) return log_failure(usable, "--cache ");
     const Status status = worker.run(stop.get_token());
-    if (!status.ok()) {
-        spdlog::error("{}", status.message());
-        return 1;
-    }
-    return 0;
+    return status.ok() ? kStopped : log_failure(status);
 }

@@ -48,6 +48,13 @@ class RendererCache {
     Result<std::shared_ptr<const Renderer>> renderer(const UnitLease& lease, std::stop_token stop);
     /// The same for the tables that guide a training unit, if it has any.
     Result<TrainingTracer> tracer(const UnitLease& lease, std::stop_token stop);
+    /// The two as a Worker takes them; the cache must outlive it.
+    RendererSource renderer_source() {
+        return [this](const UnitLease& lease, std::stop_token stop) { return renderer(lease, std::move(stop)); };
+    }
+    TracerSource tracer_source() {
+        return [this](const UnitLease& lease, std::stop_token stop) { return tracer(lease, std::move(stop)); };
+    }
 
   private:
     Result<std::shared_ptr<const Scene>> scene(const JobSpec& spec, std::stop_token stop);

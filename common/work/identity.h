@@ -16,5 +16,7 @@ std::string math_profile();
 
 /// The identity of this process; renders the golden units once.
 Result<BuildIdentity> build_identity();
+/// What a service says before such an error, which keeps it from starting.
+inline constexpr const char* kNoIdentity = "the golden unit failed on this host: ";
 
 }  // namespace lightloom
