@@ -1,19 +1,16 @@
 // lightloom bench: how soon algorithms come near a reference. Runs are interleaved, so that what the machine does meanwhile
 // meets all of them alike, and time is the time of light transport alone.
 
-#include <tbb/global_control.h>
-
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <thread>
 
 #include "client/bench_log.h"
 #include "client/bench_reference.h"
 #include "client/commands.h"
-#include "client/job_options.h"
+#include "client/local_scene.h"
 #include "client/output_files.h"
 #include "client/run_job.h"
 #include "common/cli/numbers.h"
@@ -144,21 +141,18 @@ int bench(BenchOptions& options) {
     if (options.scene.resolution.empty()) {
         options.scene.resolution = std::to_string(reference->frame.width) + "x" + std::to_string(reference->frame.height);
     }
-    auto local = load_scene(options.scene);
-    if (!local.ok()) return report_error(local.status());
-    std::vector<std::filesystem::path> inputs = files_of(*local);
-    inputs.push_back(options.reference);
-    if (Status s = check_output_files(inputs, std::array{options.out}); !s.ok()) return report_error(s);
-    const auto spec = make_spec(options.scene, *local);
-    if (!spec.ok()) return report_error(spec.status());
-    const int max_depth = spec->max_depth >= 0 ? spec->max_depth : local->imported.description.max_depth;
-    const tbb::global_control parallelism(tbb::global_control::max_allowed_parallelism, options.threads);
-    auto built = Scene::build(std::move(local->imported.description), {.width = spec->width, .height = spec->height});
+    const auto built = build_job(options.scene, options.threads, [&](const LocalScene& local) {
+        std::vector<std::filesystem::path> inputs = files_of(local);
+        inputs.push_back(options.reference);
+        return check_output_files(inputs, std::array{options.out});
+    });
     if (!built.ok()) return report_error(built.status());
-    const std::shared_ptr<const Scene> scene = std::move(built).value();
-    const FrameLayout frame = scene->frame();
+    const std::shared_ptr<const Scene>& scene = built->scene;
+    const std::string scene_digest = built->spec.scene_root.hex();
+    const FrameLayout& frame = built->spec.frame;
+    const int max_depth = built->spec.max_depth;
     const auto warnings =
-        check_reference(options.reference, *reference, {frame, max_depth, spec->scene_root.hex(), *choices, options.threshold});
+        check_reference(options.reference, *reference, {frame, max_depth, scene_digest, *choices, options.threshold});
     if (!warnings.ok()) return report_error(warnings.status());
     for (const std::string& warning : *warnings) std::fprintf(stderr, "lightloom bench: warning: %s\n", warning.c_str());
 
@@ -166,7 +160,7 @@ int bench(BenchOptions& options) {
     std::set<std::string> keys;
     for (uint32_t seed = 0; seed < options.seeds; ++seed) {
         for (const AlgorithmChoice& choice : *choices) {
-            runs.push_back({spec->scene_root.hex(), sha256(*reference_bytes).hex(), choice, frame.width, frame.height, max_depth,
+            runs.push_back({scene_digest, sha256(*reference_bytes).hex(), choice, frame.width, frame.height, max_depth,
                             options.scene.seed + seed, options.threads, options.time, options.spp, options.threshold,
                             options.stop_after, kBuildId});
             keys.insert(runs.back().key());
@@ -250,14 +244,13 @@ void add_bench_command(CLI::App& app, int* exit_code) {
     command->add_option("--resolution", options->scene.resolution, "WIDTHxHEIGHT in pixels (default: the reference's)");
     command->add_option("--max-depth", options->scene.max_depth, "Bounces (default: the scene's)")
         ->check(whole_number_between(0, kMaxEdges - 1));
-    command->add_option("--threads", options->threads, "Threads (default: all processors)")->check(whole_number_between(1, 1024));
+    add_threads_option(*command, options->threads);
     command->add_option("--slice", options->slice, "Seconds that a run gets before the next one's turn")
         ->capture_default_str()
         ->check(number_between(0.001, 86400.0));
     command->add_flag("-q,--quiet", options->scene.quiet, "The table and errors only");
     command->callback([options, time, spp, exit_code] {
         if (time->count() + spp->count() == 0) throw CLI::RequiredError("--time or --spp");
-        if (options->threads == 0) options->threads = std::max(1u, std::thread::hardware_concurrency());
         *exit_code = bench(*options);
     });
 }

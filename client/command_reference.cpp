@@ -1,16 +1,13 @@
 // lightloom reference: an image to measure others by, with its variance, who made it, and whether another algorithm agrees.
 
-#include <tbb/global_control.h>
-
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <thread>
 
 #include "client/commands.h"
 #include "client/cross_check.h"
-#include "client/job_options.h"
+#include "client/local_scene.h"
 #include "client/progress.h"
 #include "client/run_job.h"
 #include "common/cli/numbers.h"
@@ -93,50 +90,44 @@ int reference(ReferenceOptions& options) {
                 invalid_argument("--cross-check " + checker_choice.name + " is what makes the reference; name another algorithm"));
         }
     }
-    auto local = load_scene(options.job);
-    if (!local.ok()) return report_error(local.status());
-    if (Status s = check_outputs(options.job, {".json"}, &*local); !s.ok()) return report_error(s);
-    auto spec = make_spec(options.job, *local);
-    if (!spec.ok()) return report_error(spec.status());
-    if (spec->max_depth < 0) spec->max_depth = local->imported.description.max_depth;
-    const auto algorithm = find_algorithm(spec->algorithm);
-    spec->parameters = complete_parameters(**algorithm, *parse_parameters(**algorithm, spec->parameters));
-    const tbb::global_control parallelism(tbb::global_control::max_allowed_parallelism, options.threads);
-    auto built = Scene::build(std::move(local->imported.description), {.width = spec->width, .height = spec->height});
+    auto built = build_job(options.job, options.threads,
+                           [&](const LocalScene& local) { return check_outputs(options.job, {".json"}, &local); });
     if (!built.ok()) return report_error(built.status());
-    const std::shared_ptr<const Scene> scene = std::move(built).value();
-    spec->frame = scene->frame();
-    if (spec->frame.crop.width() < kCheckColumns || spec->frame.crop.height() < kCheckRows)
+    JobSpec& spec = built->spec;
+    const std::shared_ptr<const Scene>& scene = built->scene;
+    const auto algorithm = find_algorithm(spec.algorithm);
+    spec.parameters = complete_parameters(**algorithm, *parse_parameters(**algorithm, spec.parameters));
+    if (spec.frame.crop.width() < kCheckColumns || spec.frame.crop.height() < kCheckRows)
         return report_error(invalid_argument("a reference has at least 3 x 3 pixels"));
 
-    const Plan plan(scene->frame(), light_paths_per_pixel(**algorithm, *parse_parameters(**algorithm, spec->parameters)));
+    const Plan plan(scene->frame(), light_paths_per_pixel(**algorithm, *parse_parameters(**algorithm, spec.parameters)));
     const uint64_t fewest = plan.group(kLeastGroups - 1).first_iteration + 1;
-    if (!checker_choice.name.empty() && spec->samples_per_pixel > 0 && spec->samples_per_pixel < fewest)
+    if (!checker_choice.name.empty() && spec.samples_per_pixel > 0 && spec.samples_per_pixel < fewest)
         return report_error(invalid_argument("--cross-check needs --spp " + std::to_string(fewest) + " at least: " +
                                              std::to_string(kLeastGroups) + " groups of iterations, to know the error"));
 
-    const RenderSettings settings{spec->algorithm, spec->parameters, spec->seed, spec->max_depth};
+    const RenderSettings settings{spec.algorithm, spec.parameters, spec.seed, spec.max_depth};
     const auto preparation = prepare(*scene, settings, interrupt_token());
     if (!preparation.ok()) return report_error(preparation.status());
     if (!preparation->note.empty()) std::fprintf(stderr, "lightloom reference: warning: %s\n", preparation->note.c_str());
     auto progressive = ProgressiveRender::start(scene, settings, *preparation);
     if (!progressive.ok()) return report_error(progressive.status());
-    const auto means = render(*progressive, *spec, options.job.quiet);
+    const auto means = render(*progressive, spec, options.job.quiet);
     if (!means.ok()) return report_error(means.status());
     const std::vector<Estimate> made = means->estimates();
     const auto exr =
-        encode_image(*spec, {progressive->image(), progressive->variance(), progressive->iterations(), progressive->groups()}, {});
+        encode_image(spec, {progressive->image(), progressive->variance(), progressive->iterations(), progressive->groups()}, {});
     if (!exr.ok()) return report_error(exr.status());
     const std::filesystem::path output = output_path(options.job);
     std::filesystem::path json_path = output;
     json_path.replace_extension(".json");
-    nlohmann::ordered_json json = describe(options, *spec, *progressive, made.front(), *exr);
+    nlohmann::ordered_json json = describe(options, spec, *progressive, made.front(), *exr);
     // Both files before the cross-check: what took hours is safe whatever comes.
     Status status = write_file_atomically(output.string(), *exr);
     if (status.ok()) status = write_file_atomically(json_path.string(), json.dump(1) + "\n");
     if (!status.ok()) return report_error(status);
     if (!options.job.quiet) {
-        std::printf("%s  %s  %llu spp in %s  mean luminance %.6g +- %.2g\n", output.string().c_str(), spec->algorithm.c_str(),
+        std::printf("%s  %s  %llu spp in %s  mean luminance %.6g +- %.2g\n", output.string().c_str(), spec.algorithm.c_str(),
                     static_cast<unsigned long long>(progressive->iterations()), duration_text(progressive->seconds()).c_str(),
                     made.front().mean, made.front().standard_error());
         std::fflush(stdout);
@@ -152,7 +143,7 @@ int reference(ReferenceOptions& options) {
                                                 " to know its error: render longer"));
     }
 
-    const RenderSettings checker{checker_choice.name, checker_choice.parameters, spec->seed + 1, spec->max_depth};
+    const RenderSettings checker{checker_choice.name, checker_choice.parameters, spec.seed + 1, spec.max_depth};
     const auto check = cross_check(scene, settings, made, checker, options.cross_time, interrupt_token());
     if (!check.ok()) return report_error(check.status());
     json["cross_check"] = {{"algorithm", checker.algorithm}, {"parameters", checker.parameters}, {"seed", checker.seed}};
@@ -162,7 +153,7 @@ int reference(ReferenceOptions& options) {
                 check->table().c_str());
     if (check->verdict() != Verdict::kDiffer) return kSuccess;
     std::fflush(stdout);
-    std::fprintf(stderr, "lightloom reference: %s and %s differ; one of them is biased or misses paths\n", spec->algorithm.c_str(),
+    std::fprintf(stderr, "lightloom reference: %s and %s differ; one of them is biased or misses paths\n", spec.algorithm.c_str(),
                  checker_choice.name.c_str());
     return kFailure;
 }
@@ -185,11 +176,10 @@ void add_reference_command(CLI::App& app, int* exit_code) {
         ->add_option("--cross-time", options->cross_time, "Seconds for its image, and as many again for the path lengths of both")
         ->capture_default_str()
         ->check(number_between(0.001, 30 * 86400.0));
-    command->add_option("--threads", options->threads, "Threads (default: all processors)")->check(whole_number_between(1, 1024));
+    add_threads_option(*command, options->threads);
     command->add_flag("-q,--quiet", options->job.quiet, "No progress; errors and the cross-check only");
     command->callback([options, spp, time, exit_code] {
         if (spp->count() + time->count() == 0) throw CLI::RequiredError("--time or --spp");
-        if (options->threads == 0) options->threads = std::max(1u, std::thread::hardware_concurrency());
         *exit_code = reference(*options);
     });
 }

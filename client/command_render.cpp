@@ -11,8 +11,10 @@
 #include <thread>
 
 #include "client/commands.h"
+#include "client/local_scene.h"
 #include "client/run_job.h"
 #include "common/cli/numbers.h"
+#include "common/cli/start.h"
 #include "common/work/identity.h"
 #include "server/local_ports.h"
 #include "server/scene_reader.h"
@@ -56,13 +58,14 @@ std::string default_table_cache() {
 
 int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, const TableCacheOptions& cache) {
     (void)interrupt_token();
-    auto scene = load_scene(options);
-    if (!scene.ok()) return report_error(scene.status());
-    if (Status s = check_outputs(options, beside_image(options, AfterFetch::kImageGoes), &*scene); !s.ok()) return report_error(s);
-    const auto spec = make_spec(options, *scene);
-    if (!spec.ok()) return report_error(spec.status());
-    if (Status s = check_bound(options, *spec); !s.ok()) return report_error(s);
-    const auto facts = scene_facts(scene->imported.description, *spec);
+    auto local = read_job(options, [&](const LocalScene& scene) {
+        return check_outputs(options, beside_image(options, AfterFetch::kImageGoes), &scene);
+    });
+    if (!local.ok()) return report_error(local.status());
+    LocalScene& scene = local->scene;
+    const JobSpec& spec = local->spec;
+    if (Status s = check_bound(options, spec); !s.ok()) return report_error(s);
+    const auto facts = scene_facts(scene.imported.description, spec);
     if (!facts.ok()) return report_error(facts.status());
     const ScratchDirectory scratch;
     if (scratch.path.empty()) return report_error(internal_error("no directory for temporary files can be made"));
@@ -81,7 +84,7 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, c
     const auto build_scene = [&]() -> Result<std::shared_ptr<const Scene>> {
         const std::lock_guard only_one(build_mutex);
         if (!built_scene) {
-            auto built = Scene::build(std::move(scene->imported.description), {.width = spec->width, .height = spec->height});
+            auto built = Scene::build(std::move(scene.imported.description), {.width = spec.width, .height = spec.height});
             if (built.ok()) {
                 built_scene = std::shared_ptr<const Scene>(std::move(built).value());
             } else {
@@ -102,7 +105,7 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, c
     Coordinator coordinator(std::move(coordinator_options));
     LocalJobPort jobs(coordinator);
     LocalWorkerPort work(coordinator);
-    if (Status s = jobs.upload_bytes(spec->scene_root, scene->manifest.canonical_text()); !s.ok()) return report_error(s);
+    if (Status s = jobs.upload_bytes(spec.scene_root, scene.manifest.canonical_text()); !s.ok()) return report_error(s);
 
     RendererCache renderers([&](const JobSpec&, std::stop_token) { return build_scene(); }, direct_tables(work));
     std::vector<std::unique_ptr<Worker>> workers;
@@ -111,13 +114,12 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, c
         workers.push_back(std::make_unique<Worker>(
             work,
             WorkerOptions{.identity = *identity, .thread_count = threads, .host = "embedded", .process_id = uint64_t(::getpid())},
-            [&](const UnitLease& lease, std::stop_token stop) { return renderers.renderer(lease, stop); },
-            [&](const UnitLease& lease, std::stop_token stop) { return renderers.tracer(lease, stop); }));
+            renderers.renderer_source(), renderers.tracer_source()));
         running.emplace_back([worker = workers.back().get()](std::stop_token stop) { (void)worker->run(stop); });
     }
-    ClientTimes times{.import_seconds = scene->import_seconds, .digest_seconds = scene->digest_seconds};
+    ClientTimes times{.import_seconds = scene.import_seconds, .digest_seconds = scene.digest_seconds};
     const auto begin = std::chrono::steady_clock::now();
-    const auto job = submit(jobs, *spec);
+    const auto job = submit(jobs, spec);
     if (!job.ok()) return report_error(job.status());
     const auto ended = watch(jobs, job->job_id, options.quiet, true);
     times.wait_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -157,7 +159,7 @@ void add_render_command(CLI::App& app, int* exit_code) {
         ->capture_default_str();
     command->callback([options, exit_code] {
         uint32_t threads = options->threads;
-        if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency() / options->workers);
+        if (threads == 0) threads = std::max(1u, processor_count() / options->workers);
         *exit_code = render(options->job, threads, options->workers, options->cache);
     });
 }

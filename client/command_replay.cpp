@@ -1,17 +1,13 @@
 // lightloom replay: one camera sample of one iteration, or one whole unit, rendered again exactly as a job rendered it.
 
-#include <tbb/global_control.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <memory>
-#include <thread>
 #include <vector>
 
 #include "client/commands.h"
-#include "client/job_options.h"
+#include "client/local_scene.h"
 #include "common/cli/numbers.h"
-#include "common/scene/scene.h"
 #include "common/transport/renderer.h"
 #include "common/transport/training.h"
 #include "common/work/job.h"
@@ -70,22 +66,16 @@ Result<WorkUnit> find_unit(const ReplayOptions& options, const Plan& plan, uint6
 }
 
 int replay(const ReplayOptions& options) {
-    auto local = load_scene(options.job);
-    if (!local.ok()) return report_error(local.status());
-    auto spec = make_spec(options.job, *local);
-    if (!spec.ok()) return report_error(spec.status());
-    if (spec->max_depth < 0) spec->max_depth = local->imported.description.max_depth;
-    const double exposure_scale = double(local->imported.description.film.exposure_scale);
-    const tbb::global_control parallelism(tbb::global_control::max_allowed_parallelism, options.threads);
-    auto built = Scene::build(std::move(local->imported.description), {.width = spec->width, .height = spec->height});
+    const auto built = build_job(options.job, options.threads);
     if (!built.ok()) return report_error(built.status());
-    const std::shared_ptr<const Scene> scene = std::move(built).value();
+    const JobSpec& spec = built->spec;
+    const std::shared_ptr<const Scene>& scene = built->scene;
+    const double exposure_scale = double(built->exposure_scale);
     const auto renderer = create_with_tables(
-        scene, {.algorithm = spec->algorithm, .parameters = spec->parameters, .seed = spec->seed, .max_depth = spec->max_depth},
-        {});
+        scene, {.algorithm = spec.algorithm, .parameters = spec.parameters, .seed = spec.seed, .max_depth = spec.max_depth}, {});
     if (!renderer.ok()) return report_error(renderer.status());
-    const auto algorithm = find_algorithm(spec->algorithm);
-    const auto parameters = parse_parameters(**algorithm, spec->parameters);
+    const auto algorithm = find_algorithm(spec.algorithm);
+    const auto parameters = parse_parameters(**algorithm, spec.parameters);
     const Plan plan(scene->frame(), light_paths_per_pixel(**algorithm, *parameters));
 
     const int x = options.pixel.empty() ? 0 : options.pixel[0], y = options.pixel.empty() ? 0 : options.pixel[1];
@@ -150,11 +140,10 @@ void add_replay_command(CLI::App& app, int* exit_code) {
         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     iteration->needs(pixel);
     pixel->excludes(unit);
-    command->add_option("--threads", options->threads, "Threads (default: all processors)")->check(whole_number_between(1, 1024));
+    add_threads_option(*command, options->threads);
     command->add_flag("--strict", options->job.strict, "Exit with 3 if samples were dropped");
     command->callback([options, exit_code] {
         if (options->pixel.empty() && options->unit.empty()) throw CLI::RequiredError("--pixel or --unit");
-        if (options->threads == 0) options->threads = std::max(1u, std::thread::hardware_concurrency());
         *exit_code = replay(*options);
     });
 }

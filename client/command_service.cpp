@@ -7,6 +7,7 @@
 
 #include "client/commands.h"
 #include "client/grpc_job_port.h"
+#include "client/local_scene.h"
 #include "client/progress.h"
 #include "client/run_job.h"
 #include "common/work/channel.h"
@@ -47,20 +48,18 @@ int service_error(const ServiceOptions& options, const Status& status) {
 
 int submit_job(const ServiceOptions& options) {
     GrpcJobPort port = connect(options);
-    const auto scene = load_scene(options.job);
-    if (!scene.ok()) return report_error(scene.status());
-    if (!options.detach)
-        if (Status s = check_outputs(options.job, beside_image(options.job, AfterFetch::kImageStays), &*scene); !s.ok())
-            return report_error(s);
-    const auto spec = make_spec(options.job, *scene);
-    if (!spec.ok()) return report_error(spec.status());
-    if (Status s = check_bound(options.job, *spec); !s.ok()) return report_error(s);
-    ClientTimes times{.import_seconds = scene->import_seconds, .digest_seconds = scene->digest_seconds};
+    const auto local = read_job(options.job, [&](const LocalScene& scene) {
+        if (options.detach) return Status();
+        return check_outputs(options.job, beside_image(options.job, AfterFetch::kImageStays), &scene);
+    });
+    if (!local.ok()) return report_error(local.status());
+    if (Status s = check_bound(options.job, local->spec); !s.ok()) return report_error(s);
+    ClientTimes times{.import_seconds = local->scene.import_seconds, .digest_seconds = local->scene.digest_seconds};
     auto begin = std::chrono::steady_clock::now();
-    if (Status s = upload_scene(port, *scene); !s.ok()) return service_error(options, s);
+    if (Status s = upload_scene(port, local->scene); !s.ok()) return service_error(options, s);
     times.upload_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     begin = std::chrono::steady_clock::now();
-    const auto job = submit(port, *spec);
+    const auto job = submit(port, local->spec);
     if (!job.ok()) return service_error(options, job.status());
     if (options.detach) {
         std::printf("%s\n", job->job_id.c_str());
