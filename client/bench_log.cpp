@@ -35,8 +35,8 @@ bool has_no_locks(int error) { return error == ENOSYS || error == EOPNOTSUPP || 
 Json BenchRun::json() const {
     return {{"scene_digest", scene_digest},
             {"reference_digest", reference_digest},
-            {"algorithm", algorithm.name},
-            {"parameters", algorithm.parameters},
+            {"algorithm", algorithm.settings.name()},
+            {"parameters", algorithm.settings.text()},
             {"width", width},
             {"height", height},
             {"max_depth", max_depth},

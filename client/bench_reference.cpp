@@ -47,7 +47,7 @@ Result<std::vector<std::string>> check_reference(const std::string& name, const 
     if (!digest.empty() && digest != subject.scene_digest)
         warnings.push_back(name + " was made from another version of the scene's files");
     for (const AlgorithmChoice& algorithm : subject.algorithms) {
-        if (algorithm.name != maker) continue;
+        if (algorithm.settings.info().name != maker) continue;
         warnings.push_back(name + " was made by \"" + maker + "\", which is also tested: a bias that it has does not show");
         break;
     }

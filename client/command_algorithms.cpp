@@ -11,7 +11,8 @@ namespace lightloom::client {
 void add_algorithms_command(CLI::App& app, int* exit_code) {
     CLI::App* command = app.add_subcommand("algorithms", "List the algorithms and their parameters (--set)");
     command->callback([exit_code] {
-        for (const AlgorithmInfo& algorithm : catalog()) {
+        for (const AlgorithmInfo* row : catalog()) {
+            const AlgorithmInfo& algorithm = *row;
             std::printf("%s: %s\n  source: %s\n  %s\n", std::string(algorithm.name).c_str(), std::string(algorithm.summary).c_str(),
                         std::string(algorithm.source).c_str(), std::string(algorithm.bias).c_str());
             for (const ParameterInfo& p : algorithm.parameters) {

@@ -120,8 +120,7 @@ Result<std::vector<AlgorithmChoice>> parse_choices(const std::vector<std::string
         auto choice = parse_algorithm(text);
         if (!choice.ok()) return choice.status();
         for (const AlgorithmChoice& other : choices) {
-            if (other.name == choice->name && other.parameters == choice->parameters)
-                return invalid_argument("--algorithms names " + text + " twice");
+            if (other.settings == choice->settings) return invalid_argument("--algorithms names " + text + " twice");
         }
         choices.push_back(std::move(choice).value());
     }
@@ -141,7 +140,7 @@ int bench(BenchOptions& options) {
     if (options.scene.resolution.empty()) {
         options.scene.resolution = std::to_string(reference->frame.width) + "x" + std::to_string(reference->frame.height);
     }
-    options.scene.algorithm = choices->front().name;  // Runs name their own: the scene is not asked for one.
+    options.scene.algorithm = choices->front().settings.name();  // Runs name their own: the scene is not asked for one.
     const auto built = build_job(options.scene, options.threads, [&](const LocalScene& local) {
         std::vector<std::filesystem::path> inputs = files_of(local);
         inputs.push_back(options.reference);
@@ -183,7 +182,7 @@ int bench(BenchOptions& options) {
             done.back()["label"] = run.algorithm.label;  // The same run may have been written differently.
             continue;
         }
-        const RenderSettings settings{run.algorithm.name, run.algorithm.parameters, run.seed, max_depth};
+        const RenderSettings settings{run.algorithm.settings, run.seed, max_depth};
         const auto preparation = prepare(*scene, settings, interrupt_token());
         if (!preparation.ok()) return report_error(preparation.status());
         if (!preparation->note.empty())

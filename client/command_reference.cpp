@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "client/commands.h"
 #include "client/cross_check.h"
@@ -80,29 +81,31 @@ nlohmann::ordered_json describe(const ReferenceOptions& options, const JobSpec& 
 
 int reference(ReferenceOptions& options) {
     (void)interrupt_token();
-    AlgorithmChoice checker_choice;
+    std::optional<AlgorithmChoice> checker_choice;
     if (!options.cross_check.empty()) {
         auto parsed = parse_algorithm(options.cross_check);
         if (!parsed.ok()) return report_error(parsed.status());
-        checker_choice = std::move(parsed).value();
+        checker_choice = *std::move(parsed);
     }
     auto built = build_job(options.job, options.threads,
                            [&](const LocalScene& local) { return check_outputs(options.job, {".json"}, &local); });
     if (!built.ok()) return report_error(built.status());
     JobSpec& spec = built->spec;
     const std::shared_ptr<const Scene>& scene = built->scene;
-    const auto algorithm = find_algorithm(spec.algorithm);
-    spec.parameters = complete_parameters(**algorithm, *parse_parameters(**algorithm, spec.parameters));
+    spec.algorithm = spec.algorithm.completed();
+    if (checker_choice && checker_choice->settings.name() == spec.algorithm.name())
+        return report_error(
+            invalid_argument("--cross-check " + spec.algorithm.name() + " is what makes the reference; name another algorithm"));
     if (spec.frame.crop.width() < kCheckColumns || spec.frame.crop.height() < kCheckRows)
         return report_error(invalid_argument("a reference has at least 3 x 3 pixels"));
 
-    const Plan plan(scene->frame(), light_paths_per_pixel(**algorithm, *parse_parameters(**algorithm, spec.parameters)));
+    const Plan plan(scene->frame(), spec.algorithm);
     const uint64_t fewest = plan.group(kLeastGroups - 1).first_iteration + 1;
-    if (!checker_choice.name.empty() && spec.samples_per_pixel > 0 && spec.samples_per_pixel < fewest)
+    if (checker_choice && spec.samples_per_pixel > 0 && spec.samples_per_pixel < fewest)
         return report_error(invalid_argument("--cross-check needs --spp " + std::to_string(fewest) + " at least: " +
                                              std::to_string(kLeastGroups) + " groups of iterations, to know the error"));
 
-    const RenderSettings settings{spec.algorithm, spec.parameters, spec.seed, spec.max_depth};
+    const RenderSettings settings = render_settings(spec);
     const auto preparation = prepare(*scene, settings, interrupt_token());
     if (!preparation.ok()) return report_error(preparation.status());
     if (!preparation->note.empty()) std::fprintf(stderr, "lightloom reference: warning: %s\n", preparation->note.c_str());
@@ -123,7 +126,7 @@ int reference(ReferenceOptions& options) {
     if (status.ok()) status = write_file_atomically(json_path.string(), json.dump(1) + "\n");
     if (!status.ok()) return report_error(status);
     if (!options.job.quiet) {
-        std::printf("%s  %s  %llu spp in %s  mean luminance %.6g +- %.2g\n", output.string().c_str(), spec.algorithm.c_str(),
+        std::printf("%s  %s  %llu spp in %s  mean luminance %.6g +- %.2g\n", output.string().c_str(), spec.algorithm.name().c_str(),
                     static_cast<unsigned long long>(progressive->iterations()), duration_text(progressive->seconds()).c_str(),
                     made.front().mean, made.front().standard_error());
         std::fflush(stdout);
@@ -132,25 +135,26 @@ int reference(ReferenceOptions& options) {
         std::fprintf(stderr, "lightloom reference: warning: %llu non-finite sample(s) were dropped\n",
                      static_cast<unsigned long long>(progressive->dropped()));
     }
-    if (checker_choice.name.empty()) return kSuccess;
+    if (!checker_choice) return kSuccess;
     if (progressive->groups() < kLeastGroups) {
         return report_error(failed_precondition(output.string() + " consists of " + std::to_string(progressive->groups()) +
                                                 " groups of iterations; a cross-check needs " + std::to_string(kLeastGroups) +
                                                 " to know its error: render longer"));
     }
 
-    const RenderSettings checker{checker_choice.name, checker_choice.parameters, spec.seed + 1, spec.max_depth};
+    const RenderSettings checker{checker_choice->settings, spec.seed + 1, spec.max_depth};
     const auto check = cross_check(scene, settings, made, checker, options.cross_time, interrupt_token());
     if (!check.ok()) return report_error(check.status());
-    json["cross_check"] = {{"algorithm", checker.algorithm}, {"parameters", checker.parameters}, {"seed", checker.seed}};
+    json["cross_check"] = {
+        {"algorithm", checker.algorithm.name()}, {"parameters", checker.algorithm.text()}, {"seed", checker.seed}};
     json["cross_check"].update(check->json());
     if (Status s = write_file_atomically(json_path.string(), json.dump(1) + "\n"); !s.ok()) return report_error(s);
-    std::printf("cross-check by %s, %llu spp\n%s", checker_choice.label.c_str(), static_cast<unsigned long long>(check->iterations),
-                check->table().c_str());
+    std::printf("cross-check by %s, %llu spp\n%s", checker_choice->label.c_str(),
+                static_cast<unsigned long long>(check->iterations), check->table().c_str());
     if (check->verdict() != Verdict::kDiffer) return kSuccess;
     std::fflush(stdout);
-    std::fprintf(stderr, "lightloom reference: %s and %s differ; one of them is biased or misses paths\n", spec.algorithm.c_str(),
-                 checker_choice.name.c_str());
+    std::fprintf(stderr, "lightloom reference: %s and %s differ; one of them is biased or misses paths\n",
+                 spec.algorithm.name().c_str(), checker_choice->settings.name().c_str());
     return kFailure;
 }
 

@@ -59,7 +59,7 @@ Result<WorkUnit> find_unit(const ReplayOptions& options, const Plan& plan, uint6
         const Group group = group_of_job(plan, g, options.spp);
         if (iteration >= group.first_iteration + group.iteration_count) continue;
         for (const WorkUnit& unit : plan.units(group)) {
-            if (unit.tile.contains(x, y)) return unit;
+            if (unit.render.tile.contains(x, y)) return unit;
         }
         return invalid_argument("the pixel lies outside of the rendered window");
     }
@@ -71,29 +71,29 @@ int replay(const ReplayOptions& options) {
     const JobSpec& spec = built->spec;
     const std::shared_ptr<const Scene>& scene = built->scene;
     const double exposure_scale = double(built->exposure_scale);
-    const auto renderer = create_with_tables(
-        scene, {.algorithm = spec.algorithm, .parameters = spec.parameters, .seed = spec.seed, .max_depth = spec.max_depth}, {});
+    const auto renderer = create_with_tables(scene, render_settings(spec), {});
     if (!renderer.ok()) return report_error(renderer.status());
-    const auto algorithm = find_algorithm(spec.algorithm);
-    const auto parameters = parse_parameters(**algorithm, spec.parameters);
-    const Plan plan(scene->frame(), light_paths_per_pixel(**algorithm, *parameters));
+    const Plan plan(scene->frame(), spec.algorithm);
+    // Light sub-paths of a sample's own are replayed with it; those of a cache are the whole unit's.
+    const bool has_cache = spec.algorithm.info().learning != nullptr;
 
     const int x = options.pixel.empty() ? 0 : options.pixel[0], y = options.pixel.empty() ? 0 : options.pixel[1];
     const auto unit = find_unit(options, plan, options.iteration, x, y);
     if (!unit.ok()) return report_error(unit.status());
-    UnitWork work = unit_work(*unit);
+    const RenderUnit& whole = unit->render;
+    RenderUnit work = whole;
     if (options.unit.empty()) {
         // The light path of a camera sample is numbered by its place in the unit.
         const uint64_t place =
-            (options.iteration - unit->first_iteration) * uint64_t(unit->tile.area()) + uint64_t(unit->tile.index(x, y));
+            (options.iteration - whole.first_iteration) * uint64_t(whole.tile.area()) + uint64_t(whole.tile.index(x, y));
         work.first_iteration = options.iteration;
         work.iteration_count = 1;
         work.tile = {x, y, x + 1, y + 1};
-        if ((*algorithm)->needs_tables) {
-            work.owner_tile = unit->tile;  // the sample looks at the whole unit's cache
+        if (has_cache) {
+            work.owner_tile = whole.tile;  // the sample looks at the whole unit's cache
         } else {
-            work.first_light_path = unit->first_light_path + place;
-            work.light_path_count = unit->light_path_count > 0 ? 1 : 0;
+            work.first_light_path = whole.first_light_path + place;
+            work.light_path_count = whole.light_path_count > 0 ? 1 : 0;
         }
     }
     const auto partial = (*renderer)->render(work, {});
@@ -103,7 +103,7 @@ int replay(const ReplayOptions& options) {
     std::printf("unit %u,%u  camera %.9g %.9g %.9g\n", unit->key.group, unit->key.tile, sum[0], sum[1], sum[2]);
     const int width = scene->frame().crop.width();
     // With a cache, the splats are the unit's, not this sample's.
-    if (options.unit.empty() && !(*algorithm)->needs_tables) {
+    if (options.unit.empty() && !has_cache) {
         for (const SplatSum& splat : partial->splats) {
             std::printf("splat at %d,%d  %.9g %.9g %.9g\n", scene->frame().crop.x0 + int(splat.pixel) % width,
                         scene->frame().crop.y0 + int(splat.pixel) / width, exposure_scale * splat.rgb[0],

@@ -145,11 +145,14 @@ Result<TableFile> read_tables(const std::string& path, const Scene& scene) {
     if (!bytes.ok()) return bytes.status();
     const auto content = tables_of_file(*std::move(bytes));
     if (!content.ok()) return invalid_argument(path + ": " + content.status().message());
-    auto tables = parse_tables(*content);
-    if (!tables.ok()) return invalid_argument(path + ": " + tables.status().message());
+    const TablePart* const known[] = {&SubspaceTables::kPart};
+    const auto parts = parse_tables(*content, known);
+    if (!parts.ok()) return invalid_argument(path + ": " + parts.status().message());
+    const auto tables = parts->get<SubspaceTables>();
+    if (!tables) return invalid_argument(path + ": holds no tables of subspaces, which are what can be shown");
     if (const Status s = tables->validate(scene.emitters()); !s.ok())
         return invalid_argument(path + ": the tables are not those of this scene: " + s.message());
-    return TableFile{*std::move(tables), sha256(*content), content->size()};
+    return TableFile{*tables, sha256(*content), content->size()};
 }
 
 nlohmann::ordered_json describe(const TableFile& file) {

@@ -9,7 +9,6 @@
 #include "common/cli/numbers.h"
 #include "common/path/path_view.h"
 #include "common/scene/scene.h"
-#include "common/transport/catalog.h"
 
 namespace lightloom::client {
 namespace {
@@ -100,17 +99,18 @@ Status check_bound(const JobOptions& options, const JobSpec& spec) {
 
 Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
     JobSpec spec;
-    spec.algorithm = options.algorithm.empty() ? default_algorithm(scene.imported.description.integrator).name : options.algorithm;
+    std::map<std::string, std::string> parameters;
     for (const std::string& setting : options.settings) {
         const size_t equals = setting.find('=');
         if (equals == std::string::npos || equals == 0) return invalid_argument("--set takes KEY=VALUE, not \"" + setting + "\"");
         const std::string key = setting.substr(0, equals);
-        if (!spec.parameters.emplace(key, setting.substr(equals + 1)).second)
+        if (!parameters.emplace(key, setting.substr(equals + 1)).second)
             return invalid_argument("--set " + key + " is given twice; which value is meant?");
     }
-    const auto algorithm = find_algorithm(spec.algorithm);
-    if (!algorithm.ok()) return invalid_argument(algorithm.status().message());
-    if (const auto parameters = parse_parameters(**algorithm, spec.parameters); !parameters.ok()) return parameters.status();
+    auto algorithm = AlgorithmSettings::parse(
+        options.algorithm.empty() ? default_algorithm(scene.imported.description.integrator).name : options.algorithm, parameters);
+    if (!algorithm.ok()) return algorithm.status();
+    spec.algorithm = *std::move(algorithm);
     spec.seed = options.seed;
     spec.time_limit_seconds = options.time_seconds;
     spec.samples_per_pixel = options.samples_per_pixel;

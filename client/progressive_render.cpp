@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 
-#include "common/transport/catalog.h"
 #include "common/transport/training.h"
 
 namespace lightloom::client {
@@ -24,51 +23,42 @@ double process_seconds() {
 }  // namespace
 
 Result<AlgorithmChoice> parse_algorithm(const std::string& text) {
-    AlgorithmChoice choice{.label = text};
+    std::map<std::string, std::string> parameters;
     size_t begin = std::min(text.find(':'), text.size());
-    choice.name = text.substr(0, begin);
+    const std::string name = text.substr(0, begin);
     while (begin < text.size()) {
         const size_t end = std::min(text.find(':', begin + 1), text.size());
         const std::string setting = text.substr(begin + 1, end - begin - 1);
         const size_t equals = setting.find('=');
         if (equals == std::string::npos || equals == 0)
             return invalid_argument("algorithm \"" + text + "\": write NAME:KEY=VALUE:KEY=VALUE, not \"" + setting + "\"");
-        if (!choice.parameters.emplace(setting.substr(0, equals), setting.substr(equals + 1)).second)
+        if (!parameters.emplace(setting.substr(0, equals), setting.substr(equals + 1)).second)
             return invalid_argument("algorithm \"" + text + "\" sets " + setting.substr(0, equals) + " twice");
         begin = end;
     }
-    const auto info = find_algorithm(choice.name);
-    if (!info.ok()) return invalid_argument(info.status().message());
-    const auto parameters = parse_parameters(**info, choice.parameters);
-    if (!parameters.ok()) return parameters.status();
-    choice.parameters = complete_parameters(**info, *parameters);
-    return choice;
+    const auto settings = AlgorithmSettings::parse(name, parameters);
+    if (!settings.ok()) return settings.status();
+    return AlgorithmChoice{settings->completed(), text};
 }
 
 Result<Preparation> prepare(const Scene& scene, const RenderSettings& settings, std::stop_token stop) {
-    const auto info = find_algorithm(settings.algorithm);
-    if (!info.ok()) return invalid_argument(info.status().message());
-    if (!(*info)->needs_tables) return Preparation{};
+    if (!settings.algorithm.info().learning) return Preparation{};
     const auto begin = Clock::now();
     TrainingReport report;
     auto tables = make_tables(scene, settings, std::move(stop), &report);
     if (!tables.ok()) return tables.status();
-    return Preparation{std::make_shared<const SubspaceTables>(std::move(tables).value()), seconds_since(begin), report.note};
+    return Preparation{*std::move(tables), seconds_since(begin), report.note};
 }
 
 Result<ProgressiveRender> ProgressiveRender::start(std::shared_ptr<const Scene> scene, const RenderSettings& settings,
                                                    const Preparation& preparation) {
-    const auto info = find_algorithm(settings.algorithm);
-    if (!info.ok()) return invalid_argument(info.status().message());
-    const auto parameters = parse_parameters(**info, settings.parameters);
-    if (!parameters.ok()) return parameters.status();
     const FrameLayout frame = scene->frame();
     const float exposure_scale = scene->description().film.exposure_scale;
     const auto begin = Clock::now();
     auto renderer = Renderer::create(std::move(scene), settings, preparation.tables);
     if (!renderer.ok()) return renderer.status();
-    return ProgressiveRender(std::move(renderer).value(), frame, Plan(frame, light_paths_per_pixel(**info, *parameters)),
-                             exposure_scale, preparation.seconds + seconds_since(begin));
+    return ProgressiveRender(std::move(renderer).value(), frame, Plan(frame, settings.algorithm), exposure_scale,
+                             preparation.seconds + seconds_since(begin));
 }
 
 ProgressiveRender::ProgressiveRender(std::unique_ptr<const Renderer> renderer, const FrameLayout& frame, const Plan& plan,
@@ -95,7 +85,7 @@ Status ProgressiveRender::advance(uint64_t iteration_limit, std::stop_token stop
     for (const WorkUnit& unit : plan_.units(group)) {
         const auto begin = Clock::now();
         const double cpu_begin = process_seconds();
-        const auto partial = renderer_->render(unit_work(unit), stop);
+        const auto partial = renderer_->render(unit.render, stop);
         cpu_seconds += process_seconds() - cpu_begin;
         seconds += seconds_since(begin);
         if (!partial.ok()) return partial.status();

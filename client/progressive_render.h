@@ -17,11 +17,10 @@
 
 namespace lightloom::client {
 
-/// An algorithm with its parameters, from one word of a command line: "bdpt:heuristic=1:rr-start=6".
+/// An algorithm with all of its parameters, from one word of a command line: "bdpt:heuristic=1:rr-start=6".
 struct AlgorithmChoice {
-    std::string name;
-    std::map<std::string, std::string> parameters;  ///< All of them, defaults included.
-    std::string label;                              ///< The word.
+    AlgorithmSettings settings;
+    std::string label;  ///< The word.
 };
 
 /// "NAME[:KEY=VALUE]...", checked against the catalog.
@@ -29,7 +28,7 @@ Result<AlgorithmChoice> parse_algorithm(const std::string& text);
 
 /// What an algorithm computes before its first sample.
 struct Preparation {
-    std::shared_ptr<const SubspaceTables> tables;  ///< Null for algorithms that need none.
+    Tables tables;  ///< Empty for algorithms that need none.
     double seconds = 0;
     std::string note;  ///< One line where the tables are simpler than asked; empty otherwise.
 };

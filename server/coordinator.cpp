@@ -82,6 +82,7 @@ void Coordinator::changed(JobRecord& job) {
 Result<JobSpec> Coordinator::canonical_spec(const JobSpec& spec) const {
     JobSpec out = spec;
     out.frame = {};
+    out.algorithm = spec.algorithm.completed();
     if ((spec.samples_per_pixel > 0) == (spec.time_limit_seconds > 0))
         return invalid_argument("a job needs either a number of samples per pixel or a time limit");
     if (spec.samples_per_pixel > JobSpec::kMaxSamplesPerPixel)

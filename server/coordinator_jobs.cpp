@@ -74,8 +74,8 @@ Status Coordinator::prepare(JobRecord& job, std::stop_token stop) {
 void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables) {
     const FrameLayout frame = facts.frame;
     const Plan plan(frame, spec.algorithm);
-    const double unit_light_paths = double(spec.algorithm.light_paths_per_iteration(frame.crop.area())) *
-                                    plan.max_group_iterations() / plan.tile_count();
+    const double unit_light_paths =
+        double(spec.algorithm.light_paths_per_iteration(frame.crop.area())) * plan.max_group_iterations() / plan.tile_count();
     std::optional<UnitTable> units;
     units.emplace(plan, spec.samples_per_pixel, 1, options_.shuffle_seed);
     auto reducer = std::make_shared<Reducer>(frame, plan.tile_count());

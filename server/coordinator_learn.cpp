@@ -35,7 +35,11 @@ class Coordinator::Tracing final : public TracingPort {
             if (!alive()) return over();
             TrainingRound& round = *job_.round;
             if (!round.complete()) continue;
-            TracedRound traced{.kind = round.kind(), .round = round.number(), .work = round.work(), .data = {}, .worker_seconds = round.traced_seconds()};
+            TracedRound traced{.kind = round.kind(),
+                               .round = round.number(),
+                               .work = round.work(),
+                               .data = {},
+                               .worker_seconds = round.traced_seconds()};
             const TimePoint begin = job_.round_begin;
             auto parts = round.take();
             lock.unlock();

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <thread>
 
+#include "common/transport/parameters.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
 #include "server/training_budget.h"

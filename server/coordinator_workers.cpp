@@ -233,7 +233,8 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     }
     const UnitCounters counters = partial.counters;
     const uint64_t dropped = partial.dropped_count;
-    const double splats_per_path = unit.render.light_path_count > 0 ? double(partial.splats.size()) / double(unit.render.light_path_count) : 0;
+    const double splats_per_path =
+        unit.render.light_path_count > 0 ? double(partial.splats.size()) / double(unit.render.light_path_count) : 0;
     const auto refused = reducer->add(unit, std::move(partial));
 
     const std::lock_guard lock(mutex_);

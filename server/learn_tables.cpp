@@ -66,9 +66,13 @@ Result<std::optional<LearnedTables>> learn_tables(JobSpec spec, const EmitterSet
         }
         port.learning_begins();
         TrainingReport report;
-        auto tables = spec.algorithm.info().learning->learn(
-            {round->data, round->round, guide, emitters, render_settings(spec),
-             {stop, [&](double share) { port.learning_goes_on(share); }}, &report});
+        auto tables = spec.algorithm.info().learning->learn({round->data,
+                                                             round->round,
+                                                             guide,
+                                                             emitters,
+                                                             render_settings(spec),
+                                                             {stop, [&](double share) { port.learning_goes_on(share); }},
+                                                             &report});
         if (!tables.ok()) return tables.status();
         info.training_samples += round->data.samples;
         info.trace_seconds += round->seconds;

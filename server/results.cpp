@@ -44,7 +44,13 @@ template <class Chosen>
 Json fields_json(const JobSpec& spec, const Chosen& chosen) {
     Json json = Json::object();
     for_each_job_field([&]<unsigned Roles, class T>(const JobField<Roles, T>& field) {
-        if (chosen(Roles)) json[std::string(field.name)] = value_json(spec.*field.member);
+        if (!chosen(Roles)) return;
+        if constexpr (std::is_same_v<T, AlgorithmSettings>) {
+            json[std::string(field.name)] = (spec.*field.member).name();
+            json["parameters"] = (spec.*field.member).text();
+        } else {
+            json[std::string(field.name)] = value_json(spec.*field.member);
+        }
     });
     return json;
 }
@@ -101,8 +107,8 @@ std::string replay_command(const JobSpec& spec, const std::string& scene, const 
     const DroppedSample& sample = dropped.sample;
     const int width = spec.frame.crop.width();
     const int x = spec.frame.crop.x0 + int(sample.pixel) % width, y = spec.frame.crop.y0 + int(sample.pixel) / width;
-    std::string command = "lightloom replay " + shell_word(scene) + " --algorithm " + shell_word(spec.algorithm);
-    for (const auto& [key, value] : spec.parameters) command += " --set " + shell_word(key + "=" + value);
+    std::string command = "lightloom replay " + shell_word(scene) + " --algorithm " + shell_word(spec.algorithm.name());
+    for (const auto& [key, value] : spec.algorithm.text()) command += " --set " + shell_word(key + "=" + value);
     command += " --seed " + std::to_string(spec.seed) + " --max-depth " + std::to_string(spec.max_depth);
     if (spec.width > 0) command += " --resolution " + std::to_string(spec.width) + "x" + std::to_string(spec.height);
     if (spec.samples_per_pixel > 0) command += " --spp " + std::to_string(spec.samples_per_pixel);
@@ -165,14 +171,14 @@ std::string to_json(const Manifest& m) {
 
 Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers) {
     std::string parameters;
-    for (const auto& [key, value] : spec.parameters) parameters += (parameters.empty() ? "" : " ") + key + "=" + value;
+    for (const auto& [key, value] : spec.algorithm.text()) parameters += (parameters.empty() ? "" : " ") + key + "=" + value;
     ExrImage image;
     image.frame = spec.frame;
     image.color = std::move(developed.color);
     image.layers = std::move(layers);
     // Unknown is not zero.
     if (!developed.variance.pixels.empty()) image.layers.push_back({"variance", "RGB", std::move(developed.variance.pixels)});
-    image.attributes = {{exr_attribute::kAlgorithm, spec.algorithm},
+    image.attributes = {{exr_attribute::kAlgorithm, spec.algorithm.name()},
                         {exr_attribute::kParameters, parameters},
                         {exr_attribute::kSeed, std::to_string(spec.seed)},
                         {exr_attribute::kMaxDepth, std::to_string(spec.max_depth)},

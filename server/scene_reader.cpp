@@ -76,8 +76,7 @@ SceneReader make_scene_reader(std::filesystem::path scratch) {
         if (!scene.ok()) return scene.status();
         auto facts = scene_facts(scene->description, spec);
         if (!facts.ok()) return facts;
-        const auto algorithm = find_algorithm(spec.algorithm);
-        if (!algorithm.ok() || !(*algorithm)->needs_tables) return facts;
+        if (!spec.algorithm.info().learning) return facts;
         // Read a second time when it is needed, while workers trace: of the jobs that wait for their turn none holds a scene. That
         // is at once, whatever else is being read: this job is the one that workers wait for.
         facts->build_scene = [&assets, scratch, root = spec.scene_root, width = spec.width,

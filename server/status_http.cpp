@@ -30,7 +30,7 @@ std::string status_json(const Coordinator& coordinator) {
         jobs.push_back({{"job", j.job_id},
                         {"state", to_string(j.state)},
                         {"message", j.message},
-                        {"algorithm", j.spec.algorithm},
+                        {"algorithm", j.spec.algorithm.name()},
                         {"phase", j.state == JobState::kPreparing ? Json(phase_text(j)) : Json(nullptr)},
                         {"phase_done", j.phase_done},
                         {"phase_total", j.phase_total},

@@ -27,7 +27,7 @@ class TableCache {
     TableCache(std::filesystem::path directory, uint64_t max_bytes);
 
     /// Nothing when there is no entry, or a damaged one, which is removed with one line in the log.
-    std::optional<Entry> find(const Digest& key) const;
+    std::optional<Entry> find(const Digest& key, std::span<const TablePart* const> known) const;
     /// A failure costs the next job its time only: it is logged, not returned.
     void store(const Digest& key, std::string_view bytes, const TablesInfo& info) const;
     std::filesystem::path path_of(const Digest& key) const;

@@ -22,8 +22,6 @@ inline constexpr double kGuidedCost = 2;
 /// costs. The probe cannot tell: most of its own learning does not depend on the number of samples, and counts as such. (Hard
 /// interiors: 0.3 to 0.45 of tracing in two rounds.)
 inline constexpr double kLearningOverTracing = 0.35;
-/// The catalog's parameter for the size of the set.
-inline constexpr const char* kTrainingPaths = "training-paths";
 
 struct TrainingRate {
     double trace_seconds_per_sample = 0;  ///< With all workers at once.

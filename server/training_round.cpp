@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
-
 namespace lightloom {
 
 TrainingRound::TrainingRound(UnitKind kind, uint32_t number, const TrainingWork& work, std::optional<uint64_t> shuffle_seed)
-    : kind_(kind), number_(number),
+    : kind_(kind),
+      number_(number),
       work_(work),
       units_(Plan::training(kind, number, work), work.sample_count, UINT32_MAX, shuffle_seed),
       parts_(units_.group_total()) {}

@@ -168,21 +168,22 @@ Result<std::shared_ptr<const Scene>> RendererCache::scene(const JobSpec& spec, s
     return scene;
 }
 
-Result<std::shared_ptr<const SubspaceTables>> RendererCache::tables(const UnitLease& lease, const Scene& scene,
-                                                                    std::stop_token stop) {
+Result<Tables> RendererCache::tables(const UnitLease& lease, const Scene& scene, std::stop_token stop) {
     const AssetReference& asset = lease.tables;
-    if (asset.size_bytes == 0) return std::shared_ptr<const SubspaceTables>();
+    if (asset.size_bytes == 0) return Tables();
     const auto bytes = tables_(asset, stop);
     if (!bytes.ok()) {
         if (bytes.status().code() == StatusCode::kCancelled) return bytes.status();
         return Status(bytes.status().code(),
                       "this worker cannot get the tables " + asset.digest.hex() + ": " + bytes.status().message());
     }
-    auto tables = parse_tables(*bytes);
+    const LearningInfo* learning = lease.spec.algorithm.info().learning;
+    if (!learning) return failed_precondition("algorithm '" + lease.spec.algorithm.name() + "' reads no tables");
+    auto tables = parse_tables(*bytes, learning->parts);
     Status status = tables.ok() ? tables->validate(scene.emitters()) : tables.status();
     if (!status.ok())
         return failed_precondition("the tables " + asset.digest.hex() + " do not serve this scene: " + status.message());
-    return std::make_shared<const SubspaceTables>(*std::move(tables));
+    return *std::move(tables);
 }
 
 Result<std::shared_ptr<const Renderer>> RendererCache::renderer(const UnitLease& lease, std::stop_token stop) {
@@ -197,7 +198,7 @@ Result<std::shared_ptr<const Renderer>> RendererCache::renderer(const UnitLease&
     if (!built.ok()) return built.status();
     auto learned = tables(lease, **built, stop);
     if (!learned.ok()) return learned.status();
-    auto renderer = Renderer::create(*built, render_settings(lease.spec), *std::move(learned));
+    auto renderer = Renderer::create(*built, render_settings(lease.spec), *learned);
     if (!renderer.ok()) return renderer.status();
     std::shared_ptr<const Renderer> shared = std::move(renderer).value();
     renderer_entries_.push_front({image, lease.tables.digest, shared});
@@ -214,7 +215,7 @@ Result<TrainingTracer> RendererCache::tracer(const UnitLease& lease, std::stop_t
     if (!built.ok()) return built.status();
     const auto guide = tables(lease, **built, stop);
     if (!guide.ok()) return guide.status();
-    auto generator = TrainingGenerator::create(**built, render_settings(lease.spec), guide->get());
+    auto generator = TrainingGenerator::create(**built, render_settings(lease.spec), *guide);
     if (!generator.ok()) return generator.status();
     tracer_image_ = image, tracer_guide_ = lease.tables.digest;
     tracer_ = [scene = *built, generator = *std::move(generator)](const TrainingWork& work, std::stop_token unit_stop) {

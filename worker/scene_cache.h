@@ -58,7 +58,7 @@ class RendererCache {
 
   private:
     Result<std::shared_ptr<const Scene>> scene(const JobSpec& spec, std::stop_token stop);
-    Result<std::shared_ptr<const SubspaceTables>> tables(const UnitLease& lease, const Scene& scene, std::stop_token stop);
+    Result<Tables> tables(const UnitLease& lease, const Scene& scene, std::stop_token stop);
 
     struct SceneEntry {
         Digest root;

@@ -192,7 +192,7 @@ Status Worker::render_unit(const UnitLease& lease, std::stop_token unit_stop, st
     const auto renderer = renderers_(lease, unit_stop);
     if (!renderer.ok()) return renderer.status();
     Result<Partial> partial = internal_error("not rendered");
-    const auto seconds = in_turn(lease, unit_stop, drain, [&] { partial = (*renderer)->render(unit_work(lease.unit), unit_stop); });
+    const auto seconds = in_turn(lease, unit_stop, drain, [&] { partial = (*renderer)->render(lease.unit.render, unit_stop); });
     if (!seconds.ok()) return seconds.status();
     if (!partial.ok()) return partial.status();
     return submit(

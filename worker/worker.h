@@ -14,6 +14,7 @@
 #include <tbb/task_arena.h>
 
 #include "common/transport/renderer.h"
+#include "common/transport/training.h"
 #include "common/work/service.h"
 
 namespace lightloom {

@@ -62,15 +62,26 @@ double AlgorithmSettings::value(std::string_view parameter) const { return value
 
 bool AlgorithmSettings::chosen(std::string_view parameter) const { return has(parameter) && chosen_[index(parameter)]; }
 
+AlgorithmSettings AlgorithmSettings::completed() const {
+    AlgorithmSettings all = *this;
+    all.chosen_.assign(all.chosen_.size(), true);
+    return all;
+}
+
 AlgorithmSettings AlgorithmSettings::with(std::string_view parameter, double value) const {
     AlgorithmSettings changed = *this;
-    changed.values_.at(index(parameter)) = value;
+    const size_t i = index(parameter);
+    changed.values_.at(i) = value;
+    changed.chosen_.at(i) = true;
     return changed;
 }
 
-std::map<std::string, std::string> AlgorithmSettings::text() const {
+std::map<std::string, std::string> AlgorithmSettings::text() const { return completed().chosen_text(); }
+
+std::map<std::string, std::string> AlgorithmSettings::chosen_text() const {
     std::map<std::string, std::string> out;
     for (size_t i = 0; i < values_.size(); ++i) {
+        if (!chosen_[i]) continue;
         char text[64];
         const auto end = std::to_chars(text, text + sizeof text, values_[i]).ptr;
         out[std::string(info_->parameters[i].name)] = std::string(text, end);

@@ -27,10 +27,14 @@ class AlgorithmSettings {
     double value(std::string_view parameter) const;
     /// Whether the text that these settings come from named the parameter.
     bool chosen(std::string_view parameter) const;
-    /// The same with one parameter changed to a value in its range.
+    /// The same with everything chosen: what the defaults were is written down.
+    AlgorithmSettings completed() const;
+    /// The same with one parameter chosen, a value in its range.
     AlgorithmSettings with(std::string_view parameter, double value) const;
     /// All parameters with their values as canonical text, so that an image says what was rendered even where defaults applied.
     std::map<std::string, std::string> text() const;
+    /// Of the chosen ones alone; parse() makes these settings again from it.
+    std::map<std::string, std::string> chosen_text() const;
 
     /// N1: light paths per pixel and iteration; 0 for an algorithm that traces none.
     double light_paths_per_pixel() const { return info_->light_paths_per_pixel ? info_->light_paths_per_pixel(*this) : 0; }
@@ -38,10 +42,8 @@ class AlgorithmSettings {
     /// every group reckon with what the group really traces.
     uint64_t light_paths_per_iteration(int64_t crop_pixels) const;
 
-    /// The same algorithm with the same values, however they came about.
-    friend bool operator==(const AlgorithmSettings& a, const AlgorithmSettings& b) {
-        return a.info_ == b.info_ && a.values_ == b.values_;
-    }
+    /// The same algorithm with the same values, and the same of them chosen.
+    friend bool operator==(const AlgorithmSettings&, const AlgorithmSettings&) = default;
 
   private:
     explicit AlgorithmSettings(const AlgorithmInfo& info);

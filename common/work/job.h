@@ -3,15 +3,15 @@
 // pure function between them. Nothing here knows about workers, clocks or networks.
 
 #include <cstdint>
-#include <map>
 #include <string>
 #include <vector>
 
 #include "common/core/digest.h"
 #include "common/core/result.h"
 #include "common/film/frame.h"
-#include "common/transport/renderer.h"
-#include "common/transport/training.h"
+#include "common/transport/learning.h"
+#include "common/transport/settings.h"
+#include "common/transport/unit.h"
 
 namespace lightloom {
 
@@ -19,8 +19,7 @@ namespace lightloom {
 struct JobSpec {
     static constexpr uint32_t kMaxSamplesPerPixel = 1u << 24;
 
-    std::string algorithm = "path";
-    std::map<std::string, std::string> parameters;  ///< --set key=value, canonical text; validated by the catalog.
+    AlgorithmSettings algorithm;  ///< As they were chosen; once the job is accepted, with every default written down.
     uint64_t seed = 0;
     uint32_t samples_per_pixel = 0;  ///< Iterations; 0 when time-limited.
     double time_limit_seconds = 0;   ///< 0 when bounded by samples. Exactly one of the two is set.
@@ -40,7 +39,7 @@ bool same_request(const JobSpec& a, const JobSpec& b);
 
 /// What light transport needs of a spec.
 inline RenderSettings render_settings(const JobSpec& spec) {
-    return {.algorithm = spec.algorithm, .parameters = spec.parameters, .seed = spec.seed, .max_depth = spec.max_depth};
+    return {.algorithm = spec.algorithm, .seed = spec.seed, .max_depth = spec.max_depth};
 }
 
 enum class UnitKind : uint8_t {
@@ -81,8 +80,8 @@ struct PlanOptions {
 /// As the row of the algorithm says.
 PlanOptions plan_options(const FrameLayout& frame, const AlgorithmSettings& algorithm);
 
-/// The units of a group: one per tile, in order. The group's light paths, so many per iteration, are shared out in proportion to the
-/// tiles' areas with exact cumulative rounding.
+/// The units of a group: one per tile, in order. The group's light paths, so many per iteration, are shared out in proportion to
+/// the tiles' areas with exact cumulative rounding.
 std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& tiles, const PlanOptions& options);
 
 /// The plan is a pure function of frame, options and the number of iterations. Group sizes grow geometrically: a group is at

@@ -4,7 +4,6 @@
 // checked against it by job_fields_test.
 
 #include <cstddef>
-#include <map>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -43,7 +42,6 @@ inline constexpr auto kJobFields = [] {
     constexpr unsigned kBound = kRequest | kManifest;
     return std::tuple{
         job_field<kSetting>("algorithm", &JobSpec::algorithm),
-        job_field<kSetting>("parameters", &JobSpec::parameters),
         job_field<kSetting>("seed", &JobSpec::seed),
         job_field<kSetting>("max_depth", &JobSpec::max_depth),
         // A time limit that ended a job is of no use for a replay: what is left of it is a number of samples.
@@ -98,10 +96,9 @@ std::string fields_text(const JobSpec& spec) {
     for_each_job_field([&]<unsigned Roles, class T>(const JobField<Roles, T>& field) {
         if constexpr ((Roles & Role) != 0) {
             const T& value = spec.*field.member;
-            if constexpr (std::is_same_v<T, std::string>) {
-                append_text(out, field.name, value);
-            } else if constexpr (std::is_same_v<T, std::map<std::string, std::string>>) {
-                for (const auto& [key, text] : value) append_text(out, "set " + key, text);
+            if constexpr (std::is_same_v<T, AlgorithmSettings>) {
+                append_text(out, field.name, value.info().name);
+                for (const auto& [key, text] : value.text()) append_text(out, "set " + key, text);
             } else if constexpr (std::is_same_v<T, Digest>) {
                 append_text(out, field.name, value.hex());
             } else if constexpr (std::is_same_v<T, FrameLayout>) {

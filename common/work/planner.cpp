@@ -67,7 +67,8 @@ std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& t
 }
 
 Plan::Plan(const FrameLayout& frame, const PlanOptions& options)
-    : options_(options), tiles_(make_tiles(frame.crop, options.whole_frame)) {
+    : options_(options),
+      tiles_(make_tiles(frame.crop, options.whole_frame)) {
     int64_t largest = 1;
     for (const Rect& tile : tiles_) largest = std::max(largest, tile.area());
     // A unit of a whole large frame is large, and so is its partial: it should not be of one iteration for ever.

@@ -139,8 +139,8 @@ Result<Digest> get(const v1::Digest& in) {
 }
 
 void put(const JobSpec& in, v1::JobSpec* out) {
-    out->set_algorithm(in.algorithm);
-    for (const auto& [key, value] : in.parameters) (*out->mutable_parameters())[key] = value;
+    out->set_algorithm(in.algorithm.name());
+    for (const auto& [key, value] : in.algorithm.chosen_text()) (*out->mutable_parameters())[key] = value;
     out->set_seed(in.seed);
     out->set_samples_per_pixel(in.samples_per_pixel);
     out->set_time_limit_seconds(in.time_limit_seconds);
@@ -156,8 +156,9 @@ void put(const JobSpec& in, v1::JobSpec* out) {
 
 Result<JobSpec> get(const v1::JobSpec& in) {
     JobSpec spec;
-    spec.algorithm = in.algorithm();
-    for (const auto& [key, value] : in.parameters()) spec.parameters[key] = value;
+    auto algorithm = AlgorithmSettings::parse(in.algorithm(), {in.parameters().begin(), in.parameters().end()});
+    if (!algorithm.ok()) return algorithm.status();
+    spec.algorithm = *std::move(algorithm);
     spec.seed = in.seed();
     spec.samples_per_pixel = in.samples_per_pixel();
     spec.time_limit_seconds = in.time_limit_seconds();
