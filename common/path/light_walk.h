@@ -10,7 +10,7 @@ namespace lightloom {
 class LightSampler : public WalkSampler {
   public:
     /// `key.index` is the number of the path; numbers that differ above 32 bits belong to different sequences.
-    explicit LightSampler(const RngKey& key)
+    LL_ALWAYS_INLINE explicit LightSampler(const RngKey& key)
         : WalkSampler(key,
                       Rng({key.seed, Stage::kLightScramble, key.iteration, uint64_t(key.stage) << 56 | key.index >> 32}).next_u64(),
                       uint32_t(key.index), 3) {}

@@ -31,6 +31,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "common/core/inline.h"
 #include "common/path/path_view.h"
 #include "common/path/technique.h"
 
@@ -67,7 +68,7 @@ struct RatioSum {
     bool beaten = false;
 
     /// `earlier` breaks ties of the maximum heuristic: the technique that comes first in the sweep order wins.
-    void add(double ratio, bool earlier) {
+    LL_ALWAYS_INLINE void add(double ratio, bool earlier) {
         switch (heuristic) {
             case Heuristic::kBalance: sum += ratio; break;
             case Heuristic::kPower: sum += ratio * ratio; break;
@@ -125,7 +126,7 @@ inline bool can_connect(const PathView& view, int s) {
 /// Calls visit(s, chain) with chain = C(s) A(s) / (C(base) A(base)) for every s != base from s_min to s_max that it is not
 /// zero for, walking outward from `base`, a technique that can produce the path.
 template <class Visit>
-void for_each_split(const PathView& view, int base, int s_min, int s_max, Visit&& visit) {
+LL_ALWAYS_INLINE inline void for_each_split(const PathView& view, int base, int s_min, int s_max, Visit&& visit) {
     WideProduct chain;
     for (int s = base; s < s_max; ++s) {
         chain.multiply(view.fwd[s] / view.rev[s]);  // rev > 0: the own technique traced x_s from the camera
@@ -155,18 +156,21 @@ double mis_weight(const PathView& view, Technique own, const OnPath& on, Heurist
     if (!(own_sigma > 0)) return 0;
     const double inv_own = 1 / own_sigma;
     detail::RatioSum ratios{heuristic};
-    // Order for ties: hit, next event, connect 1, merge 1, connect 2, merge 2, ..., lens.
-    const auto split = [&](int s, const WideProduct& chain, bool earlier) {
-        if (s < s_min || s > s_max || !can_connect(view, s)) return;
-        for_each_technique_of_split(s, k, [&](Technique t) {
-            if (t == own) {
-                earlier = false;  // what follows at the own split comes later
-                return;
-            }
-            if (const double f = sigma(on, t); f > 0) ratios.add(chain.value(f * inv_own), earlier);
-        });
+    const auto add = [&](double other_sigma, const WideProduct& chain, bool earlier) LL_ALWAYS_INLINE {
+        if (other_sigma > 0) ratios.add(chain.value(other_sigma * inv_own), earlier);
     };
-    const auto merge = [&](int i, const WideProduct& chain, bool earlier) {
+    // Order for ties: hit, next event, connect 1, merge 1, connect 2, merge 2, ..., lens.
+    const auto split = [&](int s, const WideProduct& chain, bool earlier) LL_ALWAYS_INLINE {
+        if (s < s_min || s > s_max || !can_connect(view, s)) return;
+        const double survivors = on.survivors(s);
+        if (s > 1 && s < k) [[likely]]
+            return add(survivors * on.connect(s), chain, earlier);
+        if (s == 0) return add(survivors * on.hit(), chain, earlier);
+        if (s == k) return add(survivors * on.lens(), chain, earlier);
+        add(survivors * on.next_event(), chain, earlier);
+        add(survivors * on.connect(s), chain, earlier);
+    };
+    const auto merge = [&](int i, const WideProduct& chain, bool earlier) LL_ALWAYS_INLINE {
         if constexpr (OnPath::kMerges) {
             if (i < 1 || i > k - 1 || view.delta[i] || own == Technique::merge(i)) return;
             const double factor = on.merge(i);
@@ -177,12 +181,15 @@ double mis_weight(const PathView& view, Technique own, const OnPath& on, Heurist
             }
         }
     };
-    split(base, WideProduct{}, true);
+    if (own.kind == TechniqueKind::kMerge) split(base, WideProduct{}, true);
+    if (own.kind == TechniqueKind::kConnect && base == 1) add(on.survivors(1) * on.next_event(), WideProduct{}, true);
+    if (own.kind == TechniqueKind::kNextEvent) add(on.survivors(1) * on.connect(1), WideProduct{}, false);
     merge(base, WideProduct{}, false);
-    for_each_split(view, base, OnPath::kMerges ? 0 : s_min, OnPath::kMerges ? k : s_max, [&](int s, const WideProduct& chain) {
-        split(s, chain, s < base);
-        merge(s, chain, s < base);
-    });
+    for_each_split(view, base, OnPath::kMerges ? 0 : s_min, OnPath::kMerges ? k : s_max,
+                   [&](int s, const WideProduct& chain) LL_ALWAYS_INLINE {
+                       split(s, chain, s < base);
+                       merge(s, chain, s < base);
+                   });
     return ratios.weight();
 }
 

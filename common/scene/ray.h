@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "common/core/inline.h"
 #include "common/core/vec.h"
 
 namespace lightloom {
@@ -25,7 +26,7 @@ struct RawHit {
 /// THAT, which near the origin of a large ground plane is far more than those of `p`. The floor near the origin shrinks with
 /// `reach` below 1/4, for scenes that are small as a whole. Camera and light sub-paths, next
 /// event and connections all use this one rule, so that a segment has the same visibility from either end.
-inline Vec3 offset_origin(const Vec3& p, const Vec3& geometric_normal, const Vec3& direction, float reach) {
+LL_ALWAYS_INLINE inline Vec3 offset_origin(const Vec3& p, const Vec3& geometric_normal, const Vec3& direction, float reach) {
     constexpr float kOrigin = 1.0f / 32, kIntScale = 256, kReachScale = 0x1p-20f;
     const Vec3 n = face_forward(geometric_normal, direction);
     const float least = kReachScale * reach, floor = reach < 0.25f ? 0x1p-14f * reach : 0x1p-16f;

@@ -177,11 +177,16 @@ class UnitSums {
         add(preparation.counters);
         traced_light_paths_ += preparation.light_paths;
     }
-    void add(const UnitChunk& chunk) {
-        partial.dropped_count += chunk.dropped_count;
-        for (const DroppedSample& d : chunk.dropped) drop(d);
-        add(chunk.counters);
-        add(chunk.splats);
+    void add(std::vector<UnitChunk> chunks) {
+        for (const UnitChunk& chunk : chunks) {
+            partial.dropped_count += chunk.dropped_count;
+            for (const DroppedSample& d : chunk.dropped) drop(d);
+            add(chunk.counters);
+            add(chunk.splats);
+        }
+        // Their memory stays until the unit is done: freed before the partial's splats are allocated it would go back to the
+        // system, which costs bdpt two per cent in page faults.
+        last_chunks_ = std::move(chunks);
     }
     void add(const UnitSink& sink) {
         for (const UnitSink::Lane& lane : sink.lanes()) {
@@ -217,6 +222,7 @@ class UnitSums {
     }
 
     const Rect crop_;
+    std::vector<UnitChunk> last_chunks_;
     std::vector<double> splat_sums_;
     uint64_t traced_light_paths_ = 0;
 };
@@ -272,7 +278,7 @@ void add_samples(const UnitScope& scope, const Trace& trace, const Weight& weigh
             chunk.counters = context.counters;
         }
     });
-    for (const UnitChunk& chunk : chunks) sums->add(chunk);
+    sums->add(std::move(chunks));
 }
 
 /// One preparation and the samples that share its state.
