@@ -50,12 +50,9 @@ inline RenderSettings settings_of(const std::string& algorithm, const std::vecto
 }
 
 /// A unit of the whole frame, with the light paths that its plan would give it.
-inline RenderUnit whole_frame(const Scene& scene, const AlgorithmSettings& algorithm, uint64_t first_iteration,
-                              uint32_t iterations) {
+inline RenderUnit whole_frame(const Scene& scene, const AlgorithmSettings& algorithm, uint32_t iterations) {
     const Rect& crop = scene.frame().crop;
-    return {.first_iteration = first_iteration,
-            .iteration_count = iterations,
-            .group_first_iteration = first_iteration,
+    return {.iteration_count = iterations,
             .tile = crop,
             .light_path_count = iterations * algorithm.light_paths_per_iteration(crop.area()),
             .splats_only = !algorithm.info().camera_samples};

@@ -99,7 +99,7 @@ int main(int argc, char** argv) {
         const RenderSettings settings = bench::settings_of(name, set, loaded);
         TrainingReport training;
         const Tables tables = bench::value_or_exit(make_tables(*loaded.scene, settings, {}, &training));
-        const RenderUnit unit = bench::whole_frame(*loaded.scene, settings.algorithm, 0, iterations);
+        const RenderUnit unit = bench::whole_frame(*loaded.scene, settings.algorithm, iterations);
         std::vector<Images> by_seed(seeds);
         // A renderer that is watched uses one thread.
         fork_join(seeds, [&](size_t first, size_t last) {

@@ -50,8 +50,9 @@ int main(int argc, char** argv) {
     const double samples = double(crop.area()) * iterations;
     for (int rep = 0; rep < repetitions; ++rep)
         for (Row& row : rows) {
-            const RenderUnit unit =
-                bench::whole_frame(*scene, row.algorithm, uint64_t(rep) * uint64_t(iterations), uint32_t(iterations));
+            // Other camera samples each time; the light paths are those of the first.
+            RenderUnit unit = bench::whole_frame(*scene, row.algorithm, uint32_t(iterations));
+            unit.first_iteration = uint64_t(rep) * uint64_t(iterations);
             const auto start = std::chrono::steady_clock::now();
             const auto partial = row.renderer->render(unit, {});
             const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

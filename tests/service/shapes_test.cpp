@@ -5,6 +5,7 @@
 
 #include <numeric>
 
+#include "client/progressive_render.h"
 #include "common/film/exr_io.h"
 #include "common/transport/training.h"
 #include "tests/service/forwarding_port.h"
@@ -17,6 +18,7 @@ namespace lightloom {
 namespace {
 
 using namespace lightloom::testing;
+using client::ProgressiveRender;
 
 /// Before any test reads the catalog.
 const bool kStubs = add_stub_rows();
@@ -48,9 +50,9 @@ class VanishingPort final : public ForwardingPort {
   public:
     explicit VanishingPort(std::unique_ptr<WorkerPort> port) : ForwardingPort(*port), own_(std::move(port)) {}
     Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds, std::stop_token stop) override {
-        if (leased_) return gone();
+        if (leased_.exchange(true)) return gone();  // a worker asks from several threads
         auto leases = port_.lease_units(worker_id, wait_seconds, stop);
-        if (leases.ok() && !leases->empty()) leased_ = true;
+        if (!leases.ok() || leases->empty()) leased_ = false;
         return leases;
     }
     Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running) override {
@@ -150,6 +152,15 @@ TEST_P(Shapes, BytesDoNotDependOnWhoRendersWhatAndWhoVanishes) {
     }
     EXPECT_EQ(first.info.samples_per_pixel_done, kIterations);
     EXPECT_EQ(first.info.unit_done, first.info.unit_total);
+
+    // Without a service, group by group.
+    auto renderer = Renderer::create(large_box(), {algorithm_of(algorithm), 0, kMaxDepth});
+    ASSERT_TRUE(renderer.ok()) << renderer.status().message();
+    ProgressiveRender alone(*std::move(renderer), kLarge, Plan(kLarge, algorithm_of(algorithm)), 1, 0);
+    while (alone.iterations() < kIterations) ASSERT_TRUE(alone.advance(kIterations).ok());
+    const auto image = decode_exr(first.exr, "image");
+    ASSERT_TRUE(image.ok());
+    EXPECT_EQ(alone.image().pixels, image->color.pixels);
 
     // What arrives at the image is what arrives at the sensor: the frame's mean is that of an algorithm of the product.
     const double mean = mean_of(first.exr), expected = mean_by_bdpt(algorithm == kStubSplats ? 2 : 1);
@@ -283,7 +294,7 @@ TEST(WrongUnits, AreRefusedWithTheReason) {
 /// A coordinator that plans otherwise than the worker's algorithm needs.
 class CuttingPort final : public ForwardingPort {
   public:
-    CuttingPort(std::unique_ptr<WorkerPort> port) : ForwardingPort(*port), own_(std::move(port)) {}
+    explicit CuttingPort(std::unique_ptr<WorkerPort> port) : ForwardingPort(*port), own_(std::move(port)) {}
     Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds, std::stop_token stop) override {
         auto leases = port_.lease_units(worker_id, wait_seconds, stop);
         if (leases.ok())
