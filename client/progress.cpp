@@ -12,7 +12,10 @@ constexpr auto kPlainInterval = std::chrono::seconds(5);
 constexpr auto kRedrawInterval = std::chrono::milliseconds(100);
 
 std::string line_of(const JobInfo& job, int percent) {
-    const double rate = job.render_seconds > 0 ? double(job.camera_samples) / job.render_seconds : 0;
+    // An algorithm that only splats has no camera samples to count.
+    const bool splats_only = !job.spec.algorithm.info().camera_samples;
+    const double done = double(splats_only ? job.light_paths : job.camera_samples);
+    const double rate = job.render_seconds > 0 ? done / job.render_seconds : 0;
     std::string line;
     char text[160];
     std::snprintf(text, sizeof text, "%3d %%  ", percent);
@@ -25,8 +28,8 @@ std::string line_of(const JobInfo& job, int percent) {
     }
     line += text;
     if (rate > 0) {
-        std::snprintf(text, sizeof text, "  %.2f Msamples/s  %u worker%s", rate * 1e-6, job.worker_count,
-                      job.worker_count == 1 ? "" : "s");
+        std::snprintf(text, sizeof text, "  %.2f M%s/s  %u worker%s", rate * 1e-6, splats_only ? "paths" : "samples",
+                      job.worker_count, job.worker_count == 1 ? "" : "s");
         line += text;
     }
     if (job.eta_seconds >= 0 && !is_terminal(job.state)) line += "  ETA " + duration_text(job.eta_seconds);

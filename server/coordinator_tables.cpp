@@ -181,7 +181,7 @@ void Coordinator::drop_tables(const Digest& digest) {
 Result<uint64_t> Coordinator::expected_training_bytes(const UnitReference& reference) const {
     const std::lock_guard lock(mutex_);
     const auto job = find_job(reference.job_id);
-    UnitTable* const units = job ? job->open_units(reference.key.kind) : nullptr;
+    UnitTable* const units = job ? job->open_units(reference.key) : nullptr;
     if (!units || reference.key.kind == UnitKind::kRender)
         return not_found("job " + reference.job_id + " takes no such training data (any more)");
     const auto unit = units->find(reference.key);
@@ -207,7 +207,7 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
     worker->last_heard = options_.clock();
     worker->held.erase(reference);
     const auto job = find_job(reference.job_id);
-    UnitTable* const units = job ? job->open_units(reference.key.kind) : nullptr;
+    UnitTable* const units = job ? job->open_units(reference.key) : nullptr;
     if (!units) return SubmitAck{SubmitOutcome::kStale, "job " + reference.job_id + " has its training data already"};
     const auto unit = units->find(reference.key);
     if (!unit) return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};

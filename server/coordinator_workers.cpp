@@ -102,7 +102,7 @@ Result<std::vector<UnitReference>> Coordinator::heartbeat(const std::string& wor
     std::set<UnitReference> held;
     for (const RunningUnit& item : running) {
         const auto job = find_job(item.unit.job_id);
-        UnitTable* const units = job ? job->open_units(item.unit.key.kind) : nullptr;
+        UnitTable* const units = job ? job->open_units(item.unit.key) : nullptr;
         if (!units || !units->renew(item.unit.key, worker->index, lease_end())) {
             revoked.push_back(item.unit);
             continue;
@@ -127,7 +127,7 @@ Status Coordinator::release_unit(const std::string& worker_id, const UnitReferen
     if (!worker) return no_worker(worker_id);
     worker->held.erase(unit);
     const auto job = find_job(unit.job_id);
-    UnitTable* const units = job ? job->open_units(unit.key.kind) : nullptr;
+    UnitTable* const units = job ? job->open_units(unit.key) : nullptr;
     if (!units) return {};
     // What a network did to a worker says nothing about the unit: it costs time only.
     const bool blameless = repaired || why.code() == StatusCode::kCancelled || why.code() == StatusCode::kUnavailable ||

@@ -88,11 +88,11 @@ UnitTable* JobRecord::open_units() {
     return state == JobState::kPreparing && round ? &round->units() : nullptr;
 }
 
-UnitTable* JobRecord::open_units(UnitKind kind) {
+UnitTable* JobRecord::open_units(const UnitKey& unit) {
     UnitTable* const table = open_units();
     if (!table) return nullptr;
-    const UnitKind open = state == JobState::kRunning ? UnitKind::kRender : round->kind();
-    return kind == open ? table : nullptr;
+    if (state == JobState::kRunning) return unit.kind == UnitKind::kRender ? table : nullptr;
+    return unit == round->key(unit.group) ? table : nullptr;
 }
 
 const std::shared_ptr<JobRecord>& maker_of_last_resort(const std::shared_ptr<JobRecord>& job) {

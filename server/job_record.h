@@ -50,7 +50,7 @@ struct JobRecord {
     PreparePhase phase = PreparePhase::kReadingScene;
     SceneFacts facts;                                ///< From the reading of the scene until the units are planned.
     std::optional<TrainingRound> round;              ///< In kPreparing, of a job that makes tables.
-    AssetReference guide;                            ///< Tables that the training units read; empty for pilots and probes.
+    AssetReference guide;                            ///< Tables that the training units read; empty for first rounds and probes.
     std::shared_ptr<const std::string> guide_bytes;  ///< Of these, should the disk lose them.
     bool capped_by_time_limit = false;
     Digest table_key;                  ///< Of the tables that the job needs; set before `makes_tables` or `maker`.
@@ -74,8 +74,8 @@ struct JobRecord {
     JobInfo info(TimePoint now) const;
     /// The units that can be leased now, or null.
     UnitTable* open_units();
-    /// The same if they are of that kind, otherwise null.
-    UnitTable* open_units(UnitKind kind);
+    /// The same if the unit is of their kind and round, otherwise null: a late result of one round is none of the next.
+    UnitTable* open_units(const UnitKey& unit);
 };
 
 /// The job itself, or who makes the tables that it, and those that it waits for, wait for. Jobs never wait in a circle: who waits

@@ -159,13 +159,14 @@ class UnitRenderer final : public Renderer {
 }  // namespace detail
 
 /// The renderer of `make(select)`, where `select(selection)` is that selection without the techniques that the request leaves out.
+/// An algorithm that makes a selection for each unit keeps a copy of `select`.
 template <class Make>
 std::unique_ptr<Renderer> make_unit_renderer(const RendererRequest& request, Make&& make) {
     const auto finish = [&](auto algorithm) -> std::unique_ptr<Renderer> {
         return std::make_unique<detail::UnitRenderer<decltype(algorithm)>>(request, std::move(algorithm));
     };
     if (!request.mask) return finish(make([](auto selection) { return selection; }));
-    return finish(make([&](auto selection) { return Masked<decltype(selection)>{std::move(selection), *request.mask}; }));
+    return finish(make([mask = *request.mask](auto selection) { return Masked<decltype(selection)>{std::move(selection), mask}; }));
 }
 
 }  // namespace lightloom

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -40,12 +41,21 @@ inline LoadedScene load(const std::string& path, const std::string& resolution) 
 
 /// `set`: key=value each.
 inline RenderSettings settings_of(const std::string& algorithm, const std::vector<std::string>& set, const LoadedScene& loaded) {
-    RenderSettings settings{algorithm, {}, 1, loaded.max_depth};
+    std::map<std::string, std::string> parameters;
     for (const std::string& item : set) {
         const size_t equals = std::min(item.find('='), item.size());
-        settings.parameters[item.substr(0, equals)] = equals < item.size() ? item.substr(equals + 1) : "";
+        parameters[item.substr(0, equals)] = equals < item.size() ? item.substr(equals + 1) : "";
     }
-    return settings;
+    return {value_or_exit(AlgorithmSettings::parse(algorithm, parameters)), 1, loaded.max_depth};
+}
+
+/// A unit of the whole frame, with the light paths that its plan would give it.
+inline RenderUnit whole_frame(const Scene& scene, const AlgorithmSettings& algorithm, uint32_t iterations) {
+    const Rect& crop = scene.frame().crop;
+    return {.iteration_count = iterations,
+            .tile = crop,
+            .light_path_count = iterations * algorithm.light_paths_per_iteration(crop.area()),
+            .splats_only = !algorithm.info().camera_samples};
 }
 
 }  // namespace lightloom::bench

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "common/transport/parameters.h"
 #include "common/transport/spcbpt.h"
 #include "common/transport/training.h"
 #include "common/work/job.h"
@@ -95,21 +96,30 @@ int main(int argc, char** argv) {
     const bench::LoadedScene loaded = bench::load(scene_path, resolution);
     const std::shared_ptr<const Scene>& scene = loaded.scene;
     const RenderSettings settings = bench::settings_of("spcbpt", set, loaded);
-    const TransportParameters parameters = bench::value_or_exit(TransportParameters::read(settings));
+    const AlgorithmSettings& chosen = settings.algorithm;
+    const CacheParameters cache = CacheParameters::of(chosen);
+    const RouletteRule roulette = roulette_of(chosen);
     TrainingReport report;
-    SubspaceTables tables = bench::value_or_exit(make_tables(*scene, settings, {}, &report));
+    const Tables tables = bench::value_or_exit(make_tables(*scene, settings, {}, &report));
 
-    const double frame_paths = parameters.light_paths * double(scene->frame().crop.area());
-    const auto plain = make_spcbpt(parameters, std::make_shared<const PreparedTables>(std::move(tables)), frame_paths);
-    const CachedAlgorithm<TimedConnections> algorithm{{{plain.method}}, plain.heuristic, plain.minimum_paths};
+    const auto prepared = std::make_shared<const PreparedTables>(*tables.get<SubspaceTables>());
+    const SpcbptSelection selection = spcbpt_selection(
+        prepared, {.light_paths_per_iteration = double(chosen.light_paths_per_iteration(scene->frame().crop.area())),
+                   .connections = cache.connections,
+                   .cache_paths = chosen.value("ris-aware") != 0 ? double(cache.minimum_paths) : 0,
+                   .correction = chosen.info().learning->plan(chosen).correction,
+                   .roulette = roulette});
+    const CachedAlgorithm<TimedConnections> algorithm{
+        {{selection, prepared, cache.connections}}, heuristic_of(chosen), cache.minimum_paths};
     const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
     const Overhead empty = overhead();
     // The units of a job: caches as large as there.
-    const Plan plan(scene->frame(), parameters.light_paths);
+    const Plan plan(scene->frame(), chosen);
     const uint64_t begin = __rdtsc();
     for (const Group& group : plan.groups_for(iterations)) {
         for (const WorkUnit& unit : plan.units(group))
-            (void)bench::value_or_exit(render_unit(algorithm, *scene, settings, parameters.roulette, unit_work(unit), {}));
+            (void)bench::value_or_exit(
+                render_unit(algorithm, *scene, settings.seed, settings.max_edges(), roulette, unit.render, {}));
     }
     double whole = double(__rdtsc() - begin);
     for (const Clock& clock : clocks) whole -= double(clock.calls) * empty.whole;

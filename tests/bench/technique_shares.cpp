@@ -1,6 +1,7 @@
-// Where an image's light and an algorithm's noise come from: for emitter hits, next event, longer connections and light
-// tracing, the share of the mean that the weights give to them, and the share of the variance per iteration (of single
-// pixels, relative to their brightness, without the noisiest 0.1 %).
+// Where an image's light and an algorithm's noise come from: for emitter hits, next event, longer connections, light tracing and
+// merging, the share of the mean that the weights give to them, and the share of the variance per iteration (of single
+// pixels, relative to their brightness, without the noisiest 0.1 %). Any algorithm of the catalog will do, unless it makes its
+// loops itself and shows no single contribution.
 //
 //   technique_shares SCENE [--algorithms bdpt,lvcbpt,spcbpt] [--iterations N] [--seeds N] [--resolution WxH]
 //                    [--set key=value ...]
@@ -10,9 +11,7 @@
 #include <cstdio>
 #include <numeric>
 
-#include "common/transport/bdpt.h"
-#include "common/transport/lvcbpt.h"
-#include "common/transport/spcbpt.h"
+#include "common/core/fork_join.h"
 #include "common/transport/training.h"
 #include "tests/bench/bench_scene.h"
 
@@ -20,63 +19,64 @@ using namespace lightloom;
 
 namespace {
 
-enum Class { kHits, kNextEvent, kConnections, kLightTracing, kClasses };
-constexpr const char* kNames[kClasses] = {"emitter hits", "s = 1", "2 <= s < k", "light tracing"};
+enum Class { kHits, kOneLightVertex, kConnections, kLightTracing, kMerging, kClasses };
+constexpr const char* kNames[kClasses] = {"emitter hits", "s = 1", "2 <= s < k", "light tracing", "merging"};
 
-Class class_of(const PathContribution& c) {
-    if (c.s == 0) return kHits;
-    if (c.to_lens()) return kLightTracing;
-    return c.s == 1 ? kNextEvent : kConnections;
+Class class_of(Technique t) {
+    switch (t.kind) {
+        case TechniqueKind::kHit: return kHits;
+        case TechniqueKind::kNextEvent: return kOneLightVertex;
+        case TechniqueKind::kConnect: return t.s == 1 ? kOneLightVertex : kConnections;
+        case TechniqueKind::kLens: return kLightTracing;
+        case TechniqueKind::kMerge: return kMerging;
+    }
+    return kHits;
 }
 
-/// One class of an algorithm with a cache, weighted as in the whole.
-template <class Whole>
-struct ClassOfCached {
-    Whole whole;
-    Class wanted;
+/// What each class adds to the image, one number per pixel.
+using Images = std::vector<std::vector<double>>;
 
-    auto prepare(const UnitScope& scope, UnitPreparation* preparation) const {
-        return whole.prepare(scope, preparation, [&](const PathContribution& c, const PathView& view, uint64_t, auto& chunk) {
-            if (wanted != kLightTracing) return;
-            const uint32_t pixel = uint32_t(scope.scene.frame().crop.index(int(c.film.x), int(c.film.y)));
-            chunk.splats.push_back({pixel, scope.work.first_iteration, c.value * whole.weight(view, c.s)});
-        });
+Images images_of(const Renderer& renderer, const Scene& scene, const RenderUnit& unit) {
+    Images images(kClasses, std::vector<double>(size_t(scene.frame().crop.area()), 0.0));
+    const auto see = [&](const SeenContribution& seen) {
+        const Technique technique = seen.found.technique;
+        const double samples = technique.splats() ? double(unit.light_path_count) : unit.samples_per_pixel();
+        const Rgb& value = seen.found.value;
+        const double weighted = seen.weight * (double(value.r) + double(value.g) + double(value.b)) / (3 * samples);
+        if (std::isfinite(weighted)) images[class_of(technique)][seen.pixel] += weighted;
+    };
+    (void)bench::value_or_exit(renderer.watch(unit, see, {}));
+    return images;
+}
+
+void report(const std::string& name, const std::vector<Images>& by_seed, uint32_t iterations) {
+    const size_t seeds = by_seed.size(), pixels = by_seed[0][0].size();
+    std::vector<double> mean(pixels, 0.0), light(kClasses, 0.0), noise(kClasses, 0.0);
+    for (const Images& images : by_seed)
+        for (size_t c = 0; c < kClasses; ++c)
+            for (size_t p = 0; p < pixels; ++p) mean[p] += images[c][p] / double(seeds), light[c] += images[c][p] / double(seeds);
+    const double all_light = std::accumulate(light.begin(), light.end(), 0.0);
+    if (all_light == 0) {
+        std::printf("%s: shows no contributions\n", name.c_str());
+        return;
     }
-    Rgb sample(SampleContext& context, const typename Whole::State& state) const {
-        Rgb sum;
-        whole.trace(context, state, [&](const PathContribution& c, const PathView& view) {
-            if (class_of(c) == wanted) sum += c.value * whole.weight(view, c.s);
-        });
-        return sum;
+    for (size_t c = 0; c < kClasses; ++c) {
+        std::vector<double> variance(pixels);
+        for (size_t p = 0; p < pixels; ++p) {
+            double sum = 0, square = 0;
+            for (const Images& images : by_seed) sum += images[c][p], square += images[c][p] * images[c][p];
+            variance[p] = (square - sum * sum / double(seeds)) / double(seeds - 1) * iterations / (mean[p] * mean[p] + 1e-4);
+        }
+        std::sort(variance.begin(), variance.end());
+        variance.resize(pixels - pixels / 1000);
+        noise[c] = std::accumulate(variance.begin(), variance.end(), 0.0) / double(variance.size());
     }
-};
-
-struct ClassOfBdpt {
-    BdptSelection selection;
-    Class wanted;
-
-    Rgb sample(SampleContext& context) const {
-        Rgb sum;
-        trace_bdpt_sample<ViewDetail::kFull>(
-            context, [](const PathVertex*, int) {},
-            [&](const PathContribution& c, const PathView& view) {
-                if (class_of(c) != wanted) return;
-                const Rgb weighted = c.value * float(mis_weight(view, {TechniqueKind::kConnect, c.s}, selection));
-                if (c.to_lens())
-                    context.splat(c.film, weighted);
-                else
-                    sum += weighted;
-            });
-        return sum;
-    }
-};
-
-std::vector<double> image_of(const Partial& part, const Rect& crop) {
-    std::vector<double> image(size_t(crop.area()), 0.0);
-    for (size_t i = 0; i < image.size(); ++i)
-        image[i] = (part.camera[3 * i] + part.camera[3 * i + 1] + part.camera[3 * i + 2]) / (3.0 * part.samples_per_pixel);
-    for (const SplatSum& s : part.splats) image[s.pixel] += (s.rgb[0] + s.rgb[1] + s.rgb[2]) / (3.0 * double(part.light_paths));
-    return image;
+    const double all_noise = std::accumulate(noise.begin(), noise.end(), 0.0);
+    std::printf("%s, %zu x %u iterations: relative variance of a pixel per iteration %.3g\n", name.c_str(), seeds, iterations,
+                all_noise);
+    std::printf("  %-14s %9s %9s\n", "", "light", "noise");
+    for (size_t c = 0; c < kClasses; ++c)
+        std::printf("  %-14s %8.2f%% %8.2f%%\n", kNames[c], 100 * light[c] / all_light, 100 * noise[c] / all_noise);
 }
 
 }  // namespace
@@ -95,67 +95,21 @@ int main(int argc, char** argv) {
     CLI11_PARSE(app, argc, argv);
 
     const bench::LoadedScene loaded = bench::load(scene_path, resolution);
-    const std::shared_ptr<const Scene>& scene = loaded.scene;
-    const Rect crop = scene->frame().crop;
-
     for (const std::string& name : algorithms) {
-        RenderSettings settings = bench::settings_of(name, set, loaded);
-        const TransportParameters parameters = bench::value_or_exit(TransportParameters::read(settings));
-        SubspaceTables tables;
-        if (parameters.needs_tables) {
-            TrainingReport report;
-            tables = bench::value_or_exit(make_tables(*scene, settings, {}, &report));
-        }
-        const double frame_paths = parameters.light_paths * double(crop.area());
-        std::vector<std::vector<std::vector<double>>> images(kClasses);
-        for (int c = 0; c < kClasses; ++c) {
-            for (uint32_t seed = 0; seed < seeds; ++seed) {
-                settings.seed = 100 + seed;
-                const uint64_t light_paths = uint64_t(frame_paths * iterations + 0.5);
-                const UnitWork work{0, iterations, 0, crop, 0, std::max<uint64_t>(1, light_paths)};
-                const auto render = [&](const auto& algorithm) {
-                    return render_unit(algorithm, *scene, settings, parameters.roulette, work, {});
-                };
-                const Partial part = bench::value_or_exit([&]() -> Result<Partial> {
-                    const Class wanted = Class(c);
-                    if (name == "bdpt") return render(ClassOfBdpt{{frame_paths}, wanted});
-                    if (name == "lvcbpt") {
-                        const LvcbptAlgorithm<> whole{
-                            {{frame_paths, parameters.connections / tables.vertices_per_path, TypicalSurvival(parameters.roulette)},
-                             parameters.connections},
-                            parameters.heuristic,
-                            parameters.minimum_paths};
-                        return render(ClassOfCached<LvcbptAlgorithm<>>{whole, wanted});
-                    }
-                    if (name != "spcbpt") return invalid_argument("no shares of techniques for '" + name + "'");
-                    const auto whole = make_spcbpt(parameters, std::make_shared<const PreparedTables>(tables), frame_paths);
-                    return render(ClassOfCached<SpcbptAlgorithm<>>{whole, wanted});
-                }());
-                images[size_t(c)].push_back(image_of(part, crop));
+        const RenderSettings settings = bench::settings_of(name, set, loaded);
+        TrainingReport training;
+        const Tables tables = bench::value_or_exit(make_tables(*loaded.scene, settings, {}, &training));
+        const RenderUnit unit = bench::whole_frame(*loaded.scene, settings.algorithm, iterations);
+        std::vector<Images> by_seed(seeds);
+        // A renderer that is watched uses one thread.
+        fork_join(seeds, [&](size_t first, size_t last) {
+            for (size_t i = first; i < last; ++i) {
+                RenderSettings own = settings;
+                own.seed = 100 + i;
+                const auto renderer = bench::value_or_exit(Renderer::create(loaded.scene, own, tables));
+                by_seed[i] = images_of(*renderer, *loaded.scene, unit);
             }
-        }
-        const size_t pixels = size_t(crop.area());
-        std::vector<double> mean(pixels, 0.0), light(kClasses, 0.0), noise(kClasses, 0.0);
-        for (size_t c = 0; c < kClasses; ++c)
-            for (const auto& image : images[c])
-                for (size_t p = 0; p < pixels; ++p) mean[p] += image[p] / seeds, light[c] += image[p] / seeds;
-        for (size_t c = 0; c < kClasses; ++c) {
-            std::vector<double> variance(pixels);
-            for (size_t p = 0; p < pixels; ++p) {
-                double sum = 0, square = 0;
-                for (const auto& image : images[c]) sum += image[p], square += image[p] * image[p];
-                variance[p] = (square - sum * sum / seeds) / (seeds - 1) * iterations / (mean[p] * mean[p] + 1e-4);
-            }
-            std::sort(variance.begin(), variance.end());
-            variance.resize(pixels - pixels / 1000);
-            noise[c] = std::accumulate(variance.begin(), variance.end(), 0.0) / double(variance.size());
-        }
-        const double all_light = std::accumulate(light.begin(), light.end(), 0.0);
-        const double all_noise = std::accumulate(noise.begin(), noise.end(), 0.0);
-        std::printf("%s, %u x %u iterations: relative variance of a pixel per iteration %.3g\n", name.c_str(), seeds, iterations,
-                    all_noise);
-        std::printf("  %-14s %9s %9s\n", "", "light", "noise");
-        for (size_t c = 0; c < kClasses; ++c)
-            std::printf("  %-14s %8.2f%% %8.2f%%\n", kNames[c], 100 * light[c] / all_light, 100 * noise[c] / all_noise);
+        });
+        report(name, by_seed, iterations);
     }
 }

@@ -1,5 +1,6 @@
 // Throughput of light transport alone: samples and rays per second of each algorithm on a scene, one process, a given
-// number of threads, algorithms interleaved over repetitions so that a drift of the machine hits all of them.
+// number of threads, algorithms interleaved over repetitions so that a drift of the machine hits all of them. Any algorithm of the
+// catalog will do; tables are made first and not timed.
 //
 //   throughput SCENE [--algorithms path,bdpt] [--iterations N] [--repetitions N] [--threads N] [--resolution WxH]
 
@@ -10,7 +11,7 @@
 #include <chrono>
 #include <cstdio>
 
-#include "common/transport/renderer.h"
+#include "common/transport/training.h"
 #include "tests/bench/bench_scene.h"
 
 using namespace lightloom;
@@ -34,27 +35,34 @@ int main(int argc, char** argv) {
     const std::shared_ptr<const Scene>& scene = loaded.scene;
 
     struct Row {
+        AlgorithmSettings algorithm;
         std::unique_ptr<Renderer> renderer;
         std::vector<double> samples, rays;
         double mean = 0;
     };
     std::vector<Row> rows(algorithms.size());
-    for (size_t i = 0; i < rows.size(); ++i)
-        rows[i].renderer = bench::value_or_exit(Renderer::create(scene, bench::settings_of(algorithms[i], {}, loaded)));
+    for (size_t i = 0; i < rows.size(); ++i) {
+        const RenderSettings settings = bench::settings_of(algorithms[i], {}, loaded);
+        rows[i].algorithm = settings.algorithm;
+        rows[i].renderer = bench::value_or_exit(create_with_tables(scene, settings, {}));
+    }
     const Rect crop = scene->frame().crop;
     const double samples = double(crop.area()) * iterations;
     for (int rep = 0; rep < repetitions; ++rep)
         for (Row& row : rows) {
+            // Other camera samples each time; the light paths are those of the first.
+            RenderUnit unit = bench::whole_frame(*scene, row.algorithm, uint32_t(iterations));
+            unit.first_iteration = uint64_t(rep) * uint64_t(iterations);
             const auto start = std::chrono::steady_clock::now();
-            auto partial = row.renderer->render(
-                {uint64_t(rep) * uint64_t(iterations), uint32_t(iterations), 0, crop, 0, uint64_t(samples)}, {});
+            const auto partial = row.renderer->render(unit, {});
             const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
             if (!partial.ok()) return std::fprintf(stderr, "%s\n", partial.status().message().c_str()), 1;
             row.samples.push_back(samples / seconds);
             row.rays.push_back(double(partial->counters.rays) / seconds);
             double sum = 0;
             for (const double v : partial->camera) sum += v / samples;
-            for (const SplatSum& s : partial->splats) sum += (s.rgb[0] + s.rgb[1] + s.rgb[2]) / samples / double(crop.area());
+            for (const SplatSum& s : partial->splats)
+                sum += (s.rgb[0] + s.rgb[1] + s.rgb[2]) / double(partial->light_paths) / double(crop.area());
             row.mean += sum / 3 / repetitions;
         }
     const auto median = [](std::vector<double> v) {

@@ -22,7 +22,7 @@ FrameLayout whole(int width, int height) { return {width, height, {0, 0, width, 
 Digest digest_of(const UnitKey& key) { return sha256(std::to_string(key.group) + "/" + std::to_string(key.tile)); }
 
 TEST(UnitTable, MergedGroupsStillAnswerForTheirUnits) {
-    const Plan plan(whole(1000, 600), 0.5);
+    const Plan plan(whole(1000, 600), {.light_paths_per_iteration = 300000});
     ASSERT_GT(plan.tile_count(), 1u);
     UnitTable table(plan, 50, 2, std::nullopt);
     std::vector<WorkUnit> leased;
@@ -47,16 +47,12 @@ TEST(UnitTable, MergedGroupsStillAnswerForTheirUnits) {
         EXPECT_EQ(merged[i].worker, key.tile);
         const auto found = table.find(key);
         ASSERT_TRUE(found);
-        EXPECT_EQ(found->first_iteration, leased[i].first_iteration);
-        EXPECT_EQ(found->iteration_count, leased[i].iteration_count);
-        EXPECT_EQ(found->tile, leased[i].tile);
-        EXPECT_EQ(found->first_light_path, leased[i].first_light_path);
-        EXPECT_EQ(found->light_path_count, leased[i].light_path_count);
+        EXPECT_EQ(found->render, leased[i].render);
         EXPECT_EQ(table.complete(key, 9, digest_of(key)), UnitTable::Completion::kDuplicateSame);
         EXPECT_EQ(table.complete(key, 9, sha256("other")), UnitTable::Completion::kDuplicateDifferent);
         EXPECT_FALSE(table.renew(key, 9, kNever));
         EXPECT_EQ(table.reopen(key).total, 0);
-        if (key.tile == 0) iterations += found->iteration_count;
+        if (key.tile == 0) iterations += found->render.iteration_count;
     }
     EXPECT_EQ(iterations, 50u);
     EXPECT_EQ(table.complete({table.group_total(), 0}, 0, {}), UnitTable::Completion::kUnknown);
@@ -65,7 +61,7 @@ TEST(UnitTable, MergedGroupsStillAnswerForTheirUnits) {
 
 TEST(UnitTable, AMillionIterationsNeedNoRoomBeforeTheyAreLeased) {
     const auto begin = std::chrono::steady_clock::now();
-    UnitTable table(Plan(whole(4000, 4000), 1), 1u << 24, 4, std::nullopt);
+    UnitTable table(Plan(whole(4000, 4000), {.light_paths_per_iteration = 4000 * 4000}), 1u << 24, 4, std::nullopt);
     EXPECT_EQ(table.group_total(), 1u << 24);
     EXPECT_TRUE(table.lease(0, kNever));
     EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(500));
@@ -125,10 +121,10 @@ TEST(WorkerRegistry, ASilenceIsHeldAgainstOneUnitOnly) {
 /// The only splat of a unit's partial is `value`.
 Partial splat_of(const WorkUnit& unit, double value) {
     Partial partial;
-    partial.tile = unit.tile;
-    partial.samples_per_pixel = unit.iteration_count;
-    partial.light_paths = unit.light_path_count;
-    partial.camera.assign(size_t(3 * unit.tile.area()), 0.0);
+    partial.tile = unit.render.tile;
+    partial.samples_per_pixel = unit.render.samples_per_pixel();
+    partial.light_paths = unit.render.light_path_count;
+    partial.camera.assign(size_t(3 * unit.render.tile.area()), 0.0);
     partial.splats.push_back({0, {value, 0, 0}});
     return partial;
 }
@@ -147,11 +143,12 @@ TrainingRound::Part part_of(uint32_t unit, uint64_t bytes, double seconds) {
 
 TEST(TrainingRound, CountsWhatCameAndForgetsWhatIsRefused) {
     constexpr uint64_t kShort = 7, kEarlier = 3 * kTrainingUnitSamples, kCount = 2 * kTrainingUnitSamples + kShort;
-    TrainingRound round(UnitKind::kTraining, {kEarlier, kCount, kEarlier + kCount}, std::nullopt);
+    TrainingRound round(UnitKind::kTraining, 1, {kEarlier, kCount, kEarlier + kCount}, std::nullopt);
     EXPECT_EQ(round.samples_done(), kEarlier) << "those of the round before";
     for (uint32_t unit = 0; unit < 3; ++unit) ASSERT_EQ(round.units().lease(0, kNever)->key.group, unit);
     const auto finish = [&](uint32_t unit) {
-        const UnitKey key{unit, 0, UnitKind::kTraining};
+        const UnitKey key = round.key(unit);
+        ASSERT_EQ(key, (UnitKey{unit, 0, UnitKind::kTraining, 1}));
         ASSERT_EQ(round.units().complete(key, 0, digest_of(key)), UnitTable::Completion::kFirst);
         round.add(unit, part_of(unit, 100 + unit, 1.5));
     };
@@ -189,7 +186,7 @@ TEST(TrainingRound, CountsWhatCameAndForgetsWhatIsRefused) {
 
 TEST(Reducer, APartialThatLeavesTheRangeAfterWaitingIsTheOneRefused) {
     const FrameLayout frame = whole(1000, 600);
-    const Plan plan(frame, 0.5);
+    const Plan plan(frame, {.light_paths_per_iteration = 300000});
     const uint32_t tiles = plan.tile_count();
     ASSERT_GE(tiles, 3u);
     const auto first = plan.units(plan.group(0)), second = plan.units(plan.group(1));
@@ -230,7 +227,7 @@ TEST(Reducer, WithoutAPartialThereIsNoImage) {
 
 TEST(Reducer, AGroupThatDoesNotFitTheSumsIsAnError) {
     const FrameLayout frame = whole(10, 10);
-    const Plan plan(frame, 1);
+    const Plan plan(frame, {.light_paths_per_iteration = 100});
     Reducer reducer(frame, 1);
     for (uint32_t group = 0; group < 2; ++group) {
         const WorkUnit unit = plan.units(plan.group(group))[0];
@@ -292,9 +289,9 @@ TEST(Coordinator, DroppedSamplesOfGroupsBeyondTheImageDoNotCount) {
     // Groups 0 and 2 arrive, each with dropped samples; group 1 never does.
     for (const int i : {0, 2}) {
         const UnitLease& lease = held[size_t(i)].second;
-        Partial partial = testing::fake_partial(unit_work(lease.unit), lease.spec.frame);
+        Partial partial = testing::fake_partial(lease.unit.render, lease.spec.frame);
         partial.dropped_count = uint64_t(i + 1);
-        for (int d = 0; d <= i; ++d) partial.dropped.push_back({lease.unit.first_iteration, uint32_t(d), false});
+        for (int d = 0; d <= i; ++d) partial.dropped.push_back({lease.unit.render.first_iteration, uint32_t(d), false});
         const auto encoded = encode_partial(partial, lease.spec.frame);
         ASSERT_TRUE(encoded.ok()) << encoded.status().message();
         const auto ack =
@@ -324,7 +321,7 @@ TEST(SceneReader, FactsKeepNoSceneAndBuildItWhenAsked) {
     ASSERT_TRUE(assets.put(manifest->root(), manifest->canonical_text()).ok());
     ASSERT_TRUE(assets.put(manifest->entries[0].digest, *read_file((scenes / "furnace-box.pbrt").string())).ok());
     JobSpec spec;
-    spec.algorithm = "spcbpt";
+    spec.algorithm = testing::algorithm_of("spcbpt");
     spec.scene_root = manifest->root();
     spec.width = spec.height = 16;
     const auto facts = make_scene_reader(directory.path / "scratch")(assets, spec, {});

@@ -4,6 +4,7 @@
 #include <sys/socket.h>
 
 #include "tests/service/forwarding_port.h"
+#include "tests/service/light_crew.h"
 #include "tests/service/table_service.h"
 
 namespace lightloom {
@@ -40,7 +41,7 @@ class NoisyPort final : public ForwardingPort {
 TEST(Broadcast, DamagedTablesAreFetchedAgain) {
     TableService service;
     LocalWorkerPort local(*service.coordinator);
-    const std::string bytes = serialize(trivial_tables(golden()->emitters()));
+    const std::string bytes = serialize(Tables(trivial_tables(golden()->emitters())));
     const AssetReference asset{sha256(bytes), bytes.size()};
     ASSERT_TRUE(service.coordinator->assets().put(asset.digest, bytes).ok());
     const TempDirectory directory;
@@ -70,7 +71,7 @@ TEST(Broadcast, ShortenedTablesAreFetchedAgain) {
     TableService service;
     LocalWorkerPort local(*service.coordinator);
     AssetStore& assets = service.coordinator->assets();
-    const std::string bytes = serialize(trivial_tables(golden()->emitters()));
+    const std::string bytes = serialize(Tables(trivial_tables(golden()->emitters())));
     const AssetReference asset{sha256(bytes), bytes.size()};
     ASSERT_TRUE(assets.put(asset.digest, bytes).ok());
     const TempDirectory directory, elsewhere;
@@ -119,40 +120,11 @@ TEST(Broadcast, ACoordinatorThatDoesNotAnswerIsGivenUp) {
     ::close(listener);
 }
 
-/// Workers with real light, all in this process.
-class LightCrew {
-  public:
-    void add(std::unique_ptr<WorkerPort> port, const BuildIdentity& identity, bool tables = true) {
-        ports_.push_back(std::move(port));
-        WorkerPort& p = *ports_.back();
-        const TableSource source = tables ? direct_tables(p) : [](const AssetReference&, std::stop_token) -> Result<std::string> {
-            return data_loss("the disk is broken");
-        };
-        caches_.push_back(std::make_unique<RendererCache>(
-            [](const JobSpec&, std::stop_token) { return Result<std::shared_ptr<const Scene>>(golden()); }, source));
-        RendererCache& cache = *caches_.back();
-        workers_.push_back(std::make_unique<Worker>(
-            p, WorkerOptions{.identity = identity, .thread_count = 1, .host = "h", .process_id = workers_.size()},
-            [&](const UnitLease& lease, std::stop_token stop) { return cache.renderer(lease, stop); },
-            [&](const UnitLease& lease, std::stop_token stop) { return cache.tracer(lease, stop); }));
-        threads_.emplace_back([w = workers_.back().get()](std::stop_token stop) { EXPECT_TRUE(w->run(stop).ok()); });
-    }
-    ~LightCrew() {
-        for (std::jthread& t : threads_) t.request_stop();
-    }
-
-  private:
-    std::vector<std::unique_ptr<WorkerPort>> ports_;
-    std::vector<std::unique_ptr<RendererCache>> caches_;
-    std::vector<std::unique_ptr<Worker>> workers_;
-    std::vector<std::jthread> threads_;
-};
-
 JobInfo run(int workers, bool over_grpc, const std::function<JobSpec(const TableService&)>& spec) {
     TableService service({}, workers);
     std::unique_ptr<GrpcServer> server;
     if (over_grpc) server = std::move(GrpcServer::start(*service.coordinator, "127.0.0.1:0")).value();
-    LightCrew crew;
+    LightCrew crew(golden());
     const auto add = [&] {
         if (over_grpc) {
             crew.add(std::make_unique<GrpcWorkerPort>(
@@ -175,7 +147,7 @@ TEST(Broadcast, BytesDoNotDependOnWhoTracedAndRendered) {
     for (const std::string algorithm : {"spcbpt", "spcbpt, one round", "lvcbpt"}) {
         const auto spec = [&](const TableService& service) {
             JobSpec s = algorithm == "spcbpt" ? service.guided_spec(6) : service.table_spec(6);
-            if (algorithm == "lvcbpt") s.algorithm = algorithm, s.parameters = {{"training-paths", "20000"}, {"cache", "500"}};
+            if (algorithm == "lvcbpt") s.algorithm = algorithm_of(algorithm, {{"training-paths", "20000"}, {"cache", "500"}});
             return s;
         };
         const JobInfo reference = run(1, false, spec);
@@ -190,8 +162,8 @@ TEST(Broadcast, BytesDoNotDependOnWhoTracedAndRendered) {
 TEST(Broadcast, AWorkerWithoutTheTablesRefusesAndOthersRender) {
     TableService service;
     const std::string id = train_by_hand(service, service.table_spec(3));
-    LightCrew crew;
-    crew.add(std::make_unique<LocalWorkerPort>(*service.coordinator), service.identity, false);
+    LightCrew crew(golden());
+    crew.add(std::make_unique<LocalWorkerPort>(*service.coordinator), service.identity, 1, no_tables);
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
     EXPECT_EQ(service.coordinator->get_job(id)->unit_done, 0u);
     crew.add(std::make_unique<LocalWorkerPort>(*service.coordinator), service.identity);
@@ -229,7 +201,7 @@ TEST(Broadcast, TablesDamagedAtTheCoordinatorAreRestored) {
         bytes[bytes.size() / 2] ^= 1;
         if (shortened) bytes.resize(bytes.size() / 2);
         ASSERT_TRUE(write_file_atomically(service.coordinator->assets().path_of(asset.digest).string(), bytes).ok());
-        LightCrew crew;
+        LightCrew crew(golden());
         crew.add(std::make_unique<LocalWorkerPort>(*service.coordinator), service.identity);
         const JobInfo info = service.wait_end(id);
         EXPECT_EQ(info.state, copy ? JobState::kSucceeded : JobState::kFailed) << info.message;
@@ -262,7 +234,7 @@ TEST(TrainingBudget, AProbeIsTimedOnAWarmWorker) {
             traced_counts.push_back(work.sample_count);
         }
         if (cold) std::this_thread::sleep_for(std::chrono::duration<double>(kColdSeconds));
-        return trace_training(*golden(), render_settings(spec), work, stop);
+        return TrainingGenerator::create(*golden(), render_settings(spec))->trace(work, stop);
     };
     const auto tracers = [&](const UnitLease& lease, std::stop_token) -> Result<TrainingTracer> {
         return TrainingTracer(
@@ -272,7 +244,7 @@ TEST(TrainingBudget, AProbeIsTimedOnAWarmWorker) {
     std::jthread thread([&](std::stop_token stop) { EXPECT_TRUE(worker.run(stop).ok()); });
     JobSpec timed = service.table_spec(0);
     timed.time_limit_seconds = 20;
-    timed.parameters.erase("training-paths");
+    timed.algorithm = without(timed.algorithm, "training-paths");
     const std::string id = service.submit_now(timed);
     service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing; });
     EXPECT_TRUE(service.coordinator->cancel_job(id).ok());
@@ -291,7 +263,7 @@ TEST(TrainingBudget, ProbeAndTrainingTakeATenthOfTheLimitAtMost) {
             TableService service;
             JobSpec timed = guided ? service.guided_spec(0) : service.table_spec(0);
             timed.time_limit_seconds = limit;
-            timed.parameters.erase("training-paths");
+            timed.algorithm = without(timed.algorithm, "training-paths");
             const std::string id = service.submit_training(timed);
             const std::string worker = service.add_worker();
             const auto probe = service.lease(worker);
@@ -301,7 +273,7 @@ TEST(TrainingBudget, ProbeAndTrainingTakeATenthOfTheLimitAtMost) {
             const double per_sample = kSeconds / double(probe[0].unit.training.sample_count);
             service.give(worker, probe[0], traced(probe[0]));
             const JobInfo info = service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing; });
-            const double chosen = std::stod(info.spec.parameters.at("training-paths"));
+            const double chosen = info.spec.algorithm.value("training-paths");
             const auto fits = [&](double samples) {
                 const bool two_rounds = guided && samples > double(kTrainingUnitSamples);  // a smaller set has no pilot
                 const double cost = samples * per_sample * (1 + kLearningOverTracing) * (two_rounds ? kGuidedCost : 1);
@@ -317,7 +289,7 @@ TEST(TrainingBudget, ProbeAndTrainingTakeATenthOfTheLimitAtMost) {
 JobSpec poor_job(const TableService& service) {
     JobSpec timed = service.table_spec(0);
     timed.time_limit_seconds = 0.5;  // a tenth of which is less than give() says that the probe took
-    timed.parameters.erase("training-paths");
+    timed.algorithm = without(timed.algorithm, "training-paths");
     return timed;
 }
 
@@ -368,8 +340,8 @@ TEST(TrainingBudget, SoDoThreeOfThem) {
     std::vector<std::string> jobs;
     for (int i = 0; i < 3; ++i) jobs.push_back(service.submit_training(poor_job(service)));
     const auto waits = [&](const std::string& id) {
-        JobInfo job = *service.coordinator->get_job(id);
-        return !job.waits_for.empty() && job.spec.parameters["training-paths"] == std::to_string(kMinTrainingSamples);
+        const JobInfo job = *service.coordinator->get_job(id);
+        return !job.waits_for.empty() && uint64_t(job.spec.algorithm.value("training-paths")) == kMinTrainingSamples;
     };
     int probes = 0;
     std::vector<std::pair<std::string, UnitLease>> sets;
@@ -400,7 +372,7 @@ TEST(TrainingBudget, SoDoThreeOfThem) {
 TEST(TrainingBudget, ATimeLimitedJobWaitsForNoTablesBeforeItKnowsWhatItCanAfford) {
     TableService service;
     JobSpec leisurely = service.table_spec(1);
-    leisurely.parameters.erase("training-paths");
+    leisurely.algorithm = without(leisurely.algorithm, "training-paths");
     const std::string maker = service.submit_training(leisurely), timed = service.submit_training(poor_job(service));
     EXPECT_EQ(service.coordinator->get_job(timed)->phase, PreparePhase::kProbing);
     // The maker's units are in work when the probe's turn comes.
@@ -414,7 +386,7 @@ TEST(TrainingBudget, ATimeLimitedJobWaitsForNoTablesBeforeItKnowsWhatItCanAfford
     ASSERT_EQ(leases[0].job_id, timed);
     service.give(worker, leases[0], traced(leases[0]));
     const JobInfo settled = service.wait(timed, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing; });
-    EXPECT_EQ(settled.spec.parameters.at("training-paths"), std::to_string(kMinTrainingSamples));
+    EXPECT_EQ(settled.spec.algorithm.value("training-paths"), double(kMinTrainingSamples));
 }
 
 /// Who waits for a younger job's tables does not wait for what has come in between.
@@ -424,7 +396,7 @@ TEST(TrainingBudget, AJobThatWaitsLendsItsPlaceInTheQueue) {
     const std::string between = service.submit_now(service.spec(1000));
     service.wait(between, is_running);
     JobSpec same = service.table_spec(1);
-    same.parameters["training-paths"] = std::to_string(kMinTrainingSamples);
+    same.algorithm = same.algorithm.with("training-paths", double(kMinTrainingSamples));
     const std::string young = service.submit_training(same);
     const std::string worker = service.add_worker();
     const auto probe = service.lease(worker);
@@ -445,18 +417,18 @@ TEST(TrainingBudget, AJobThatWaitsLendsItsPlaceInTheQueue) {
 
 TEST(TrainingBudget, ATimeLimitedJobRecordsWhatItTrainedAndCanBeRenderedAgain) {
     TableService service([](CoordinatorOptions& o) { o.clock = [] { return std::chrono::steady_clock::now(); }; });
-    LightCrew crew;
+    LightCrew crew(golden());
     crew.add(std::make_unique<LocalWorkerPort>(*service.coordinator), service.identity);
     JobSpec timed = service.table_spec(0);
     timed.time_limit_seconds = 0.5;
-    timed.parameters.erase("training-paths");
+    timed.algorithm = without(timed.algorithm, "training-paths");
     const JobInfo info = service.wait_end(service.submit_now(timed));
     ASSERT_EQ(info.state, JobState::kSucceeded) << info.message;
     EXPECT_TRUE(info.tables.capped_by_time_limit);
     EXPECT_LT(info.tables.training_samples, 200000u);
-    EXPECT_EQ(info.spec.parameters.at("training-paths"), std::to_string(info.tables.training_samples));
+    EXPECT_EQ(info.spec.algorithm.value("training-paths"), double(info.tables.training_samples));
     JobSpec again = service.table_spec(uint32_t(info.samples_per_pixel_done));
-    again.parameters["training-paths"] = std::to_string(info.tables.training_samples);
+    again.algorithm = again.algorithm.with("training-paths", double(info.tables.training_samples));
     const JobInfo repeated = service.wait_end(service.submit_now(again));
     EXPECT_EQ(repeated.image_digest, info.image_digest);
     EXPECT_EQ(repeated.tables.asset.digest, info.tables.asset.digest);
@@ -466,7 +438,7 @@ TEST(TrainingBudget, ATimeLimitedJobRecordsWhatItTrainedAndCanBeRenderedAgain) {
         EXPECT_NE(manifest.find(key), std::string::npos) << key;
     EXPECT_NE(manifest.find(info.tables.asset.digest.hex()), std::string::npos);
     // Who names the training set gets it, whatever the time limit.
-    timed.parameters["training-paths"] = "3000";
+    timed.algorithm = timed.algorithm.with("training-paths", 3000);
     const JobInfo chosen = service.wait_end(service.submit_now(timed));
     EXPECT_EQ(chosen.tables.training_samples, 3000u);
     EXPECT_FALSE(chosen.tables.capped_by_time_limit);

@@ -222,7 +222,7 @@ TEST(Client, SubmitsAgainUnderTheSameRequestWhenTheAnswerIsLost) {
 TEST(Results, ReplayCommandsAreOneShellCommand) {
     JobSpec spec;
     spec.frame = {4, 4, {0, 0, 4, 4}};
-    spec.parameters["key"] = "1";
+    spec.algorithm = testing::algorithm_of("path", {{"rr-start", "6"}});
     const std::string plain = replay_command(spec, "room/a-b.pbrt", {{0, 0}, {3, 6, false}});
     EXPECT_EQ(plain.find('\''), std::string::npos) << plain;
     const std::string scene = "my room; it's \"$HOME\" `x`.pbrt";
@@ -232,7 +232,9 @@ TEST(Results, ReplayCommandsAreOneShellCommand) {
     std::string output(1000, '\0');
     output.resize(std::fread(output.data(), 1, output.size(), shell));
     EXPECT_EQ(::pclose(shell), 0);
-    EXPECT_TRUE(output.starts_with("lightloom|replay|" + scene + "|--algorithm|path|--set|key=1|")) << output;
+    EXPECT_TRUE(
+        output.starts_with("lightloom|replay|" + scene + "|--algorithm|path|--set|heuristic=0|--set|rr-min=0.5|--set|rr-start=6|"))
+        << output;
 }
 
 TEST(DataLock, OneHolderAtATime) {

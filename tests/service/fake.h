@@ -12,6 +12,7 @@
 #include "common/core/rng.h"
 #include "server/coordinator.h"
 #include "server/local_ports.h"
+#include "tests/support/algorithm_of.h"
 #include "worker/worker.h"
 
 namespace lightloom::testing {
@@ -33,16 +34,16 @@ class TempDirectory {
 };
 
 /// Pixels of widely different size, so that a sum that depended on its order would show.
-inline Partial fake_partial(const UnitWork& work, const FrameLayout& frame) {
+inline Partial fake_partial(const RenderUnit& work, const FrameLayout& frame) {
     Partial partial;
     partial.tile = work.tile;
-    partial.samples_per_pixel = work.iteration_count;
+    partial.samples_per_pixel = work.samples_per_pixel();
     partial.light_paths = work.light_path_count;
     partial.camera.assign(size_t(3 * work.tile.area()), 0.0);
     for (int y = work.tile.y0; y < work.tile.y1; ++y) {
         for (int x = work.tile.x0; x < work.tile.x1; ++x) {
             double* sum = &partial.camera[size_t(3 * work.tile.index(x, y))];
-            for (uint32_t i = 0; i < work.iteration_count; ++i) {
+            for (uint32_t i = 0; i < work.samples_per_pixel(); ++i) {
                 Rng rng({1, Stage::kCamera, work.first_iteration + i, uint64_t(frame.crop.index(x, y))});
                 const double scale = double(uint64_t(1) << (rng.next_u64() % 40)) * 1e-6;
                 for (int c = 0; c < 3; ++c) sum[c] += scale * rng.uniform_double();
@@ -52,7 +53,7 @@ inline Partial fake_partial(const UnitWork& work, const FrameLayout& frame) {
     Rng rng({1, Stage::kLight, work.group_first_iteration, work.first_light_path});
     for (uint32_t p = 0; p < uint32_t(frame.crop.area()); p += 1 + rng.below(3))
         partial.splats.push_back({p, {1 + rng.uniform_double(), rng.uniform_double(), 1e-3 * rng.uniform_double()}});
-    partial.counters.camera_samples = uint64_t(work.tile.area()) * work.iteration_count;
+    partial.counters.camera_samples = uint64_t(work.tile.area()) * work.samples_per_pixel();
     return partial;
 }
 
@@ -60,7 +61,7 @@ inline Partial fake_partial(const UnitWork& work, const FrameLayout& frame) {
 class FakeRenderer final : public Renderer {
   public:
     FakeRenderer(FrameLayout frame, double seconds) : frame_(frame), seconds_(seconds) {}
-    Result<Partial> render(const UnitWork& work, std::stop_token stop) const override {
+    Result<Partial> render(const RenderUnit& work, std::stop_token stop) const override {
         const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds_);
         while (std::chrono::steady_clock::now() < end) {
             if (stop.stop_requested()) return Status(StatusCode::kCancelled, "stopped");
@@ -68,6 +69,11 @@ class FakeRenderer final : public Renderer {
         }
         return fake_partial(work, frame_);
     }
+    Result<Partial> watch(const RenderUnit& work, const std::function<void(const SeenContribution&)>&,
+                          std::stop_token stop) const override {
+        return render(work, stop);
+    }
+    std::unique_ptr<PathWeights> weights() const override { return nullptr; }
 
   private:
     FrameLayout frame_;
@@ -107,7 +113,7 @@ struct FakeService {
 
     JobSpec spec(uint32_t spp) const {
         JobSpec s;
-        s.algorithm = "bdpt";
+        s.algorithm = algorithm_of("bdpt");
         s.samples_per_pixel = spp;
         s.scene_root = root;
         return s;
@@ -137,7 +143,7 @@ struct FakeService {
         return leases.ok() ? *leases : std::vector<UnitLease>();
     }
     SubmitAck deliver(const std::string& worker, const UnitLease& lease) {
-        const auto encoded = encode_partial(fake_partial(unit_work(lease.unit), lease.spec.frame), lease.spec.frame);
+        const auto encoded = encode_partial(fake_partial(lease.unit.render, lease.spec.frame), lease.spec.frame);
         const auto ack = coordinator->submit_payload(worker, lease.reference(), encoded->descriptor, encoded->payload);
         EXPECT_TRUE(ack.ok()) << ack.status().message();
         return ack.ok() ? *ack : SubmitAck{SubmitOutcome::kRejected, "error"};

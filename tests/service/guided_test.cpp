@@ -11,7 +11,8 @@ std::vector<std::pair<std::string, UnitLease>> deliver_pilot(TableService& servi
     service.now_ms += milliseconds;
     EXPECT_EQ(pilot.size(), 1u);
     for (const auto& [worker, lease] : pilot) {
-        EXPECT_EQ(lease.unit.key.kind, UnitKind::kPilot);
+        EXPECT_EQ(lease.unit.key.kind, UnitKind::kTraining);
+        EXPECT_EQ(lease.unit.key.round, 0u);
         EXPECT_EQ(lease.tables.size_bytes, 0u);
         EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
     }
@@ -26,8 +27,8 @@ std::vector<std::pair<std::string, UnitLease>> deliver_pilot(TableService& servi
 std::string guided(TableService& service, const UnitLease& lease) {
     const auto bytes = service.coordinator->assets().read(lease.tables.digest);
     if (!bytes.ok()) throw std::runtime_error(bytes.status().message());
-    const auto tables = parse_tables(*bytes);
-    const auto generator = TrainingGenerator::create(*golden(), render_settings(lease.spec), &*tables);
+    const auto guide = parse_tables(*bytes, lease.spec.algorithm.info().learning->parts);
+    const auto generator = TrainingGenerator::create(*golden(), render_settings(lease.spec), *guide);
     return serialize(*generator->trace(lease.unit.training, {}));
 }
 
@@ -41,13 +42,10 @@ TEST(GuidedTables, AreThoseOfASingleMachine) {
     uint64_t samples = 0;
     for (const auto& [worker, lease] : units) {
         EXPECT_EQ(lease.unit.key.kind, UnitKind::kTraining);
+        EXPECT_EQ(lease.unit.key.round, 1u);
         EXPECT_EQ(lease.tables.digest, guide);
         EXPECT_GE(lease.unit.training.first_sample, kTrainingUnitSamples);
         samples += lease.unit.training.sample_count;
-        // What belongs to the round before is not mistaken for a result of this one.
-        UnitLease late = lease;
-        late.unit.key.kind = UnitKind::kPilot;
-        EXPECT_EQ(service.give(worker, late, guided(service, lease)).outcome, SubmitOutcome::kStale);
     }
     EXPECT_EQ(samples, kSamples - kTrainingUnitSamples);
     std::reverse(units.begin(), units.end());
@@ -58,6 +56,40 @@ TEST(GuidedTables, AreThoseOfASingleMachine) {
     EXPECT_EQ(info.tables.training_samples, kSamples);
     EXPECT_EQ(info.tables.asset.digest, tables_alone(service.guided_spec()));
     EXPECT_FALSE(service.coordinator->assets().contains(guide)) << "nobody needs it any more";
+    ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
+}
+
+/// A worker that fell silent over the first round comes back in the second: its data have the size of a unit that is open, and were
+/// traced without the guide all the same.
+TEST(GuidedTables, ALateResultOfTheFirstRoundIsNotOneOfTheSecond) {
+    TableService service;
+    const std::string id = service.submit_training(service.guided_spec());
+    const std::string silent = service.add_worker();
+    const auto lost = service.lease(silent);
+    ASSERT_EQ(lost.size(), 1u);
+    const UnitLease& late = lost[0];
+    ASSERT_EQ(late.unit.key.round, 0u);
+    service.now_ms += 11000;
+    service.wait(id, [](const JobInfo& j) { return j.unit_leased == 0; });
+    const auto units = deliver_pilot(service);
+    ASSERT_EQ(units.size(), 2u);
+    const UnitLease& open = units[0].second;
+    ASSERT_EQ(open.unit.key.group, late.unit.key.group);
+    ASSERT_EQ(open.unit.training.sample_count, late.unit.training.sample_count);
+
+    const auto revoked = service.coordinator->heartbeat(silent, {{late.reference(), true}});
+    ASSERT_TRUE(revoked.ok());
+    ASSERT_EQ(revoked->size(), 1u);
+    EXPECT_EQ(revoked->front(), late.reference());
+    EXPECT_EQ(service.coordinator->expected_training_bytes(late.reference()).status().code(), StatusCode::kNotFound);
+    EXPECT_EQ(service.give(silent, late, traced(late)).outcome, SubmitOutcome::kStale);
+    ASSERT_TRUE(service.coordinator->release_unit(silent, late.reference(), internal_error("boom")).ok());
+    EXPECT_TRUE(lease_all(service).empty()) << "the unit of this round stays with its worker";
+    for (const auto& [worker, lease] : units)
+        EXPECT_EQ(service.give(worker, lease, guided(service, lease)).outcome, SubmitOutcome::kAccepted);
+    const JobInfo info = service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
+    ASSERT_EQ(info.state, JobState::kRunning) << info.message;
+    EXPECT_EQ(info.tables.asset.digest, tables_alone(service.guided_spec()));
     ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
 }
 
@@ -109,7 +141,7 @@ TEST(GuidedTables, AGuideThatTheDiskHasLostIsRestored) {
 TEST(GuidedTables, OfATimeLimitedJobAreThoseOfItsSpec) {
     TableService service;
     JobSpec timed = service.guided_spec(0);
-    timed.parameters.erase("training-paths");
+    timed.algorithm = without(timed.algorithm, "training-paths");
     timed.time_limit_seconds = 20;
     const std::string id = service.submit_training(timed);
     const auto probe = lease_all(service);
@@ -120,8 +152,8 @@ TEST(GuidedTables, OfATimeLimitedJobAreThoseOfItsSpec) {
     service.give(probe[0].first, probe[0].second, payload, sha256(payload), 0.11);
     JobInfo info = service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing; });
     JobSpec recorded = service.guided_spec();
-    recorded.parameters["training-paths"] = info.spec.parameters.at("training-paths");
-    EXPECT_EQ(recorded.parameters["training-paths"], "32768");
+    EXPECT_EQ(info.spec.algorithm.value("training-paths"), 32768);
+    recorded.algorithm = recorded.algorithm.with("training-paths", 32768);
     for (const auto& [worker, lease] : deliver_pilot(service))
         EXPECT_EQ(service.give(worker, lease, guided(service, lease)).outcome, SubmitOutcome::kAccepted);
     info = service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; });

@@ -5,10 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <functional>
 
 #include "client/grpc_job_port.h"
 #include "common/core/atomic_file.h"
 #include "common/work/channel.h"
+#include "common/work/wire.h"
 #include "server/grpc_services.h"
 #include "tests/service/fake.h"
 #include "tests/service/process.h"
@@ -22,6 +24,40 @@ using Clock = std::chrono::steady_clock;
 
 std::shared_ptr<grpc::Channel> channel_to(int port) {
     return grpc::CreateChannel("127.0.0.1:" + std::to_string(port), grpc::InsecureChannelCredentials());
+}
+
+/// What a client of another build may send: our own cannot make such a spec.
+TEST(Submission, OfAnAlgorithmOrParameterThatDoesNotExistIsRefusedClearly) {
+    FakeService service;
+    const auto server = std::move(GrpcServer::start(*service.coordinator, "127.0.0.1:0")).value();
+    const auto stub = v1::JobService::NewStub(channel_to(server->port()));
+    int requests = 0;
+    const auto submit = [&](const std::function<void(v1::JobSpec&)>& change) {
+        v1::SubmitJobRequest request;
+        request.set_request_id("raw-" + std::to_string(++requests));
+        wire::put(service.spec(4), request.mutable_spec());
+        change(*request.mutable_spec());
+        grpc::ClientContext context;
+        context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(30));
+        v1::Job job;
+        return stub->SubmitJob(&context, request, &job);
+    };
+    const auto refuses = [&](const std::function<void(v1::JobSpec&)>& change, const std::string& reason) {
+        const grpc::Status status = submit(change);
+        EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << status.error_message();
+        EXPECT_NE(status.error_message().find(reason), std::string::npos) << status.error_message();
+    };
+    refuses([](v1::JobSpec& s) { s.set_algorithm("no-such"); }, "no algorithm named 'no-such'; choose one of: path, ");
+    refuses([](v1::JobSpec& s) { s.set_algorithm(""); }, "no algorithm named ''");
+    refuses([](v1::JobSpec& s) { (*s.mutable_parameters())["light-subspaces"] = "40"; },
+            "algorithm 'bdpt' has no parameter 'light-subspaces'; `lightloom algorithms` lists them");
+    refuses([](v1::JobSpec& s) { (*s.mutable_parameters())["rr-min"] = "nan"; },
+            "parameter rr-min=nan of 'bdpt' must be a number from 0.01 to 1");
+    refuses([](v1::JobSpec& s) { (*s.mutable_parameters())["heuristic"] = "1.5"; }, "(balance, power, maximum)");
+    EXPECT_TRUE(service.coordinator->list_jobs().empty());
+    EXPECT_TRUE(submit([](v1::JobSpec& s) { (*s.mutable_parameters())["heuristic"] = "power"; }).ok()) << "a name of a choice";
+    ASSERT_EQ(service.coordinator->list_jobs().size(), 1u);
+    EXPECT_EQ(service.coordinator->list_jobs()[0].spec.algorithm.text().at("heuristic"), "1");
 }
 
 /// A file that somebody else has begun to upload.

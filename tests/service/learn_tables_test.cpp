@@ -12,17 +12,16 @@ namespace {
 class FakeTracing : public TracingPort {
   public:
     FakeTracing(const JobSpec& job, UnitKind first) : spec(job), kind(first) {
-        const auto p = TransportParameters::read(render_settings(spec));
-        const uint64_t samples = p->training_samples;
-        work = {0, first == UnitKind::kTraining ? samples : kFirstSamples, samples};
+        const LearningPlan plan = plan_of(spec);
+        work = first == UnitKind::kTraining ? plan.work(0) : TrainingWork{0, kFirstSamples, plan.samples};
     }
 
     Result<TracedRound> collect() override {
-        asked += kind == UnitKind::kProbe ? "probe " : kind == UnitKind::kPilot ? "pilot " : "set ";
+        asked += kind == UnitKind::kProbe ? "probe " : "round" + std::to_string(number) + " ";
         if (asked.ends_with(stops_at)) stop.request_stop();
         if (asked.ends_with(fails_at)) return data_loss("boom");
-        const auto generator = TrainingGenerator::create(*golden(), render_settings(spec), guide ? &*guide : nullptr);
-        TracedRound round{kind, work, {}, worker_seconds, 2};
+        const auto generator = TrainingGenerator::create(*golden(), render_settings(spec), guide);
+        TracedRound round{kind, number, work, {}, worker_seconds, 2};
         const uint64_t end = work.first_sample + work.sample_count;
         for (uint64_t first = work.first_sample; first < end; first += kTrainingUnitSamples) {
             const auto unit = generator->trace({first, std::min(kTrainingUnitSamples, end - first), work.total_samples}, {});
@@ -35,7 +34,7 @@ class FakeTracing : public TracingPort {
         asked += "settle ";
         settled = set;
         spec = set.spec;
-        kind = UnitKind::kTraining, work = {0, set.samples, set.samples};
+        kind = UnitKind::kTraining, work = plan_of(spec).work(0);
         if (asked.ends_with(fails_at)) return data_loss("boom");
         return goes_on;
     }
@@ -48,18 +47,21 @@ class FakeTracing : public TracingPort {
         EXPECT_LE(now, 1);
         share = now;
     }
-    Status open_guided_round(const SubspaceTables& pilot, const TrainingWork& rest) override {
-        asked += "guide ";
-        guide = pilot, work = rest, kind = UnitKind::kTraining;
+    Status open_round(uint32_t next, const Tables& tables, const TrainingWork& rest) override {
+        asked += tables.empty() ? "open " : "guide ";
+        number = next, guide = tables, work = rest;
         return asked.ends_with(fails_at) ? data_loss("boom") : Status();
     }
 
-    static constexpr uint64_t kFirstSamples = kTrainingUnitSamples;  ///< Of a probe or pilot.
+    static LearningPlan plan_of(const JobSpec& spec) { return spec.algorithm.info().learning->plan(spec.algorithm); }
+
+    static constexpr uint64_t kFirstSamples = kTrainingUnitSamples;  ///< Of a probe.
 
     JobSpec spec;
     UnitKind kind;
+    uint32_t number = 0;
     TrainingWork work;
-    std::optional<SubspaceTables> guide;
+    Tables guide;
     std::optional<AffordableSet> settled;
     std::string asked, fails_at = "nothing", stops_at = "nothing";
     std::stop_source stop;
@@ -70,8 +72,7 @@ class FakeTracing : public TracingPort {
 JobSpec complete(JobSpec spec) {
     spec.max_depth = 5;
     spec.frame = kFrame;
-    const auto algorithm = find_algorithm(spec.algorithm);
-    spec.parameters = complete_parameters(**algorithm, *parse_parameters(**algorithm, spec.parameters));
+    spec.algorithm = spec.algorithm.completed();
     return spec;
 }
 
@@ -92,17 +93,17 @@ Result<std::optional<LearnedTables>> learn(FakeTracing& tracing, const std::func
 TEST(LearnTables, TwoRoundsAreThoseOfASingleMachine) {
     const TableService service;
     const JobSpec spec = complete(service.guided_spec());
-    FakeTracing tracing(spec, UnitKind::kPilot);
+    FakeTracing tracing(spec, UnitKind::kTraining);
     const auto learned = learn(tracing);
     ASSERT_TRUE(learned.ok()) << learned.status().message();
     ASSERT_TRUE(learned->has_value());
-    EXPECT_EQ(tracing.asked, "pilot learn guide set learn ");
+    EXPECT_EQ(tracing.asked, "round0 learn guide round1 learn ");
     EXPECT_EQ(tracing.work.first_sample, kTrainingUnitSamples);
     EXPECT_EQ(tracing.work.sample_count, kSamples - kTrainingUnitSamples);
     EXPECT_EQ(sha256(serialize((*learned)->tables)), tables_alone(spec));
     EXPECT_EQ((*learned)->info.training_samples, kSamples);
     EXPECT_EQ((*learned)->info.trace_seconds, 4) << "of both rounds";
-    EXPECT_EQ((*learned)->info.light_subspaces, (*learned)->tables.light_count);
+    EXPECT_EQ((*learned)->info.light_subspaces, (*learned)->tables.get<SubspaceTables>()->light_count);
     EXPECT_LT((*learned)->info.loss, (*learned)->info.uniform_loss);
     EXPECT_GT(tracing.share, 0.1) << "learning tells how far it has come";
 }
@@ -111,13 +112,13 @@ TEST(LearnTables, ALimitWithRoomForLessMakesTheSetSmaller) {
     FakeTracing tracing(limited_spec(), UnitKind::kProbe);
     const auto learned = learn(tracing);
     ASSERT_TRUE(learned.ok() && learned->has_value()) << learned.status().message();
-    EXPECT_EQ(tracing.asked, "probe settle set learn ");
+    EXPECT_EQ(tracing.asked, "probe settle round0 learn ");
     ASSERT_TRUE(tracing.settled.has_value());
     EXPECT_EQ(tracing.settled->wanted, kSamples);
     EXPECT_EQ(tracing.settled->probe_samples, FakeTracing::kFirstSamples);
     // On two workers a sample costs half of the probe's 61 us, and 0.35 of them to learn from: room for 19275.
     EXPECT_EQ(tracing.settled->samples, 16384u);
-    EXPECT_EQ((*learned)->spec.parameters.at("training-paths"), "16384");
+    EXPECT_EQ((*learned)->spec.algorithm.value("training-paths"), 16384);
     EXPECT_EQ((*learned)->info.training_samples, 16384u);
     EXPECT_EQ(sha256(serialize((*learned)->tables)), tables_alone((*learned)->spec));
 }
@@ -144,10 +145,10 @@ TEST(LearnTables, NothingIsLearnedWhereTheTablesExist) {
 
 TEST(LearnTables, EveryErrorEndsIt) {
     const TableService service;
-    for (const char* where : {"pilot ", "guide ", "set ", "probe ", "settle "}) {
+    for (const char* where : {"round0 ", "guide ", "round1 ", "probe ", "settle "}) {
         const bool probes = std::string_view(where) == "probe " || std::string_view(where) == "settle ";
         FakeTracing tracing(probes ? limited_spec() : complete(service.guided_spec()),
-                            probes ? UnitKind::kProbe : UnitKind::kPilot);
+                            probes ? UnitKind::kProbe : UnitKind::kTraining);
         tracing.fails_at = where;
         const auto learned = learn(tracing);
         EXPECT_EQ(learned.status().code(), StatusCode::kDataLoss) << where;
@@ -158,9 +159,9 @@ TEST(LearnTables, EveryErrorEndsIt) {
 TEST(LearnTables, AStopEndsIt) {
     for (const UnitKind first : {UnitKind::kProbe, UnitKind::kTraining}) {
         FakeTracing tracing(limited_spec(), first);
-        tracing.stops_at = first == UnitKind::kProbe ? "probe " : "set ";
+        tracing.stops_at = first == UnitKind::kProbe ? "probe " : "round0 ";
         EXPECT_EQ(learn(tracing).status().code(), StatusCode::kCancelled);
-        EXPECT_EQ(tracing.asked, first == UnitKind::kProbe ? "probe " : "set learn ");
+        EXPECT_EQ(tracing.asked, first == UnitKind::kProbe ? "probe " : "round0 learn ");
     }
 }
 

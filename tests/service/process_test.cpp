@@ -385,7 +385,7 @@ TEST(Processes, TheScenesIntegratorIsTheDefault) {
     const auto jobs = service.jobs().list_jobs();
     ASSERT_TRUE(jobs.ok()) << jobs.status().message();
     ASSERT_EQ(jobs->size(), 1u);
-    EXPECT_EQ(jobs->front().spec.algorithm, "path") << "a service is told, it does not guess";
+    EXPECT_EQ(jobs->front().spec.algorithm.name(), "path") << "a service is told, it does not guess";
 }
 
 TEST(Processes, MistakesAreOneLineAndTheDocumentedExitCode) {

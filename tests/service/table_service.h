@@ -44,18 +44,17 @@ struct TableService : FakeService {
           }) {}
     JobSpec table_spec(uint32_t spp = 2) const {
         JobSpec s = spec(spp);
-        s.algorithm = "spcbpt";
-        s.parameters = {{"training-paths", std::to_string(kSamples)},
-                        {"cache", "500"},
-                        {"light-subspaces", "40"},
-                        {"eye-subspaces", "20"},
-                        {"pilot", "0"}};
+        s.algorithm = algorithm_of("spcbpt", {{"training-paths", std::to_string(kSamples)},
+                                              {"cache", "500"},
+                                              {"light-subspaces", "40"},
+                                              {"eye-subspaces", "20"},
+                                              {"pilot", "0"}});
         return s;
     }
     /// The same, with a pilot of one unit and a guided round of two.
     JobSpec guided_spec(uint32_t spp = 2) const {
         JobSpec s = table_spec(spp);
-        s.parameters.erase("pilot");
+        s.algorithm = without(s.algorithm, "pilot");
         return s;
     }
     std::string submit_now(const JobSpec& s) {
@@ -86,7 +85,7 @@ inline const std::string& traced(const UnitLease& lease) {
     static std::map<std::tuple<Digest, uint64_t, uint64_t>, std::string> memory;
     const TrainingWork& work = lease.unit.training;
     std::string& payload = memory[{lease.spec.spec_digest(), work.first_sample, work.total_samples}];
-    if (payload.empty()) payload = serialize(*trace_training(*golden(), render_settings(lease.spec), work, {}));
+    if (payload.empty()) payload = serialize(*TrainingGenerator::create(*golden(), render_settings(lease.spec))->trace(work, {}));
     return payload;
 }
 

@@ -105,7 +105,7 @@ TEST(Tables, TrainingDataHaveABound) {
     EXPECT_GE(*limit, traced(held[0].second).size());
     TableService plenty;
     JobSpec spec = plenty.table_spec();
-    spec.parameters["energy-paths"] = "16";
+    spec.algorithm = spec.algorithm.with("energy-paths", 16);
     plenty.submit_training(spec);
     const auto large = lease_all(plenty);
     ASSERT_FALSE(large.empty());
@@ -136,7 +136,7 @@ TEST(Tables, JobsCanBeCancelledInEveryPhase) {
     cancel(service.submit_training(service.table_spec()));
     JobSpec timed = service.table_spec(0);
     timed.time_limit_seconds = 100;
-    timed.parameters.erase("training-paths");
+    timed.algorithm = without(timed.algorithm, "training-paths");
     const std::string probing = service.submit_training(timed);
     EXPECT_EQ(service.coordinator->get_job(probing)->phase, PreparePhase::kProbing);
     const auto probe = lease_all(service);
@@ -231,8 +231,8 @@ TEST(Tables, TheirBytesGoWithTheLastJobThatNamesThem) {
     ASSERT_TRUE(service.coordinator->cancel_job(second).ok());
     EXPECT_FALSE(service.coordinator->assets().contains(digest));
     // What a coordinator that was killed left behind goes when the next one starts; files of scenes stay.
-    const Digest left = sha256(serialize(trivial_tables(golden()->emitters())));
-    ASSERT_TRUE(service.coordinator->assets().put(left, serialize(trivial_tables(golden()->emitters()))).ok());
+    const Digest left = sha256(serialize(Tables(trivial_tables(golden()->emitters()))));
+    ASSERT_TRUE(service.coordinator->assets().put(left, serialize(Tables(trivial_tables(golden()->emitters())))).ok());
     CoordinatorOptions options;
     options.directory = service.directory.path;
     service.coordinator.reset();
@@ -240,6 +240,9 @@ TEST(Tables, TheirBytesGoWithTheLastJobThatNamesThem) {
     EXPECT_FALSE(next.assets().contains(left));
     EXPECT_TRUE(next.assets().contains(service.root));
 }
+
+/// What the cached tables of these tests consist of.
+constexpr const TablePart* kParts[] = {&SubspaceTables::kPart};
 
 TEST(TableCache, ASecondJobStartsAtOnceAndAChangedOneDoesNot) {
     TempDirectory cache;
@@ -263,8 +266,7 @@ TEST(TableCache, ASecondJobStartsAtOnceAndAChangedOneDoesNot) {
 TEST(TableCache, EachPartOfTheKeyMatters) {
     BuildIdentity identity{"build", "profile", sha256("golden")};
     JobSpec spec;
-    spec.algorithm = "spcbpt";
-    spec.parameters = complete_parameters(**find_algorithm("spcbpt"), *parse_parameters(**find_algorithm("spcbpt"), {}));
+    spec.algorithm = algorithm_of("spcbpt");
     spec.max_depth = 5;
     spec.scene_root = sha256("scene");
     spec.frame = kFrame;
@@ -279,7 +281,7 @@ TEST(TableCache, EachPartOfTheKeyMatters) {
     changed([](BuildIdentity& i, JobSpec&) { i.build_id += "x"; });
     changed([](BuildIdentity& i, JobSpec&) { i.math_profile += "x"; });
     changed([](BuildIdentity& i, JobSpec&) { i.golden_digest = sha256("other"); });
-    changed([](BuildIdentity&, JobSpec& s) { s.algorithm = "lvcbpt"; });
+    changed([](BuildIdentity&, JobSpec& s) { s.algorithm = algorithm_of("lvcbpt"); });
     changed([](BuildIdentity&, JobSpec& s) { s.seed = 1; });
     changed([](BuildIdentity&, JobSpec& s) { s.max_depth = 6; });
     changed([](BuildIdentity&, JobSpec& s) { s.scene_root = sha256("other"); });
@@ -289,8 +291,10 @@ TEST(TableCache, EachPartOfTheKeyMatters) {
     changed([](BuildIdentity&, JobSpec& s) { ++s.frame.crop.y0; });
     changed([](BuildIdentity&, JobSpec& s) { --s.frame.crop.x1; });
     changed([](BuildIdentity&, JobSpec& s) { --s.frame.crop.y1; });
-    for (const auto& [name, value] : spec.parameters)
-        changed([&](BuildIdentity&, JobSpec& s) { s.parameters[name] = value + "1"; });
+    for (const ParameterInfo& p : spec.algorithm.info().parameters)
+        changed([&](BuildIdentity&, JobSpec& s) {
+            s.algorithm = s.algorithm.with(p.name, p.default_value == p.max_value ? p.min_value : p.max_value);
+        });
     // What decides only how long the rendering takes does not.
     spec.samples_per_pixel = 9;
     EXPECT_EQ(table_key(identity, spec), reference);
@@ -298,12 +302,12 @@ TEST(TableCache, EachPartOfTheKeyMatters) {
 
 TEST(TableCache, DamagedEntriesAreRemovedAndTheDirectoryStaysBounded) {
     const TempDirectory directory;
-    const std::string bytes = serialize(trivial_tables(golden()->emitters()));
+    const std::string bytes = serialize(Tables(trivial_tables(golden()->emitters())));
     const TableCache cache(directory.path, 5 * bytes.size() / 2 + 4096);
     const Digest key = sha256("a");
-    EXPECT_FALSE(cache.find(key));
+    EXPECT_FALSE(cache.find(key, kParts));
     cache.store(key, bytes, {.training_samples = 7, .loss = 0.25, .note = "a note"});
-    const auto entry = cache.find(key);
+    const auto entry = cache.find(key, kParts);
     ASSERT_TRUE(entry);
     EXPECT_EQ(entry->bytes, bytes);
     EXPECT_EQ(entry->info.training_samples, 7u);
@@ -316,23 +320,23 @@ TEST(TableCache, DamagedEntriesAreRemovedAndTheDirectoryStaysBounded) {
         std::string damaged = file;
         damaged[at] ^= 4;
         ASSERT_TRUE(write_file_atomically(cache.path_of(key).string(), damaged).ok());
-        EXPECT_FALSE(cache.find(key)) << at;
+        EXPECT_FALSE(cache.find(key, kParts)) << at;
         EXPECT_FALSE(std::filesystem::exists(cache.path_of(key))) << at;
     }
     // Another key's entry under this name is no entry of this key.
     ASSERT_TRUE(write_file_atomically(cache.path_of(sha256("b")).string(), file).ok());
-    EXPECT_FALSE(cache.find(sha256("b")));
+    EXPECT_FALSE(cache.find(sha256("b"), kParts));
     for (int i = 0; i < 40; ++i) cache.store(sha256(std::to_string(i)), bytes, {});
     uint64_t total = 0;
     for (const auto& item : std::filesystem::directory_iterator(directory.path)) total += item.file_size();
     EXPECT_LE(total, 5 * bytes.size() / 2 + 4096);
-    EXPECT_TRUE(cache.find(sha256("39"))) << "the newest entry stays";
-    EXPECT_FALSE(TableCache({}, 1000).find(key));
+    EXPECT_TRUE(cache.find(sha256("39"), kParts)) << "the newest entry stays";
+    EXPECT_FALSE(TableCache({}, 1000).find(key, kParts));
 }
 
 TEST(TableCache, WhatAKilledProcessBeganIsRemoved) {
     const TempDirectory directory;
-    const std::string bytes = serialize(trivial_tables(golden()->emitters()));
+    const std::string bytes = serialize(Tables(trivial_tables(golden()->emitters())));
     const TableCache cache(directory.path, 1 << 20);
     const auto path = [&](const std::string& name) { return directory.path / name; };
     const std::string entry = sha256("a").hex() + ".tables", old = entry + ".tmp-1-0", young = entry + ".tmp-2-0";
@@ -345,16 +349,16 @@ TEST(TableCache, WhatAKilledProcessBeganIsRemoved) {
     EXPECT_FALSE(std::filesystem::exists(path(old)));
     EXPECT_TRUE(std::filesystem::exists(path(young))) << "somebody may be writing it";
     EXPECT_TRUE(std::filesystem::exists(path("notes.txt"))) << "which is none of ours";
-    EXPECT_TRUE(cache.find(sha256("b")));
+    EXPECT_TRUE(cache.find(sha256("b"), kParts));
 }
 
 TEST(TableCache, AMalformedReportIsADamagedEntry) {
     const TempDirectory directory;
-    const std::string bytes = serialize(trivial_tables(golden()->emitters()));
+    const std::string bytes = serialize(Tables(trivial_tables(golden()->emitters())));
     const TableCache cache(directory.path, 1 << 20);
     const Digest key = sha256("a");
     cache.store(key, bytes, {.loss = std::numeric_limits<double>::infinity()});
-    EXPECT_TRUE(cache.find(key)) << "no report that we write ourselves is damaged";
+    EXPECT_TRUE(cache.find(key, kParts)) << "no report that we write ourselves is damaged";
     const std::string file = *read_file(cache.path_of(key).string());
     const size_t head = file.find('\n') + 1, begin = file.find('\n', head) + 1, end = file.find('\n', begin);
     const std::string good = file.substr(begin, end - begin);
@@ -362,7 +366,7 @@ TEST(TableCache, AMalformedReportIsADamagedEntry) {
         const std::string rest = file.substr(head, begin - head) + report + file.substr(end);
         const std::string whole = file.substr(0, head - 65) + sha256(rest).hex() + "\n" + rest;
         EXPECT_TRUE(write_file_atomically(cache.path_of(key).string(), whole).ok());
-        return cache.find(key).has_value();
+        return cache.find(key, kParts).has_value();
     };
     EXPECT_TRUE(find_with(good));
     const auto with = [&](const std::string& field, const std::string& value) {

@@ -101,8 +101,9 @@ TEST(ErrorCurve, CheckpointsGrowGeometrically) {
 TEST(AlgorithmChoice, ParsesSettingsAndNamesMistakes) {
     const auto choice = parse_algorithm("bdpt:rr-start=6:heuristic=1");
     ASSERT_TRUE(choice.ok()) << choice.status().message();
-    EXPECT_EQ(choice->name, "bdpt");
-    EXPECT_EQ(choice->parameters, (std::map<std::string, std::string>{{"heuristic", "1"}, {"rr-min", "0.5"}, {"rr-start", "6"}}));
+    EXPECT_EQ(choice->settings.name(), "bdpt");
+    EXPECT_EQ(choice->settings.text(),
+              (std::map<std::string, std::string>{{"heuristic", "1"}, {"rr-min", "0.5"}, {"rr-start", "6"}}));
     EXPECT_EQ(choice->label, "bdpt:rr-start=6:heuristic=1");
     EXPECT_TRUE(parse_algorithm("path").ok());
     for (const char* wrong : {"", "no-such", "bdpt:", "bdpt:=1", "bdpt:heuristic", "bdpt:heuristic=9", "bdpt:no-such=1",
@@ -116,7 +117,8 @@ TEST(AlgorithmChoice, ParsesSettingsAndNamesMistakes) {
 
 BenchRun some_run() {
     BenchRun run;
-    run.scene_digest = "s", run.reference_digest = "r", run.algorithm = {"bdpt", {{"heuristic", "1"}}, ""}, run.build = "b";
+    run.scene_digest = "s", run.reference_digest = "r", run.algorithm = *parse_algorithm("bdpt:heuristic=1"),
+    run.algorithm.label = "", run.build = "b";
     run.width = 160, run.height = 90, run.max_depth = 10, run.time_limit = 60;
     return run;
 }
@@ -125,8 +127,8 @@ TEST(BenchRun, EveryFieldEntersTheKey) {
     std::vector<BenchRun> runs(15, some_run());
     runs[1].scene_digest = "t";
     runs[2].reference_digest = "t";
-    runs[3].algorithm.name = "path";
-    runs[4].algorithm.parameters["heuristic"] = "2";
+    runs[3].algorithm.settings = parse_algorithm("path:heuristic=1")->settings;
+    runs[4].algorithm.settings = runs[4].algorithm.settings.with("heuristic", 2);
     runs[5].width = 161;
     runs[6].height = 91;
     runs[7].max_depth = 11;
@@ -291,7 +293,7 @@ ExrImage grey(float value, float variance) {
 }
 
 TEST(BenchReference, IsRefusedWhereItCannotJudge) {
-    const BenchSubject subject{{8, 8, {0, 0, 8, 8}}, 5, "digest", {{"path", {}, "path"}}, 12};
+    const BenchSubject subject{{8, 8, {0, 0, 8, 8}}, 5, "digest", {*parse_algorithm("path")}, 12};
     const auto good = check_reference("ref.exr", grey(1, 1e-4f), subject);
     ASSERT_TRUE(good.ok()) << good.status().message();
     EXPECT_TRUE(good->empty());
@@ -308,7 +310,7 @@ TEST(BenchReference, IsRefusedWhereItCannotJudge) {
 }
 
 TEST(BenchReference, IsWarnedOfWhereItMayMislead) {
-    const BenchSubject subject{{8, 8, {0, 0, 8, 8}}, 5, "another", {{"bdpt", {}, "bdpt"}}, 12};
+    const BenchSubject subject{{8, 8, {0, 0, 8, 8}}, 5, "another", {*parse_algorithm("bdpt")}, 12};
     // Standard deviation 0.1 of 1: MAPE 100 % * sqrt(2 / pi) * 0.1 / 1.01 = 7.9 %.
     EXPECT_NEAR(noise_mape(grey(1, 0.01f)).value_or(0), 7.9, 0.01);
     EXPECT_EQ(check_reference("ref.exr", grey(1, 0.01f), subject)->size(), 3u);

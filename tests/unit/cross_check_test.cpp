@@ -8,6 +8,7 @@
 
 #include "common/core/rng.h"
 #include "common/work/golden.h"
+#include "tests/support/algorithm_of.h"
 
 namespace lightloom::client {
 namespace {
@@ -80,7 +81,7 @@ std::shared_ptr<const Scene> small_scene() {
 }
 
 TEST(ProgressiveRender, GrowsByGroupsUpToItsLimit) {
-    auto render = ProgressiveRender::start(small_scene(), {.algorithm = "bdpt", .max_depth = 3}, {});
+    auto render = ProgressiveRender::start(small_scene(), {.algorithm = testing::algorithm_of("bdpt"), .max_depth = 3}, {});
     ASSERT_TRUE(render.ok()) << render.status().message();
     EXPECT_FALSE(render->last_group_image().ok());
     double seconds = 0;
@@ -94,14 +95,14 @@ TEST(ProgressiveRender, GrowsByGroupsUpToItsLimit) {
     EXPECT_EQ(render->advance(45).code(), StatusCode::kFailedPrecondition);
     std::stop_source stopped;
     stopped.request_stop();
-    auto other = ProgressiveRender::start(small_scene(), {.algorithm = "bdpt", .max_depth = 3}, {});
+    auto other = ProgressiveRender::start(small_scene(), {.algorithm = testing::algorithm_of("bdpt"), .max_depth = 3}, {});
     EXPECT_EQ(other->advance(10, stopped.get_token()).code(), StatusCode::kCancelled);
     EXPECT_EQ(other->iterations(), 0u);
 }
 
 TEST(MeasureLengths, AddUpToTheImageAndAgreeBetweenAlgorithms) {
     const auto scene = small_scene();
-    const RenderSettings path{"path", {}, 1, 3}, bdpt{"bdpt", {}, 2, 3};
+    const RenderSettings path{testing::algorithm_of("path"), 1, 3}, bdpt{testing::algorithm_of("bdpt"), 2, 3};
     const auto lengths = measure_lengths(scene, path, 0, {});
     ASSERT_TRUE(lengths.ok()) << lengths.status().message();
     ASSERT_EQ(lengths->groups.size(), kLeastGroups);

@@ -13,6 +13,7 @@
 #include "common/work/wire.h"
 #include "server/results.h"
 #include "server/table_cache.h"
+#include "tests/support/algorithm_of.h"
 
 namespace lightloom {
 namespace {
@@ -25,8 +26,7 @@ const std::string kMain = "room.pbrt";
 /// No field has the value that a forgotten one would have.
 JobSpec full_spec() {
     JobSpec spec;
-    spec.algorithm = "lvcbpt";
-    spec.parameters = {{"cache", "500"}, {"rr-min", "0.25"}};
+    spec.algorithm = testing::algorithm_of("lvcbpt", {{"cache", "500"}, {"rr-min", "0.25"}}).completed();
     spec.seed = ~0ull;
     spec.samples_per_pixel = 7;
     spec.time_limit_seconds = 1.5;
@@ -50,13 +50,11 @@ std::string manifest_spec(const JobSpec& spec) {
 std::string replay(const JobSpec& spec) { return replay_command(spec, kMain, {{3, 1}, {5, 6, true}}); }
 
 // Other values than the given one, each different in another part of it.
-std::vector<std::string> others(const std::string& value) { return {value + "x"}; }
-std::vector<std::map<std::string, std::string>> others(const std::map<std::string, std::string>& value) {
-    auto more = value, less = value, changed = value;
-    more["another"] = "1";
-    less.erase(less.begin());
-    changed.begin()->second += "1";
-    return {more, less, changed};
+std::vector<AlgorithmSettings> others(const AlgorithmSettings& value) {
+    std::vector<AlgorithmSettings> all{testing::algorithm_of("bdpt").completed()};
+    for (const ParameterInfo& p : value.info().parameters)
+        all.push_back(value.with(p.name, value.value(p.name) == p.max_value ? p.min_value : p.max_value));
+    return all;
 }
 std::array<bool, 1> others(bool value) { return {!value}; }
 std::vector<Digest> others(Digest value) {
@@ -89,7 +87,7 @@ TEST(JobFields, EachDecidesWhatItsRolesSayAndTravels) {
             EXPECT_EQ(replay(changed) != replay(base), has(job_role::kReplay));
             const auto settings = [](const JobSpec& spec) {
                 const RenderSettings s = render_settings(spec);
-                return std::tuple(s.algorithm, s.parameters, s.seed, s.max_depth);
+                return std::tuple(s.algorithm, s.seed, s.max_depth);
             };
             EXPECT_EQ(settings(changed) != settings(base), has(job_role::kSettings));
 
@@ -100,7 +98,27 @@ TEST(JobFields, EachDecidesWhatItsRolesSayAndTravels) {
             EXPECT_TRUE(*back == changed);
         }
     });
-    EXPECT_EQ(size_t(v1::JobSpec::descriptor()->field_count()), std::tuple_size_v<decltype(kJobFields)>);
+    // The algorithm is two on the wire: its name and its parameters.
+    EXPECT_EQ(size_t(v1::JobSpec::descriptor()->field_count()), std::tuple_size_v<decltype(kJobFields)> + 1);
+}
+
+/// A default that somebody writes down is the same job: only a repeated request tells the two apart, because it must be the same
+/// text, and the choice of a training set, which a time limit may not change.
+TEST(JobFields, WhichParametersWereChosenTravelsAndDecidesNothing) {
+    JobSpec chosen = full_spec(), left = full_spec();
+    left.algorithm = testing::algorithm_of("lvcbpt", {{"cache", "500"}, {"rr-min", "0.25"}});
+    ASSERT_FALSE(left == chosen);
+    EXPECT_FALSE(same_request(left, chosen));
+    EXPECT_EQ(left.spec_digest(), chosen.spec_digest());
+    EXPECT_EQ(table_key(kIdentity, left), table_key(kIdentity, chosen));
+    EXPECT_EQ(manifest_spec(left), manifest_spec(chosen));
+    EXPECT_EQ(replay(left), replay(chosen));
+    v1::JobSpec message;
+    wire::put(left, &message);
+    const auto back = wire::get(message);
+    ASSERT_TRUE(back.ok()) << back.status().message();
+    EXPECT_TRUE(*back == left);
+    EXPECT_FALSE(back->algorithm.chosen("light-paths"));
 }
 
 /// With as many rows as members, no member is in the list twice exactly if none is missing.
@@ -117,24 +135,28 @@ TEST(JobFields, NoneIsInTheListTwice) {
 }
 
 /// Images name the digest of their spec, and tables lie under their key: neither may change unless what it stands for does. The
-/// values are those of the versions that wrote every field out.
+/// values are those of the versions that wrote every field out and carried parameters as text; all parameters are written down, as
+/// they are in every accepted job.
 TEST(JobFields, TextsAreThoseOfEarlierVersions) {
     JobSpec spec = full_spec();
-    EXPECT_EQ(spec.spec_digest().hex(), "e87d5dc631d9bad5dd7b7278f0b350a3ad752927b8676dfbc4a65cfc85a79f06");
-    const std::string key = "4d0b883b361e076052a972e7be5ce035e4572cd6bcf49dc83987c95ea0cb081c";
+    EXPECT_EQ(spec.spec_digest().hex(), "130dca2f2c3b745ecc5a5cb480f00a147820d079de59eebe2c984e73f4c0a175");
+    const std::string key = "0f627249eeef2549071c363c2fada1fac44efdecc5188443733908273a10566b";
     EXPECT_EQ(table_key(kIdentity, spec).hex(), key);
     EXPECT_EQ(manifest_spec(spec),
-              R"({"algorithm":"lvcbpt","parameters":{"cache":"500","rr-min":"0.25"},"seed":18446744073709551615,"max_depth":9,)"
+              R"({"algorithm":"lvcbpt","parameters":{"cache":"500","connections":"3","heuristic":"0","light-paths":"0.3",)"
+              R"("rr-min":"0.25","rr-start":"4","training-paths":"20000"},"seed":18446744073709551615,"max_depth":9,)"
               R"("requested_samples_per_pixel":7,"time_limit_seconds":1.5,"layers":true,"scene":"room.pbrt",)"
               R"("scene_root":"4f48f7207cebf92638debb5694e4a8677350cf88a9e98e73c6c466b6b1d43890",)"
               R"("frame":{"width":64,"height":48,"crop":[1,2,33,44]}})");
     EXPECT_EQ(settings_json(spec).dump(),
-              R"({"algorithm":"lvcbpt","parameters":{"cache":"500","rr-min":"0.25"},"seed":18446744073709551615,"max_depth":9})");
+              R"({"algorithm":"lvcbpt","parameters":{"cache":"500","connections":"3","heuristic":"0","light-paths":"0.3",)"
+              R"("rr-min":"0.25","rr-start":"4","training-paths":"20000"},"seed":18446744073709551615,"max_depth":9})");
     EXPECT_EQ(replay(spec),
-              "lightloom replay room.pbrt --algorithm lvcbpt --set cache=500 --set rr-min=0.25 --seed 18446744073709551615 "
+              "lightloom replay room.pbrt --algorithm lvcbpt --set cache=500 --set connections=3 --set heuristic=0 "
+              "--set light-paths=0.3 --set rr-min=0.25 --set rr-start=4 --set training-paths=20000 --seed 18446744073709551615 "
               "--max-depth 9 --resolution 64x48 --spp 7 --unit 3,1");
     spec.first_hit_layers = false;
-    EXPECT_EQ(spec.spec_digest().hex(), "816904b5125d11187cf1e71fc7232f951d4a523ad81bd5785a97ecf4104bc29a");
+    EXPECT_EQ(spec.spec_digest().hex(), "5c42c553861fb94491774c217b7394e230fce7117f09fa0b598974e242931c74");
     EXPECT_EQ(table_key(kIdentity, spec).hex(), key) << "tables know nothing of layers";
 }
 

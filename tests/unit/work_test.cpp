@@ -11,12 +11,13 @@
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 
 #include "common/scene/scene.h"
 #include "common/transport/renderer.h"
 #include "common/work/asset.h"
 #include "common/work/golden.h"
-#include "common/work/wire.h"
+#include "tests/support/algorithm_of.h"
 #include "tests/support/estimates.h"
 
 namespace {
@@ -66,18 +67,18 @@ class TempDirectory {
 TEST(Plan, TilesCoverTheCropExactlyOnce) {
     for (const FrameLayout& f : {frame(64, 64), frame(512, 512), frame(1280, 720), frame(1921, 1083), frame(3, 5000),
                                  frame(5000, 3), FrameLayout{1920, 1080, {100, 200, 1333, 1007}}}) {
-        const Plan plan(f, 1);
+        const Plan plan(f, testing::algorithm_of("bdpt"));
         int64_t area = 0;
         std::vector<Rect> seen;
         for (const WorkUnit& unit : plan.units(plan.group(0))) {
-            EXPECT_FALSE(unit.tile.empty());
+            const Rect& tile = unit.render.tile;
+            EXPECT_FALSE(tile.empty());
             for (const Rect& other : seen) {
-                const bool apart =
-                    unit.tile.x1 <= other.x0 || other.x1 <= unit.tile.x0 || unit.tile.y1 <= other.y0 || other.y1 <= unit.tile.y0;
+                const bool apart = tile.x1 <= other.x0 || other.x1 <= tile.x0 || tile.y1 <= other.y0 || other.y1 <= tile.y0;
                 EXPECT_TRUE(apart);
             }
-            seen.push_back(unit.tile);
-            area += unit.tile.area();
+            seen.push_back(unit.render.tile);
+            area += unit.render.tile.area();
         }
         EXPECT_EQ(area, f.crop.area());
         EXPECT_EQ(seen.size(), plan.tile_count());
@@ -85,18 +86,18 @@ TEST(Plan, TilesCoverTheCropExactlyOnce) {
 }
 
 TEST(Plan, SmallFramesAreOneTileAndLargeTilesAreLarge) {
-    EXPECT_EQ(Plan(frame(512, 512), 1).tile_count(), 1u);
-    EXPECT_EQ(Plan(frame(1920, 1080), 1, true).tile_count(), 1u);
-    const Plan plan(frame(1920, 1080), 1);
+    EXPECT_EQ(Plan(frame(512, 512), PlanOptions{}).tile_count(), 1u);
+    EXPECT_EQ(Plan(frame(1920, 1080), PlanOptions{.whole_frame = true}).tile_count(), 1u);
+    const Plan plan(frame(1920, 1080), PlanOptions{});
     for (const WorkUnit& unit : plan.units(plan.group(0))) {
-        EXPECT_GE(unit.tile.width(), 256);
-        EXPECT_GE(unit.tile.height(), 256);
-        EXPECT_LE(unit.tile.area(), 3 << 17);
+        EXPECT_GE(unit.render.tile.width(), 256);
+        EXPECT_GE(unit.render.tile.height(), 256);
+        EXPECT_LE(unit.render.tile.area(), 3 << 17);
     }
 }
 
 TEST(Plan, GroupsGrowByAtMostFivePercentUpToTheCap) {
-    const Plan plan(frame(64, 64), 1);
+    const Plan plan(frame(64, 64), PlanOptions{.light_paths_per_iteration = 64 * 64});
     uint64_t done = 0;
     for (uint32_t i = 0; i < 2000; ++i) {
         const Group group = plan.group(i);
@@ -111,7 +112,7 @@ TEST(Plan, GroupsGrowByAtMostFivePercentUpToTheCap) {
 }
 
 TEST(Plan, BoundedGroupsAreAPrefixOfTheUnboundedOnes) {
-    const Plan plan(frame(100, 80), 0.5);
+    const Plan plan(frame(100, 80), PlanOptions{.light_paths_per_iteration = 4000});
     for (const uint64_t iterations : {1, 2, 19, 20, 21, 57, 400, 4001}) {
         const std::vector<Group> groups = plan.groups_for(iterations);
         uint64_t sum = 0;
@@ -138,28 +139,87 @@ TEST(Plan, BoundedGroupsAreAPrefixOfTheUnboundedOnes) {
 TEST(Plan, LightPathSharesSumToTheTotalAndFollowTheArea) {
     for (const Rect& crop : {Rect{0, 0, 1234, 777}, Rect{13, 57, 640, 481}, Rect{0, 0, 7, 5}}) {
         const std::vector<Rect> tiles = cut(crop, 7, 5);
-        for (const double per_pixel : {0.0, 0.001, 0.37, 1.0, 2.5, 20.0}) {
+        const auto area = uint64_t(crop.area());
+        for (const uint64_t per_iteration : {uint64_t(0), uint64_t(1), area / 3, area, 20 * area + 1}) {
             for (const uint32_t iterations : {1u, 3u, 64u}) {
-                const auto units = split_group({4, 100, iterations}, tiles, per_pixel);
+                const auto units = split_group({4, 100, iterations}, tiles, {.light_paths_per_iteration = per_iteration});
                 ASSERT_EQ(units.size(), 35u);
-                const double exact = per_pixel * iterations * double(crop.area());
+                const uint64_t total = per_iteration * iterations;
                 uint64_t next = 0;
                 for (const WorkUnit& unit : units) {
-                    EXPECT_EQ(unit.first_light_path, next);
-                    next += unit.light_path_count;
-                    const double share = exact * double(unit.tile.area()) / double(crop.area());
-                    EXPECT_NEAR(double(unit.light_path_count), share, 1.5);
+                    EXPECT_EQ(unit.render.first_light_path, next);
+                    next += unit.render.light_path_count;
+                    const double share = double(total) * double(unit.render.tile.area()) / double(area);
+                    EXPECT_NEAR(double(unit.render.light_path_count), share, 1);
                 }
-                // A group whose weights count on light paths has at least one: its image would be too dark without.
-                EXPECT_EQ(next, exact > 0 ? std::max<uint64_t>(1, uint64_t(exact + 0.5)) : 0);
+                EXPECT_EQ(next, total);
             }
         }
     }
 }
 
 TEST(Plan, OneLightPathPerPixelGivesEveryTileItsArea) {
-    for (const WorkUnit& unit : split_group({0, 0, 3}, cut({5, 5, 700, 400}, 7, 5), 1.0))
-        EXPECT_EQ(unit.light_path_count, uint64_t(3 * unit.tile.area()));
+    for (const WorkUnit& unit : split_group({0, 0, 3}, cut({5, 5, 700, 400}, 7, 5), {.light_paths_per_iteration = 695 * 395}))
+        EXPECT_EQ(unit.render.light_path_count, uint64_t(3 * unit.render.tile.area()));
+}
+
+/// The weights of every group reckon with L1 light paths per iteration: no group may have one more or less, or its image would be
+/// too bright or too dark by that much.
+TEST(Plan, EveryGroupHasExactlyTheLightPathsThatItsWeightsCountOn) {
+    for (const FrameLayout& f : {frame(64, 64), frame(3, 5), frame(1280, 720), FrameLayout{1920, 1080, {100, 200, 1333, 1007}}}) {
+        for (const AlgorithmInfo* row : catalog()) {
+            for (const char* per_pixel : {"0.001", "0.3", "2.7"}) {
+                AlgorithmSettings settings = testing::algorithm_of(std::string(row->name));
+                if (settings.has("light-paths"))
+                    settings = testing::algorithm_of(std::string(row->name), {{"light-paths", per_pixel}});
+                const uint64_t l1 = settings.light_paths_per_iteration(f.crop.area());
+                EXPECT_EQ(l1 > 0, row->light_paths_per_pixel != nullptr) << row->name << ": at least one where there are any";
+                const Plan plan(f, settings);
+                for (const Group& group : plan.groups_for(150)) {
+                    uint64_t next = 0;
+                    for (const WorkUnit& unit : plan.units(group)) {
+                        EXPECT_EQ(unit.render.first_light_path, next);
+                        next += unit.render.light_path_count;
+                    }
+                    ASSERT_EQ(next, l1 * group.iteration_count) << row->name << ", group " << group.index;
+                }
+            }
+        }
+    }
+}
+
+/// What the row says about its units is what the units are.
+TEST(Plan, UnitsHaveTheShapeThatTheOptionsSay) {
+    const FrameLayout f = frame(1280, 720);
+    for (const bool whole : {false, true}) {
+        for (const bool splats_only : {false, true}) {
+            const Plan plan(f, {.light_paths_per_iteration = 9, .whole_frame = whole, .splats_only = splats_only});
+            EXPECT_EQ(plan.tile_count() == 1, whole);
+            for (const WorkUnit& unit : plan.units(plan.group(40))) {
+                EXPECT_EQ(unit.render.tile == f.crop, whole);
+                EXPECT_EQ(unit.render.splats_only, splats_only);
+                EXPECT_EQ(unit.render.samples_per_pixel(), splats_only ? 0 : unit.render.iteration_count);
+            }
+            // A large frame that cannot be cut has groups of several iterations in the end, so that not every one costs a partial.
+            EXPECT_EQ(plan.max_group_iterations(), whole ? 8u : 1u);
+        }
+    }
+}
+
+TEST(Plan, UnitsOfTrainingSayWhichRoundTheyAreOf) {
+    const TrainingWork work{kTrainingUnitSamples, 2 * kTrainingUnitSamples + 5, 4 * kTrainingUnitSamples};
+    const Plan plan = Plan::training(UnitKind::kTraining, 3, work);
+    ASSERT_EQ(plan.group_count(work.sample_count), 3u);
+    uint64_t next = work.first_sample;
+    for (uint32_t i = 0; i < 3; ++i) {
+        const auto units = plan.units(plan.group(i));
+        ASSERT_EQ(units.size(), 1u);
+        EXPECT_EQ(units[0].key, (UnitKey{i, 0, UnitKind::kTraining, 3}));
+        EXPECT_EQ(units[0].training.first_sample, next);
+        EXPECT_EQ(units[0].training.total_samples, work.total_samples);
+        next += units[0].training.sample_count;
+    }
+    EXPECT_EQ(next, work.first_sample + work.sample_count);
 }
 
 TEST(JobSpec, DigestChangesWithEverythingThatChangesTheImageAndOnlyThat) {
@@ -176,8 +236,8 @@ TEST(JobSpec, DigestChangesWithEverythingThatChangesTheImageAndOnlyThat) {
         change(changed);
         EXPECT_NE(changed.spec_digest(), base);
     };
-    differs([](JobSpec& s) { s.algorithm = "bdpt"; });
-    differs([](JobSpec& s) { s.parameters["a"] = "1"; });
+    differs([](JobSpec& s) { s.algorithm = testing::algorithm_of("bdpt"); });
+    differs([](JobSpec& s) { s.algorithm = s.algorithm.with("rr-start", 7); });
     differs([](JobSpec& s) { s.seed = 1; });
     differs([](JobSpec& s) { s.max_depth = 6; });
     differs([](JobSpec& s) { s.scene_root.bytes[3] = 1; });
@@ -277,39 +337,6 @@ TEST(AssetStore, TrimmingEndsQuietlyWhereADirectoryCannotBeRead) {
     }
 }
 
-TEST(Wire, SpecAndUnitsSurviveTheRoundTrip) {
-    JobSpec spec;
-    spec.algorithm = "bdpt";
-    spec.parameters = {{"a", "1"}, {"b", "2"}};
-    spec.seed = ~0ull;
-    spec.samples_per_pixel = 7;
-    spec.max_depth = -1;
-    spec.width = 640;
-    spec.height = 480;
-    spec.scene_root = sha256("x");
-    spec.frame = {640, 480, {1, 2, 3, 4}};
-    const UnitLease lease{"job-1",
-                          spec,
-                          {.key = {3, 4},
-                           .first_iteration = 5,
-                           .iteration_count = 6,
-                           .tile = {1, 2, 3, 4},
-                           .first_light_path = 7,
-                           .light_path_count = 8}};
-    v1::UnitLease message;
-    wire::put(lease, &message);
-    const auto back = wire::get(message);
-    ASSERT_TRUE(back.ok());
-    EXPECT_EQ(back->spec.spec_digest(), spec.spec_digest());
-    EXPECT_EQ(back->spec.max_depth, -1);
-    EXPECT_EQ(back->unit.key, lease.unit.key);
-    EXPECT_EQ(back->unit.tile, lease.unit.tile);
-    EXPECT_EQ(back->unit.light_path_count, 8u);
-    message.mutable_spec()->mutable_scene_root()->set_sha256("short");
-    EXPECT_EQ(wire::get(message).status().code(), StatusCode::kInvalidArgument);
-    EXPECT_FALSE(wire::get(v1::SubmitResultResponse()).ok()) << "UNSPECIFIED must be refused";
-}
-
 /// A kind that no golden unit computes could differ between two hosts unseen.
 TEST(Golden, ItsScenesHoldEveryKindOfMaterialTextureShapeAndLight) {
     const SceneDescription room = golden_scene(), court = golden_courtyard();
@@ -336,7 +363,7 @@ TEST(Golden, ItsScenesHoldEveryKindOfMaterialTextureShapeAndLight) {
 /// The sums of one unit by bdpt.
 Digest unit_digest(SceneDescription description) {
     const std::shared_ptr<const Scene> scene = std::move(Scene::build(std::move(description))).value();
-    const auto renderer = std::move(Renderer::create(scene, {.algorithm = "bdpt", .seed = 1, .max_depth = 6})).value();
+    const auto renderer = std::move(Renderer::create(scene, {testing::algorithm_of("bdpt"), 1, 6})).value();
     const Rect& crop = scene->frame().crop;
     const auto partial = renderer->render({.iteration_count = 4, .tile = crop, .light_path_count = uint64_t(crop.area()) * 4}, {});
     Sha256 hash;
