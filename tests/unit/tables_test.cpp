@@ -11,7 +11,7 @@
 
 #include "common/tables/train_classifier.h"
 #include "common/transport/training.h"
-#include "tests/support/random_tables.h"
+#include "tests/support/table_render.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
@@ -20,29 +20,31 @@ namespace {
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
 
 RenderSettings small_settings(uint64_t seed = 3) {
-    return {"spcbpt",
-            {{"training-paths", "3000"}, {"light-subspaces", "60"}, {"eye-subspaces", "40"}, {"cache", "500"}, {"windows", "4"}},
-            seed,
-            5};
+    return testing::settings_of(
+        "spcbpt",
+        {{"training-paths", "3000"}, {"light-subspaces", "60"}, {"eye-subspaces", "40"}, {"cache", "500"}, {"windows", "4"}}, seed);
+}
+
+/// What spcbpt learns of a scene.
+SubspaceTables learned(const Scene& scene, uint64_t seed = 3) {
+    TrainingReport report;
+    const auto tables = make_tables(scene, small_settings(seed), {}, &report);
+    if (!tables.ok()) throw std::runtime_error(tables.status().message());
+    return *tables->get<SubspaceTables>();
 }
 
 TrainingData small_data(const std::shared_ptr<const Scene>& scene, uint64_t samples = 600) {
-    Result<TrainingData> data = trace_training(*scene, small_settings(), {0, samples, samples}, {});
-    EXPECT_TRUE(data.ok());
-    return *std::move(data);
+    return testing::trace_training(*scene, small_settings(), {0, samples, samples});
 }
 
 TEST(Tables, SerializedAndParsedAreTheSame) {
     for (const testing::NamedScene& named : testing::kScenes) {
         const auto scene = named.make();
         const SubspaceTables random = testing::random_tables(scene->emitters(), 1);
-        TrainingReport report;
-        const Result<SubspaceTables> trained = make_tables(*scene, small_settings(), {}, &report);
-        ASSERT_TRUE(trained.ok()) << named.name << ": " << trained.status().message();
-        for (const SubspaceTables& tables : {random, *trained, trivial_tables(scene->emitters())}) {
+        for (const SubspaceTables& tables : {random, learned(*scene), trivial_tables(scene->emitters())}) {
             ASSERT_TRUE(tables.validate(scene->emitters()).ok()) << named.name;
             const std::string bytes = serialize(tables);
-            const Result<SubspaceTables> again = parse_tables(bytes);
+            const Result<SubspaceTables> again = parse_subspace_tables(bytes);
             ASSERT_TRUE(again.ok()) << again.status().message();
             EXPECT_TRUE(again->validate(scene->emitters()).ok());
             EXPECT_EQ(serialize(*again), bytes);
@@ -65,7 +67,7 @@ TEST(Tables, EveryDamagedByteIsDetected) {
         for (const char flip : {char(0x01), char(0x20), char(0x80)}) {
             std::string damaged = bytes;
             damaged[i] = char(damaged[i] ^ flip);
-            const Result<SubspaceTables> parsed = parse_tables(damaged);
+            const Result<SubspaceTables> parsed = parse_subspace_tables(damaged);
             EXPECT_FALSE(parsed.ok()) << "byte " << i << " flipped by " << int(flip);
             if (!parsed.ok()) {
                 EXPECT_EQ(parsed.status().code(), StatusCode::kDataLoss);
@@ -73,9 +75,82 @@ TEST(Tables, EveryDamagedByteIsDetected) {
         }
     }
     for (size_t size = 0; size < bytes.size(); ++size)
-        EXPECT_FALSE(parse_tables(std::string_view(bytes).substr(0, size)).ok()) << "cut to " << size << " bytes";
-    EXPECT_FALSE(parse_tables(bytes + "x").ok());
-    EXPECT_FALSE(parse_tables(bytes + bytes.substr(bytes.find('\n') + 1)).ok()) << "every table twice";
+        EXPECT_FALSE(parse_subspace_tables(std::string_view(bytes).substr(0, size)).ok()) << "cut to " << size << " bytes";
+    EXPECT_FALSE(parse_subspace_tables(bytes + "x").ok());
+    EXPECT_FALSE(parse_subspace_tables(bytes + bytes.substr(bytes.find('\n') + 1)).ok()) << "every table twice";
+}
+
+/// A part of a container, for its own sake.
+template <int kNumber>
+struct Numbered {
+    int value = 0;
+
+    static const TablePart kPart;
+};
+template <int kNumber>
+const TablePart Numbered<kNumber>::kPart{
+    kNumber == 0   ? "a-part"
+    : kNumber == 1 ? "b-part"
+                   : "c-part",
+    [](const void* part) { return std::string(1, char(static_cast<const Numbered*>(part)->value)); },
+    [](std::string_view bytes) -> Result<std::shared_ptr<const void>> {
+        if (bytes.size() != 1) return data_loss("not one byte");
+        return std::shared_ptr<const void>(std::make_shared<const Numbered>(Numbered{int(bytes[0])}));
+    },
+    [](const void* part, const EmitterSet&) {
+        return static_cast<const Numbered*>(part)->value == 66 ? data_loss("the value is 66") : Status();
+    }};
+
+TEST(Tables, AreNamedPartsThatKnowNothingOfOneAnother) {
+    using A = Numbered<0>;
+    using B = Numbered<1>;
+    using C = Numbered<2>;
+    const TablePart* const both[] = {&A::kPart, &B::kPart};
+    const TablePart* const others[] = {&A::kPart, &C::kPart};
+    const auto scene = testing::diffuse_box();
+    Tables tables;
+    EXPECT_TRUE(tables.empty());
+    EXPECT_TRUE(tables.consist_of({}));
+    tables.set(std::make_shared<const B>(B{7}));
+    EXPECT_FALSE(tables.consist_of(both));
+    tables.set(std::make_shared<const A>(A{5}));
+    EXPECT_TRUE(tables.consist_of(both));
+    EXPECT_FALSE(tables.consist_of(others));
+    EXPECT_FALSE(tables.consist_of(std::span(both).first(1)));
+    EXPECT_EQ(tables.get<A>()->value, 5);
+    EXPECT_EQ(tables.get<C>(), nullptr);
+    EXPECT_TRUE(tables.validate(scene->emitters()).ok());
+
+    // The bytes do not know in which order parts came, and every part comes back.
+    Tables turned(A{5});
+    turned.set(std::make_shared<const B>(B{7}));
+    const std::string bytes = serialize(tables);
+    EXPECT_EQ(serialize(turned), bytes);
+    const auto again = parse_tables(bytes, both);
+    ASSERT_TRUE(again.ok()) << again.status().message();
+    EXPECT_EQ(again->get<A>()->value, 5);
+    EXPECT_EQ(again->get<B>()->value, 7);
+    EXPECT_EQ(serialize(*again), bytes);
+
+    const Status unknown = parse_tables(bytes, others).status();
+    EXPECT_EQ(unknown.code(), StatusCode::kFailedPrecondition);
+    EXPECT_NE(unknown.message().find("b-part"), std::string::npos) << unknown.message();
+    for (size_t i = 0; i < bytes.size(); ++i) {
+        std::string damaged = bytes;
+        damaged[i] = char(damaged[i] ^ 0x01);
+        const Status refused = parse_tables(damaged, both).status();
+        // A byte of a name makes it another part's name, which is nobody's here.
+        EXPECT_TRUE(refused.code() == StatusCode::kDataLoss || refused.code() == StatusCode::kFailedPrecondition) << "byte " << i;
+        if (i == 0) continue;
+        const auto cut = parse_tables(std::string_view(bytes).substr(0, i), both);
+        EXPECT_TRUE(!cut.ok() || !cut->consist_of(both)) << "cut to " << i << " bytes";
+    }
+
+    // A part replaces one of its type, and what is wrong with one is wrong with all.
+    turned.set(std::make_shared<const A>(A{66}));
+    EXPECT_EQ(turned.get<A>()->value, 66);
+    EXPECT_EQ(tables.get<A>()->value, 5);
+    EXPECT_EQ(turned.validate(scene->emitters()).code(), StatusCode::kDataLoss);
 }
 
 TEST(Tables, EveryBadTableIsRefusedByName) {
@@ -146,7 +221,7 @@ TEST(Tables, EveryBadTableIsRefusedByName) {
         EXPECT_EQ(status.code(), StatusCode::kDataLoss) << name;
         EXPECT_FALSE(status.message().empty()) << name;
         // And nothing renders from them.
-        EXPECT_FALSE(Renderer::create(scene, {"spcbpt", {}, 1, 4}, std::make_shared<const SubspaceTables>(bad)).ok()) << name;
+        EXPECT_EQ(Renderer::create(scene, small_settings(), Tables(bad)).status().code(), StatusCode::kDataLoss) << name;
     }
 }
 
@@ -170,9 +245,8 @@ TEST(TrainingData, PartsJoinToTheWhole) {
     const TrainingData whole = small_data(scene, total);
     TrainingData joined;
     for (uint64_t first = 0; first < total; first += 512) {
-        const Result<TrainingData> part = trace_training(*scene, small_settings(), {first, 512, total}, {});
-        ASSERT_TRUE(part.ok());
-        ASSERT_TRUE(joined.append(*part).ok());
+        const TrainingData part = testing::trace_training(*scene, small_settings(), {first, 512, total});
+        ASSERT_TRUE(joined.append(part).ok());
     }
     EXPECT_EQ(serialize(joined), serialize(whole));
     const auto other_frame = testing::environment_lit();
@@ -338,12 +412,7 @@ TEST(Training, IsDeterministicOnAnyNumberOfThreads) {
         const auto scene = make();
         const auto on_threads = [&](int threads, uint64_t seed) {
             std::string bytes;
-            tbb::task_arena(threads).execute([&] {
-                TrainingReport report;
-                const Result<SubspaceTables> tables = make_tables(*scene, small_settings(seed), {}, &report);
-                ASSERT_TRUE(tables.ok());
-                bytes = serialize(*tables);
-            });
+            tbb::task_arena(threads).execute([&] { bytes = serialize(learned(*scene, seed)); });
             return bytes;
         };
         const std::string alone = on_threads(1, 3);
