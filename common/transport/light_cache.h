@@ -170,7 +170,7 @@ LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPr
 }
 
 /// Connects z_{t-1} to the end of a prefix: s = 1 to the point x_0 itself, s >= 2 to y_{s-1}. Unweighted contribution f / p with
-/// the prefix's density as traced, p(y); black when it fails.
+/// the prefix's density as traced, p(y); black when it fails. The view is the path's, whose point x_0 next event might have chosen too.
 template <ViewDetail detail>
 Rgb connect_candidate(const Scene& scene, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view,
                       WalkCounters* counters) {
@@ -179,7 +179,11 @@ Rgb connect_candidate(const Scene& scene, const PathVertex* y, int s, const Path
     light.emitter = uint32_t(y[0].emitter);
     if (!scene.emitters().connect_point(z[t - 1].p, y[0].p, y[0].ng, &light)) return {};
     light.pdf = float(y[0].fwd);
-    return next_event<detail>(scene, z, t, light, view, counters);
+    const Rgb contribution = next_event<detail>(scene, z, t, light, view, counters);
+    if (contribution.is_black()) return {};
+    const EmitterSet& emitters = scene.emitters();
+    view->next_event = emitters.pdf_next_event(emitters[light.emitter], z[t - 1].p, light.position, light.normal, light.wi);
+    return contribution;
 }
 
 }  // namespace lightloom

@@ -316,11 +316,14 @@ requires UnitAlgorithm<A> || PreparedAlgorithm<A> || OwnedAlgorithm<A> Result<Pa
         algorithm.run(scope, sink);
         sums.add(sink);
     } else if constexpr (PreparedAlgorithm<A> && prepares_per_iteration<A>()) {
-        // Light paths of an iteration follow those of the one before.
+        // Light paths of an iteration follow those of the one before. What an iteration traces beside those that are counted has
+        // keys of the iteration, or it would be the same in all of them.
         const uint64_t light_paths = work.iteration_count > 0 ? work.light_path_count / work.iteration_count : 0;
+        if (light_paths * work.iteration_count != work.light_path_count)
+            return invalid_argument("the unit's light paths are not the same number in every iteration");
         for (uint32_t b = 0; b < work.iteration_count && !stop.stop_requested(); ++b) {
             RenderUnit iteration = work;
-            iteration.first_iteration = work.first_iteration + b;
+            iteration.first_iteration = iteration.group_first_iteration = work.first_iteration + b;
             iteration.iteration_count = 1;
             iteration.first_light_path = work.first_light_path + b * light_paths;
             iteration.light_path_count = light_paths;

@@ -5,19 +5,17 @@
 #include <filesystem>
 
 #include "common/import/import.h"
-#include "tests/support/estimates.h"
+#include "tests/support/row_techniques.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
 namespace {
 
-using testing::MaskedSelection;
 using testing::RegionMeans;
 using testing::SceneBuilder;
 using testing::TestFamily;
 
 constexpr int kSeeds = 32;
-const char* const kAlgorithms[] = {"path", "light", "bdpt", "lvcbpt", "spcbpt"};
 
 /// Tests the frame and every block against one number.
 void expect_constant(const RegionMeans& means, double expected, const std::string& what, TestFamily* family) {
@@ -43,33 +41,37 @@ TEST(Furnace, BoxTruncatedAtEveryDepth) {
     TestFamily family;
     const double albedo = 0.5;
     const auto scene = furnace_box(float(albedo));
-    for (const char* algorithm : kAlgorithms) {
+    for (const AlgorithmInfo* row : catalog()) {
+        const std::string algorithm(row->name);
         double expected = 0, power = 1;
         for (int max_depth = 0; max_depth <= 5; ++max_depth) {
             expected += power;
             power *= albedo;
             const auto image = testing::catalog_image(scene, algorithm, max_depth, 16);
             expect_constant(testing::replicate(image, scene->frame().crop, kSeeds, 100 * uint64_t(max_depth)), expected,
-                            std::string(algorithm) + ", max depth " + std::to_string(max_depth), &family);
+                            algorithm + ", max depth " + std::to_string(max_depth), &family);
         }
     }
     family.check();
 }
 
-/// The same for every subset of bdpt's techniques that contains hits. (Next event and connections
-/// alone have no finite variance in the corners of the box, where 1 / d^2 has no bound, and a test
-/// of their means would mean nothing.)
+/// The same for every subset of a row's techniques that contains hits. (Next event and connections alone have no finite variance
+/// in the corners of the box, where 1 / d^2 has no bound, and a test of their means would mean nothing.)
 TEST(Furnace, BoxWithAnyTechniqueSubset) {
     TestFamily family;
     const auto scene = furnace_box(0.5f);
-    for (int mask = 0; mask < 8; ++mask) {
-        MaskedSelection subset{testing::bdpt_selection(*scene)};
-        subset.min_k = 2;
-        subset.next_event = mask & 1, subset.connections = mask & 2, subset.light_tracing = mask & 4;
-        const double expected = (0.5 - std::pow(0.5, 5)) / (1 - 0.5);
-        const auto image = testing::algorithm_image(scene, BdptAlgorithm<MaskedSelection>{subset}, 4, 32);
-        expect_constant(testing::replicate(image, scene->frame().crop, kSeeds, 5000 + 100 * uint64_t(mask)), expected,
-                        "techniques " + std::to_string(mask), &family);
+    const double expected = (0.5 - std::pow(0.5, 5)) / (1 - 0.5);
+    for (const AlgorithmInfo* row : catalog()) {
+        const testing::RowTechniques has = testing::techniques_of(*row, scene);
+        const std::string algorithm(row->name);
+        for (int bits = 1; has.hit && bits <= has.bits(); bits += 2) {
+            if ((bits & has.bits()) != bits) continue;
+            TechniqueMask mask = testing::mask_of_bits(bits);
+            mask.min_k = 2;
+            const auto image = testing::catalog_image(scene, algorithm, 4, 32, {}, mask);
+            expect_constant(testing::replicate(image, scene->frame().crop, kSeeds, 5000 + 100 * uint64_t(bits)), expected,
+                            algorithm + ", techniques " + std::to_string(bits), &family);
+        }
     }
     family.check();
 }
@@ -83,9 +85,11 @@ TEST(Furnace, WhiteSphereInConstantEnvironment) {
     b.sphere({0, 0, 0}, 1, b.diffuse(Rgb(1.0f)));
     b.look({0, 0, -4}, {0, 0, 0}, 40);
     const auto scene = b.build();
-    for (const char* algorithm : kAlgorithms)
+    for (const AlgorithmInfo* row : catalog()) {
+        const std::string algorithm(row->name);
         expect_constant(testing::replicate(testing::catalog_image(scene, algorithm, 3, 32), scene->frame().crop, kSeeds, 7000), 1,
                         algorithm, &family);
+    }
     family.check();
 }
 
@@ -115,11 +119,12 @@ TEST(Analytic, FacingSquares) {
         EXPECT_LT(means.frame().relative_error(), 0.005) << what;
         family.add(testing::one_sample_p_value(means.frame(), expected), what);
     };
-    for (const char* algorithm : kAlgorithms) expect(testing::catalog_image(scene, algorithm, 1, 128), algorithm);
-    for (int s = 0; s <= 2; ++s) {
-        MaskedSelection only{testing::bdpt_selection(*scene)};
-        only.only_s = s;
-        expect(testing::algorithm_image(scene, BdptAlgorithm<MaskedSelection>{only}, 1, 128), "s = " + std::to_string(s));
+    for (const AlgorithmInfo* row : catalog()) {
+        const std::string algorithm(row->name);
+        expect(testing::catalog_image(scene, algorithm, 1, 128), algorithm);
+        for (const Technique t : testing::techniques_of(*row, scene).of_length(2))
+            expect(testing::catalog_image(scene, algorithm, 1, 128, {}, testing::mask_of(t, 2)),
+                   algorithm + " by " + std::string(to_string(t.kind)) + " " + std::to_string(t.s));
     }
     family.check();
 }
@@ -146,7 +151,8 @@ TEST(Analytic, SphereOverPlane) {
                          d2 = x * x + z * z + centre.y * centre.y;
             expected += 0.6 * 2 * radius * radius / d2 * centre.y / std::sqrt(d2) / (n * n);
         }
-    for (const char* algorithm : kAlgorithms) {
+    for (const AlgorithmInfo* row : catalog()) {
+        const std::string algorithm(row->name);
         const RegionMeans means =
             testing::replicate(testing::catalog_image(scene, algorithm, 1, 128), scene->frame().crop, kSeeds, 9000);
         EXPECT_LT(means.frame().relative_error(), 0.005) << algorithm;
@@ -168,10 +174,12 @@ TEST(Furnace, SharedScenes) {
         Result<std::unique_ptr<Scene>> built = Scene::build(std::move(imported->description), {16, 16});
         ASSERT_TRUE(built.ok()) << built.status().message();
         const std::shared_ptr<const Scene> scene = std::move(built).value();
-        for (const char* algorithm : kAlgorithms)
+        for (const AlgorithmInfo* row : catalog()) {
+            const std::string algorithm(row->name);
             expect_constant(
                 testing::replicate(testing::catalog_image(scene, algorithm, max_depth, 16), scene->frame().crop, kSeeds, 100), 1,
                 std::string(name) + ", " + algorithm, &family);
+        }
     }
     family.check();
 }

@@ -42,7 +42,7 @@ struct Rendering {
     Estimate mean(size_t part) const { return parts[part].estimate(); }
 };
 
-using RenderGroup = std::function<Result<Partial>(const UnitWork&)>;
+using RenderGroup = std::function<Result<Partial>(const RenderUnit&)>;
 /// Renders groups until `settled` (asked from the 16th group on) or until `seconds` have passed.
 Result<Rendering> render_groups(const Scene& scene, const RenderGroup& render, double seconds,
                                 const std::function<bool(const Rendering&)>& settled);

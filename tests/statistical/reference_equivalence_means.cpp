@@ -26,7 +26,7 @@ Result<Rendering> render_groups(const Scene& scene, const RenderGroup& render, d
     Rendering result;
     const auto start = std::chrono::steady_clock::now();
     for (uint32_t group = 0;; ++group) {
-        const UnitWork work{
+        const RenderUnit work{
             uint64_t(group) * kIterations, kIterations, group, frame.crop, 0, uint64_t(kIterations) * uint64_t(frame.crop.area())};
         auto partial = render(work);
         if (!partial.ok()) return partial.status();
@@ -82,14 +82,16 @@ Result<LoadedScene> load_scene(const Options& options, const std::string& name, 
 }
 
 Result<RenderGroup> catalog_group(const LoadedScene& loaded, const std::string& algorithm, uint64_t seed) {
-    RenderSettings settings;
-    settings.algorithm = algorithm;
-    settings.max_depth = loaded.max_depth;
-    settings.seed = seed;
-    auto created = create_with_tables(loaded.scene, settings, {});
+    const auto parsed = AlgorithmSettings::parse(algorithm, {});
+    if (!parsed.ok()) return parsed.status();
+    auto created = create_with_tables(loaded.scene, {*parsed, seed, loaded.max_depth}, {});
     if (!created.ok()) return created.status();
     const std::shared_ptr<const Renderer> renderer = std::move(created).value();
-    return RenderGroup([renderer](const UnitWork& work) { return renderer->render(work, {}); });
+    const uint64_t light_paths = parsed->light_paths_per_iteration(loaded.scene->frame().crop.area());
+    return RenderGroup([renderer, light_paths](RenderUnit work) {
+        work.light_path_count = work.iteration_count * light_paths;
+        return renderer->render(work, {});
+    });
 }
 
 }  // namespace lightloom::equivalence

@@ -13,10 +13,16 @@ namespace {
 /// bdpt on the paths that light tracing can splat, whose vertex next to the lens is no Dirac one: every technique of the others
 /// has the density zero, and the weights inside the class stay as they are.
 struct SplattablePaths : BdptSelection {
-    double connect_factor(const PathView& view, int s) const {
-        if (view.k >= 2 && view.delta[view.k - 1]) return 0;
-        return BdptSelection::connect_factor(view, s);
-    }
+    struct OnPath : BdptSelection::OnPath {
+        double hit() const { return counts() * BdptSelection::OnPath::hit(); }
+        double next_event() const { return counts() * BdptSelection::OnPath::next_event(); }
+        double connect(int s) const { return counts() * BdptSelection::OnPath::connect(s); }
+        double lens() const { return counts() * BdptSelection::OnPath::lens(); }
+
+      private:
+        double counts() const { return view.k >= 2 && view.delta[view.k - 1] ? 0 : 1; }
+    };
+    OnPath on(const PathView& view) const { return OnPath{BdptSelection::on(view)}; }
 };
 
 /// Whether some vertex scatters and no technique of bdpt but the hit of the emitter (s = 0) can make the path: wherever it is
@@ -32,33 +38,26 @@ bool by_hits_only(const PathView& view) {
 
 /// A walk from the camera that counts those paths alone.
 struct HitsOnly {
-    Rgb sample(SampleContext& context) const {
-        Rgb sum;
+    float weight(const PathView& view, Technique) const { return by_hits_only(view) ? 1 : 0; }
+
+    template <class Contribute>
+    void trace(SampleContext& context, Contribute&& contribute) const {
         PathVertex* z = context.camera_path;
         PathView view;
         CameraSampler sampler(context.seed, context.iteration, context.pixel);
-        const auto add = [&](const Rgb& contribution) {
-            if (!contribution.is_black() && by_hits_only(view)) sum += contribution;
-        };
-        const auto visit = [&](int t) {
-            if (z[t - 1].emitter != kNone) add(emitter_hit(context.scene, z, t, &view));
-        };
+        const auto visit = [&](int t) { contribute_hit<ViewDetail::kFull>(context.scene, z, t, &view, contribute); };
         const auto escape = [&](int t, const WalkRay& ray) {
-            if (t <= context.max_edges) add(environment_hit(context.scene, z, t, ray, &view));
+            if (t <= context.max_edges) contribute_escape<ViewDetail::kFull>(context.scene, z, t, ray, &view, contribute);
         };
         trace_camera_path(context.scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
                           visit, escape);
-        return sum;
     }
 };
 
 template <UnitAlgorithm A>
 RenderGroup group_of(const LoadedScene& loaded, const A& algorithm, uint64_t seed) {
-    RenderSettings settings;
-    settings.seed = seed;
-    settings.max_depth = loaded.max_depth;
-    return [=, scene = loaded.scene](const UnitWork& work) {
-        return render_unit(algorithm, *scene, settings, RouletteRule{}, work, {});
+    return [=, scene = loaded.scene, max_edges = loaded.max_depth + 1](const RenderUnit& work) {
+        return render_unit(algorithm, *scene, seed, max_edges, RouletteRule{}, work, {});
     };
 }
 

@@ -1,5 +1,5 @@
-// The methods to come, as stubs of production pieces: pairing over the whole frame has bdpt's mean,
-// merging has it up to the bias of its kernel.
+// The methods to come, as stubs of production pieces: pairing over the whole frame, next event estimation beside a cache, and
+// algorithms of all shapes have bdpt's mean, merging has it up to the bias of its kernel.
 
 #include <gtest/gtest.h>
 
@@ -42,6 +42,44 @@ TEST(Stubs, PairingOverTheFrameHasTheSameMean) {
                                          std::to_string(pairs) + " pairs", &family));
         }
     }
+    family.check();
+}
+
+/// Points on lights are connected from the cache and chosen afresh: two techniques of one split. A sphere is chosen by its cone in
+/// one of them and by its area in the other.
+TEST(Stubs, NextEventBesideTheCacheHasTheSameMean) {
+    testing::TestFamily family;
+    const TypicalSurvival survival{RouletteRule{}};
+    for (const auto make : {testing::diffuse_box, testing::spherical_lights, testing::environment_lit, testing::delta_lights}) {
+        const auto scene = make();
+        const testing::NextEventBesideCacheSelection selection{{double(scene->frame().crop.area()), 3 / 2.5, survival}};
+        const CachedAlgorithm<testing::NextEventBesideCache> algorithm{{{selection, 3}}, Heuristic::kBalance, 1000};
+        EXPECT_TRUE(testing::compare(
+            reference(scene),
+            testing::replicate(testing::algorithm_image(scene, algorithm, kMaxDepth, 8), scene->frame().crop, kSeeds, 3000),
+            "next event beside the cache", &family));
+    }
+    family.check();
+}
+
+/// The rows of shape_rows.cpp: loops of its own, splats alone, a state for every iteration.
+TEST(Stubs, AlgorithmsOfAllShapesHaveTheSameMean) {
+    testing::TestFamily family;
+    int rows = 0;
+    for (const auto make : {testing::diffuse_box, testing::glass_and_mirror, testing::environment_lit}) {
+        const auto scene = make();
+        const RegionMeans bdpt = reference(scene);
+        for (const AlgorithmInfo* row : catalog()) {
+            if (!row->name.starts_with("stub-")) continue;
+            ++rows;
+            testing::compare(bdpt,
+                             testing::replicate(testing::catalog_image(scene, std::string(row->name), kMaxDepth, 16),
+                                                scene->frame().crop, kSeeds, 4000),
+                             std::string(row->name), &family);
+        }
+    }
+    EXPECT_EQ(rows, 9);
+    EXPECT_GE(family.size(), 50);
     family.check();
 }
 

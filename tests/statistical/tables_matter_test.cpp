@@ -39,10 +39,11 @@ TEST(TablesMatter, OnDoorUniformAndPermutedGammaAreNoisier) {
     const std::shared_ptr<const Scene> scene = std::move(built).value();
 
     // As many training paths as the paper traces light sub-paths.
-    RenderSettings settings{"spcbpt", {{"training-paths", "2000000"}}, 5, max_depth};
+    const RenderSettings settings = testing::settings_of("spcbpt", {{"training-paths", "2000000"}}, 5, max_depth);
     TrainingReport report;
-    const Result<SubspaceTables> learned = make_tables(*scene, settings, {}, &report);
-    ASSERT_TRUE(learned.ok()) << learned.status().message();
+    const auto tables_of_door = make_tables(*scene, settings, {}, &report);
+    ASSERT_TRUE(tables_of_door.ok()) << tables_of_door.status().message();
+    const auto learned = tables_of_door->get<SubspaceTables>();
     SubspaceTables uniform = *learned, permuted = *learned;
     std::fill(uniform.gamma.begin(), uniform.gamma.end(), 1.0f / float(learned->light_count));
     // Neighbours have neighbouring labels: half of all columns further on is far away.
@@ -52,18 +53,8 @@ TEST(TablesMatter, OnDoorUniformAndPermutedGammaAreNoisier) {
 
     const auto render = [&](const SubspaceTables& tables) {
         std::vector<std::vector<double>> images;
-        const auto shared = std::make_shared<const SubspaceTables>(tables);
-        for (int seed = 0; seed < kSeeds; ++seed) {
-            RenderSettings own = settings;
-            own.seed = uint64_t(100 + seed);
-            const auto renderer = Renderer::create(scene, own, shared);
-            if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
-            UnitWork work = testing::whole_frame(*scene, kIterations);
-            work.light_path_count = uint64_t(0.3 * double(work.light_path_count));
-            const Result<Partial> partial = (*renderer)->render(work, {});
-            if (!partial.ok()) throw std::runtime_error(partial.status().message());
-            images.push_back(testing::develop(*partial, scene->frame().crop));
-        }
+        const auto image = testing::table_image(scene, settings, Tables(tables), kIterations);
+        for (int seed = 0; seed < kSeeds; ++seed) images.push_back(image(uint64_t(100 + seed)));
         return images;
     };
     const auto best = render(*learned);

@@ -1,133 +1,156 @@
-// Techniques alone and in any combination: each technique's unweighted image of one path length has
-// the same mean, and so has every subset of techniques whose weights are renormalised, light
-// sub-paths that are cut short, every heuristic and every Russian roulette. All runs are production
-// bdpt with a selection that switches techniques off.
+// Techniques alone and in any combination, for every row of the catalog: each technique's unweighted image of one path length has
+// the same mean, and so has every subset of techniques whose weights are renormalised, light sub-paths that are cut short, every
+// heuristic, correction and Russian roulette. All runs are production renderers with a mask; tables know nothing.
 
 #include <gtest/gtest.h>
 
-#include "tests/support/estimates.h"
+#include "tests/support/row_techniques.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
 namespace {
 
-using testing::MaskedSelection;
 using testing::RegionMeans;
+using testing::RowTechniques;
 using testing::TestFamily;
 
 constexpr int kSeeds = 32;
+/// What the others are compared with: it samples every path of these scenes.
+const char* const kReference = "bdpt";
 
-RegionMeans masked(const std::shared_ptr<const Scene>& scene, const MaskedSelection& selection, int max_depth, uint32_t spp,
-                   uint64_t first_seed) {
-    const BdptAlgorithm<MaskedSelection> algorithm{selection};
-    return testing::replicate(testing::algorithm_image(scene, algorithm, max_depth, spp), scene->frame().crop, kSeeds, first_seed);
+struct Place {
+    const char* name;
+    std::shared_ptr<const Scene> (*make)();
+};
+
+RegionMeans means(const std::shared_ptr<const Scene>& scene, const testing::ImageOfSeed& image, uint64_t first_seed) {
+    return testing::replicate(image, scene->frame().crop, kSeeds, first_seed);
+}
+
+RegionMeans reference(const std::shared_ptr<const Scene>& scene, int max_depth, uint32_t iterations, const TechniqueMask& mask,
+                      uint64_t first_seed) {
+    return means(scene, testing::catalog_image(scene, kReference, max_depth, iterations, {}, mask), first_seed);
+}
+
+/// A row with a mask, and with random tables if it has any. Wide tables are as unbiased, but noisier than a test can use.
+RegionMeans masked(const std::shared_ptr<const Scene>& scene, const AlgorithmInfo& row, const TechniqueMask& mask, int max_depth,
+                   uint32_t iterations, uint64_t first_seed) {
+    testing::RandomTableOptions random;
+    random.light_count = 8, random.eye_count = 6, random.spread = 2, random.max_window = 2;
+    const Tables tables = testing::random_tables_for(row, *scene, 600 + first_seed, random);
+    testing::CacheOptions options;
+    options.paths = 4000;
+    const RenderSettings settings = testing::cache_settings(std::string(row.name), options, max_depth);
+    return means(scene, testing::table_image(scene, settings, tables, iterations, mask), first_seed);
 }
 
 /// One technique per run: its weight is then one, and the image is f / p of that technique.
 TEST(Techniques, EachAloneHasTheSameMean) {
     TestFamily family;
     int pairs = 0, tested = 0;
-    const struct {
-        const char* name;
-        std::shared_ptr<const Scene> (*make)();
-    } scenes[] = {{"apart_with_lamp", testing::apart_with_lamp}, {"apart_with_sky", testing::apart_with_sky}};
-    for (const auto& named : scenes) {
-        const auto scene = named.make();
+    for (const Place& place : {Place{"apart_with_lamp", testing::apart_with_lamp}, {"apart_with_sky", testing::apart_with_sky}}) {
+        const auto scene = place.make();
         for (int k = 2; k <= 4; ++k) {
-            std::vector<RegionMeans> estimates;
-            for (int s = 0; s <= k; ++s) {
-                MaskedSelection only{testing::bdpt_selection(*scene)};
-                only.only_s = s;
-                only.min_k = only.max_k = k;
-                // Hits of small lamps are rare: more samples make their means normal.
-                estimates.push_back(masked(scene, only, k - 1, s == 0 ? 64 : 16, 10000 + 1000 * uint64_t(s)));
-            }
-            for (int s = 0; s <= k; ++s) {
-                if (s == 1) continue;
-                ++pairs;
-                tested += testing::compare(
-                    estimates[1], estimates[size_t(s)],
-                    std::string(named.name) + ", k = " + std::to_string(k) + ", s = 1 and s = " + std::to_string(s), &family);
+            const RegionMeans expected = reference(scene, k - 1, 16, TechniqueMask::length(k), 10000);
+            uint64_t seed = 11000;
+            for (const AlgorithmInfo* row : catalog()) {
+                for (const Technique t : testing::techniques_of(*row, scene).of_length(k)) {
+                    // Hits of small lamps are rare: more samples make their means normal.
+                    const uint32_t iterations = t.kind == TechniqueKind::kHit ? 64 : 16;
+                    ++pairs;
+                    tested +=
+                        testing::compare(expected, masked(scene, *row, testing::mask_of(t, k), k - 1, iterations, seed += 100),
+                                         std::string(place.name) + ", k = " + std::to_string(k) + ", " + std::string(row->name) +
+                                             " by " + std::string(to_string(t.kind)) + " " + std::to_string(t.s),
+                                         &family);
+                }
             }
         }
     }
     // Hits of a small lamp may stay too noisy for a test.
-    EXPECT_GE(tested, pairs * 3 / 4);
+    EXPECT_GE(tested, pairs * 3 / 4) << "of " << pairs;
     family.check();
 }
 
-/// Every subset of {s = 0, s = 1, connections, t = 1} that still samples every path: connections
-/// alone make no path of two edges. (Directly visible light is s = 0 alone and left out.)
+/// Every subset of {hit, next event, connect, lens} that still samples every path. (Directly visible light is a hit alone and left
+/// out.)
 TEST(Techniques, AnySubsetThatSupportsEveryPathHasTheSameMean) {
     TestFamily family;
     int subsets = 0, tested = 0;
-    const struct {
-        const char* name;
-        std::shared_ptr<const Scene> (*make)();
-    } scenes[] = {{"diffuse_box", testing::diffuse_box}, {"environment_lit", testing::environment_lit}};
-    for (const auto& named : scenes) {
-        const auto scene = named.make();
-        MaskedSelection all{testing::bdpt_selection(*scene)};
-        all.min_k = 2;
-        const RegionMeans reference = masked(scene, all, 4, 16, 20000);
-        for (int mask = 1; mask < 15; ++mask) {
-            MaskedSelection subset = all;
-            subset.hits = mask & 1, subset.next_event = mask & 2, subset.connections = mask & 4, subset.light_tracing = mask & 8;
-            if (!subset.hits && !subset.next_event && !subset.light_tracing) continue;
-            ++subsets;
-            tested += testing::compare(
-                reference,
-                masked(scene, subset, 4, subset.next_event || subset.light_tracing ? 16 : 64, 20000 + 1000 * uint64_t(mask)),
-                std::string(named.name) + ", techniques " + std::to_string(mask), &family);
+    for (const Place& place : {Place{"diffuse_box", testing::diffuse_box}, {"environment_lit", testing::environment_lit}}) {
+        const auto scene = place.make();
+        const RegionMeans expected = reference(scene, 4, 16, {.min_k = 2}, 20000);
+        uint64_t seed = 21000;
+        for (const AlgorithmInfo* row : catalog()) {
+            const RowTechniques has = testing::techniques_of(*row, scene);
+            for (int bits = 1; bits < has.bits(); ++bits) {
+                if ((bits & has.bits()) != bits || !has.suffices(bits)) continue;
+                TechniqueMask mask = testing::mask_of_bits(bits);
+                mask.min_k = 2;
+                // Paths of two edges by hits alone are rare.
+                const bool rare = !(bits & 0b1010) && !(bits & 0b100 && has.connect_to_light);
+                ++subsets;
+                tested += testing::compare(
+                    expected, masked(scene, *row, mask, 4, rare ? 64 : 16, seed += 100),
+                    std::string(place.name) + ", " + std::string(row->name) + ", techniques " + std::to_string(bits), &family);
+            }
         }
     }
     EXPECT_GE(tested, subsets * 3 / 4) << "of " << subsets;
     family.check();
 }
 
-/// A cut light sub-path has no techniques beyond: they must leave the denominator, or the image
-/// darkens.
+/// A cut light sub-path has no techniques beyond: they must leave the denominator, or the image darkens.
 TEST(Techniques, LightSubPathsMayBeCutShort) {
     TestFamily family;
-    for (const auto make : {testing::diffuse_box, testing::glass_and_mirror}) {
-        const auto scene = make();
-        const MaskedSelection all{testing::bdpt_selection(*scene)};
-        const RegionMeans reference = masked(scene, all, 7, 32, 40000);
-        for (const int vertices : {2, 3, 5}) {
-            MaskedSelection cut = all;
-            cut.max_light_vertices = vertices;
-            testing::compare(reference, masked(scene, cut, 7, 32, 40000 + 1000 * uint64_t(vertices)),
-                             "light sub-paths of " + std::to_string(vertices) + " vertices", &family);
+    int cuts = 0, tested = 0;
+    for (const Place& place : {Place{"diffuse_box", testing::diffuse_box},
+                               {"environment_lit", testing::environment_lit},
+                               {"glass_and_mirror", testing::glass_and_mirror}}) {
+        const auto scene = place.make();
+        const RegionMeans expected = reference(scene, 7, 32, {}, 40000);
+        uint64_t seed = 41000;
+        for (const AlgorithmInfo* row : catalog()) {
+            const RowTechniques has = testing::techniques_of(*row, scene);
+            if (row->traces != Traces::kBoth || !has.hit) continue;
+            // A cache is shared by all pixels: one path through glass lights a whole block, and means are far from normal.
+            if (row->learning && place.make == testing::glass_and_mirror) continue;
+            for (const int vertices : {1, 2, 3, 5}) {
+                if (vertices == 1 && !has.connect_to_light) continue;  // that is path tracing
+                ++cuts;
+                tested += testing::compare(expected, masked(scene, *row, {.max_light_vertices = vertices}, 7, 32, seed += 100),
+                                           std::string(place.name) + ", " + std::string(row->name) + ", light sub-paths of " +
+                                               std::to_string(vertices) + " vertices",
+                                           &family);
+            }
         }
     }
+    EXPECT_GE(tested, cuts * 3 / 4) << "of " << cuts;
     family.check();
 }
 
-/// Production parameters: Russian roulette and the heuristic change the noise, never the mean.
-TEST(Techniques, RouletteAndHeuristicsKeepTheMean) {
+/// Production parameters: Russian roulette and every choice that a row offers change the noise, never the mean.
+TEST(Techniques, RouletteAndChoicesKeepTheMean) {
     TestFamily family;
     const auto scene = testing::glossy();
-    const Rect& crop = scene->frame().crop;
-    const std::map<std::string, std::string> variants[] = {{{"rr-min", "1"}},
-                                                           {},
-                                                           {{"rr-start", "2"}, {"rr-min", "0.05"}},
-                                                           {{"rr-start", "2"}, {"rr-min", "0.3"}},
-                                                           {{"rr-start", "2"}, {"rr-min", "0.6"}},
-                                                           {{"heuristic", "1"}},
-                                                           {{"heuristic", "2"}}};
-    for (const std::string algorithm : {"path", "light", "bdpt"}) {
+    for (const AlgorithmInfo* row : catalog()) {
+        const std::string name(row->name);
+        std::vector<std::map<std::string, std::string>> variants{{},
+                                                                 {{"rr-min", "1"}},
+                                                                 {{"rr-start", "2"}, {"rr-min", "0.05"}},
+                                                                 {{"rr-start", "2"}, {"rr-min", "0.3"}},
+                                                                 {{"rr-start", "2"}, {"rr-min", "0.6"}}};
+        for (const ParameterInfo& p : row->parameters)
+            for (size_t c = 0; c < p.choices.size(); ++c)
+                if (double(c) != p.default_value) variants.push_back({{std::string(p.name), std::string(p.choices[c])}});
         std::vector<RegionMeans> estimates;
-        std::vector<std::string> names;
         for (const auto& parameters : variants) {
-            if (algorithm == "light" && parameters.contains("heuristic")) continue;
-            std::string name = algorithm;
-            for (const auto& [key, value] : parameters) name += " " + key + "=" + value;
-            names.push_back(name);
-            estimates.push_back(testing::replicate(testing::catalog_image(scene, algorithm, 8, 16, parameters), crop, kSeeds,
-                                                   60000 + 1000 * uint64_t(estimates.size())));
+            std::string what = name;
+            for (const auto& [key, value] : parameters) what += " " + key + "=" + value;
+            estimates.push_back(
+                means(scene, testing::catalog_image(scene, name, 8, 16, parameters), 60000 + 1000 * uint64_t(estimates.size())));
+            if (estimates.size() > 1) testing::compare(estimates.front(), estimates.back(), name + " and " + what, &family);
         }
-        for (size_t i = 1; i < estimates.size(); ++i)
-            testing::compare(estimates[0], estimates[i], names[0] + " and " + names[i], &family);
     }
     family.check();
 }

@@ -20,7 +20,7 @@ namespace lightloom::testing {
 inline std::vector<double> develop(const Partial& partial, const Rect& crop) {
     std::vector<double> image(size_t(crop.area()), 0.0);
     const auto scalar = [](const double* v) { return (v[0] + v[1] + v[2]) / 3; };
-    for (int64_t i = 0; i < partial.tile.area(); ++i) {
+    for (int64_t i = 0; i < partial.tile.area() && partial.samples_per_pixel > 0; ++i) {
         const int x = partial.tile.x0 + int(i % partial.tile.width()), y = partial.tile.y0 + int(i / partial.tile.width());
         image[size_t(crop.index(x, y))] += scalar(&partial.camera[size_t(3 * i)]) / partial.samples_per_pixel;
     }
@@ -47,25 +47,27 @@ inline RenderUnit whole_frame(const Scene& scene, const AlgorithmSettings& algor
     return unit;
 }
 
-/// Training and caches that suit 32 x 32 pixels, for the rows of the catalog that have them; what is set already stays.
-inline std::map<std::string, std::string> with_small_training(const std::string& algorithm,
-                                                              std::map<std::string, std::string> parameters) {
-    const auto row = AlgorithmSettings::parse(algorithm, {});
-    if (!row.ok()) return parameters;
-    for (const auto& [name, value] : {std::pair<const char*, const char*>{"training-paths", "1500"},
-                                      {"cache", "1500"},
-                                      {"light-subspaces", "40"},
-                                      {"eye-subspaces", "30"}})
-        if (row->has(name)) parameters.insert({name, value});
+/// Of these parameters, those that the algorithm has.
+inline std::map<std::string, std::string> those_of(const std::string& algorithm, std::map<std::string, std::string> parameters) {
+    const AlgorithmSettings row = settings_of(algorithm).algorithm;
+    std::erase_if(parameters, [&](const auto& p) { return !row.has(p.first); });
     return parameters;
 }
 
-/// Whether an algorithm samples every path of a scene, of which the algorithms that do are listed, space-separated. Those that
-/// trace both sub-paths sample what `bdpt` samples.
+/// Training and caches that suit 32 x 32 pixels, for the rows of the catalog that have them; what is set already stays.
+inline std::map<std::string, std::string> with_small_training(const std::string& algorithm,
+                                                              std::map<std::string, std::string> parameters) {
+    parameters.merge(
+        those_of(algorithm, {{"training-paths", "1500"}, {"cache", "1500"}, {"light-subspaces", "40"}, {"eye-subspaces", "30"}}));
+    return parameters;
+}
+
+/// Whether an algorithm samples every path of a scene. `list` names, space-separated, algorithms that do; what an algorithm finds
+/// depends on the ends that it traces from, so that those which trace from the same ends as one of the list do as well.
 inline bool complete(const AlgorithmInfo& row, const std::string& list) {
     std::istringstream words(list);
     for (std::string name; words >> name;)
-        if (name == row.name || (name == "bdpt" && row.traces == Traces::kBoth)) return true;
+        if ((*find_algorithm(name))->traces == row.traces) return true;
     return false;
 }
 /// The rows of the catalog for which that holds.
@@ -74,6 +76,16 @@ inline std::vector<std::string> algorithms_of(const std::string& list) {
     for (const AlgorithmInfo* row : catalog())
         if (complete(*row, list)) names.emplace_back(row->name);
     return names;
+}
+
+/// A part of a training set, with a guide or without.
+inline TrainingData trace_training(const Scene& scene, const RenderSettings& settings, const TrainingWork& work,
+                                   const Tables& guide = {}) {
+    const auto generator = TrainingGenerator::create(scene, settings, guide);
+    if (!generator.ok()) throw std::runtime_error(generator.status().message());
+    auto data = generator->trace(work, {});
+    if (!data.ok()) throw std::runtime_error(data.status().message());
+    return *std::move(data);
 }
 
 /// Makes the image of one seed.

@@ -1,8 +1,10 @@
 #pragma once
-// Stand-ins for methods to come, made of production pieces only: they show that pairing over the
-// whole frame and merging need no change of the core. Slow on purpose (every photon is looked at);
-// never part of the product.
+// Stand-ins for methods to come, made of production pieces only: they show that pairing over the whole frame, merging, and next
+// event estimation beside a cache need no change of the core. Slow on purpose (every photon is looked at); never part of the
+// product.
 
+#include "common/transport/lvcbpt.h"
+#include "common/transport/unit_renderer.h"
 #include "tests/support/estimates.h"
 #include "tests/support/path_rebuild.h"
 
@@ -33,6 +35,23 @@ struct PairingStubSelection {
     };
     OnPath on(const PathView& view) const { return OnPath{connections.on(view), pairs}; }
 };
+
+/// A cache of which points on lights are connected as well, and next event estimation beside it: two techniques of one split.
+struct NextEventBesideCacheSelection : UniformSelection {
+    struct OnPath : UniformSelection::OnPath {
+        double next_event() const { return PlainTechniques::next_event(); }
+    };
+    OnPath on(const PathView& view) const { return {UniformSelection::on(view)}; }
+};
+struct NextEventBesideCache : UniformConnections<NextEventBesideCacheSelection> {
+    static constexpr bool kNextEvent = true;
+};
+
+/// What a selection without labels says of single paths.
+template <class Selection>
+std::unique_ptr<PathWeights> weights_of(const Selection& selection, Heuristic heuristic = Heuristic::kBalance) {
+    return std::make_unique<lightloom::detail::PlainWeights<Selection>>(selection, heuristic);
+}
 
 /// Light sub-paths of a whole frame, each as long as it went.
 using LightPool = std::vector<std::vector<PathVertex>>;

@@ -7,17 +7,23 @@
 
 namespace lightloom::testing {
 
-/// Random tables with all parts that the algorithm reads, empty for one that learns nothing. A new part needs a line here.
-inline Tables random_tables_for(const AlgorithmInfo& row, const EmitterSet& emitters, uint64_t seed,
+/// Tables that know nothing, with all parts that the algorithm reads; empty for one that learns nothing. A part that has no random
+/// values here yet is learned from a small training set instead, which no image may depend on either.
+inline Tables random_tables_for(const AlgorithmInfo& row, const Scene& scene, uint64_t seed,
                                 const RandomTableOptions& options = {}) {
     Tables tables;
     if (!row.learning) return tables;
-    for (const TablePart* part : row.learning->parts) {
-        if (part == &SubspaceTables::kPart)
-            tables.set(std::make_shared<const SubspaceTables>(random_tables(emitters, seed, options)));
-        else
-            ADD_FAILURE() << "no random tables of part '" << part->name << "' yet: make them in table_render.h";
+    const std::span<const TablePart* const> parts = row.learning->parts;
+    const bool known = std::all_of(parts.begin(), parts.end(), [](const TablePart* p) { return p == &SubspaceTables::kPart; });
+    if (!known) {
+        const std::string name(row.name);
+        TrainingReport report;
+        auto learned = make_tables(scene, settings_of(name, with_small_training(name, {}), seed), {}, &report);
+        if (!learned.ok()) throw std::runtime_error(learned.status().message());
+        tables = *std::move(learned);
     }
+    if (std::find(parts.begin(), parts.end(), &SubspaceTables::kPart) != parts.end())
+        tables.set(std::make_shared<const SubspaceTables>(random_tables(scene.emitters(), seed, options)));
     return tables;
 }
 
@@ -31,15 +37,13 @@ struct CacheOptions {
 
 /// The same for an algorithm with a light-vertex cache; those that it has no parameter for are left out.
 inline RenderSettings cache_settings(const std::string& algorithm, const CacheOptions& o, int max_depth) {
-    const RenderSettings defaults = settings_of(algorithm);
-    std::map<std::string, std::string> parameters;
-    for (const auto& [name, value] : std::map<std::string, std::string>{{"connections", std::to_string(o.connections)},
-                                                                        {"cache", std::to_string(o.paths)},
-                                                                        {"light-paths", std::to_string(o.light_paths)},
-                                                                        {"ris-aware", o.ris_aware ? "on" : "off"},
-                                                                        {"correlation-aware", o.correlation_aware ? "on" : "off"}})
-        if (defaults.algorithm.has(name)) parameters[name] = value;
-    return settings_of(algorithm, parameters, 0, max_depth);
+    return settings_of(algorithm,
+                       those_of(algorithm, {{"connections", std::to_string(o.connections)},
+                                            {"cache", std::to_string(o.paths)},
+                                            {"light-paths", std::to_string(o.light_paths)},
+                                            {"ris-aware", o.ris_aware ? "on" : "off"},
+                                            {"correlation-aware", o.correlation_aware ? "on" : "off"}}),
+                       0, max_depth);
 }
 
 }  // namespace lightloom::testing

@@ -24,6 +24,10 @@ struct Tally {
         loose += !(std::fabs(deviation) <= (dirac ? 1e-3 : 1e-4));
         gross += !(std::fabs(deviation) <= 1e-2);
     }
+    Tally& operator+=(const Tally& other) {
+        count += other.count, loose += other.loose, gross += other.gross;
+        return *this;
+    }
     void check(const std::string& what, double loose_share = 2e-3) const {
         EXPECT_GE(count, 500u) << what;
         EXPECT_LT(double(loose), loose_share * double(count))

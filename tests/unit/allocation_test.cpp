@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "common/transport/parameters.h"
 #include "tests/support/estimates.h"
 #include "tests/support/test_scenes.h"
 
@@ -36,10 +37,12 @@ void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
 namespace lightloom {
 namespace {
 
-uint64_t allocations_of(const std::shared_ptr<const Scene>& scene, const std::string& algorithm, uint32_t samples_per_pixel) {
-    RenderSettings settings{algorithm, testing::with_small_training(algorithm, {}), 1, 5};
-    Result<std::unique_ptr<Renderer>> renderer = create_with_tables(scene, settings, {});
-    const UnitWork work = testing::whole_frame(*scene, samples_per_pixel);
+uint64_t allocations_of(const std::shared_ptr<const Scene>& scene, const AlgorithmInfo& row, uint32_t iterations) {
+    const std::string name(row.name);
+    const RenderSettings settings = testing::settings_of(name, testing::with_small_training(name, {}), 1);
+    const auto renderer = create_with_tables(scene, settings, {});
+    EXPECT_TRUE(renderer.ok());
+    const RenderUnit work = testing::whole_frame(*scene, settings.algorithm, iterations);
     const uint64_t before = allocations;
     const Result<Partial> partial = (*renderer)->render(work, {});
     EXPECT_TRUE(partial.ok());
@@ -49,14 +52,14 @@ uint64_t allocations_of(const std::shared_ptr<const Scene>& scene, const std::st
 TEST(Allocation, DoesNotGrowWithTheSamples) {
     for (const auto make : {testing::diffuse_box, testing::rough_and_coated, testing::environment_lit}) {
         const auto scene = make();
-        for (const std::string algorithm : {"path", "light", "bdpt", "lvcbpt", "spcbpt"}) {
-            allocations_of(scene, algorithm, 1);  // the thread pool wakes up
-            const uint64_t few = allocations_of(scene, algorithm, 4), many = allocations_of(scene, algorithm, 40);
+        for (const AlgorithmInfo* row : catalog()) {
+            allocations_of(scene, *row, 1);  // the thread pool wakes up
+            const uint64_t few = allocations_of(scene, *row, 4), many = allocations_of(scene, *row, 40);
             const uint64_t more_samples = 36 * uint64_t(scene->frame().crop.area());
-            // Lists of splats double a few times more in each of the chunks; a cache adds chunks of 256 light paths,
-            // whose three lists double from one on. That is all.
-            const bool cached = algorithm == "lvcbpt" || algorithm == "spcbpt";
-            EXPECT_LT(many, few + more_samples / (cached ? 6 : 50)) << algorithm << ": " << few << " allocations, then " << many;
+            // Lists of splats double a few times more in each of the chunks; a cache adds chunks of 256 light paths, whose three
+            // lists double from one on. That is all.
+            const bool cached = testing::settings_of(std::string(row->name)).algorithm.has(kCache.name);
+            EXPECT_LT(many, few + more_samples / (cached ? 6 : 50)) << row->name << ": " << few << " allocations, then " << many;
         }
     }
 }

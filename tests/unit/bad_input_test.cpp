@@ -14,12 +14,15 @@ using Parameters = std::map<std::string, std::string>;
 
 constexpr int kSize = 12, kSeeds = 16, kMaxDepth = 3;
 
-const char* const kAlgorithms[] = {"lvcbpt", "spcbpt"};
+/// Whose mean the others must have: it learns nothing.
+const char* const kReference = "path";
 
+/// Few training paths and small caches, whatever the row.
 Parameters small(const std::string& algorithm) {
-    Parameters p{{"training-paths", "400"}, {"cache", "300"}};
-    if (algorithm == "spcbpt") p.insert({{"light-subspaces", "50"}, {"eye-subspaces", "50"}});
-    return p;
+    return testing::with_small_training(
+        algorithm,
+        testing::those_of(algorithm,
+                          {{"training-paths", "400"}, {"cache", "300"}, {"light-subspaces", "50"}, {"eye-subspaces", "50"}}));
 }
 
 SceneBuilder empty_builder() {
@@ -29,26 +32,30 @@ SceneBuilder empty_builder() {
     return b;
 }
 
-TrainingReport train(const Scene& scene, Parameters parameters, SubspaceTables* tables = nullptr, int max_depth = kMaxDepth) {
+TrainingReport train(const Scene& scene, const Parameters& parameters, Tables* tables = nullptr, int max_depth = kMaxDepth) {
     TrainingReport report;
-    const Result<SubspaceTables> made = make_tables(scene, {"spcbpt", std::move(parameters), 1, max_depth}, {}, &report);
+    const RenderSettings settings = testing::settings_of("spcbpt", parameters, 1, max_depth);
+    const auto made = make_tables(scene, settings, {}, &report);
     EXPECT_TRUE(made.ok()) << made.status().message();
     if (made.ok()) {
         EXPECT_TRUE(made->validate(scene.emitters()).ok());
         const std::string bytes = serialize(*made);
-        EXPECT_TRUE(parse_tables(bytes).ok());
+        EXPECT_TRUE(parse_tables(bytes, settings.algorithm.info().learning->parts).ok());
         if (tables != nullptr) *tables = *made;
     }
     return report;
 }
 
-/// Both methods have the mean of `path`, in the frame and its blocks.
+/// All that learn have the mean of `path`, in the frame and its blocks.
 void expect_means_of_path(const std::shared_ptr<const Scene>& scene, const std::string& what, int max_depth = kMaxDepth,
                           uint32_t samples_per_pixel = 8) {
     testing::TestFamily family;
     const Rect crop = scene->frame().crop;
-    const auto path = testing::replicate(testing::catalog_image(scene, "path", max_depth, samples_per_pixel), crop, kSeeds, 100);
-    for (const std::string algorithm : kAlgorithms) {
+    const auto path =
+        testing::replicate(testing::catalog_image(scene, kReference, max_depth, samples_per_pixel), crop, kSeeds, 100);
+    for (const AlgorithmInfo* row : catalog()) {
+        if (!row->learning) continue;
+        const std::string algorithm(row->name);
         const auto other = testing::replicate(
             testing::catalog_image(scene, algorithm, max_depth, samples_per_pixel, small(algorithm)), crop, kSeeds, 900);
         // Every region, however noisy: the images are checked for what is grossly wrong here, agreement_test measures.
@@ -63,7 +70,8 @@ void expect_means_of_path(const std::shared_ptr<const Scene>& scene, const std::
 }
 
 void expect_black(const std::shared_ptr<const Scene>& scene, const std::string& what) {
-    for (const std::string algorithm : kAlgorithms) {
+    for (const AlgorithmInfo* row : catalog()) {
+        const std::string algorithm(row->name);
         const auto image = testing::catalog_image(scene, algorithm, kMaxDepth, 2, small(algorithm))(1);
         for (const double v : image) EXPECT_EQ(v, 0) << what << ", " << algorithm;
     }
@@ -127,8 +135,7 @@ TEST(BadInput, AllSpecularRoom) {
     b.quad({-0.3f, 1.9f, -0.3f}, {0.6f, 0, 0}, {0, 0, 0.6f}, silver, b.emission({15, 12, 8}));
     const auto scene = b.build();
     expect_means_of_path(scene, "all specular");
-    SubspaceTables tables;
-    EXPECT_FALSE(train(*scene, small("spcbpt"), &tables).note.empty());
+    EXPECT_FALSE(train(*scene, small("spcbpt")).note.empty());
 }
 
 TEST(BadInput, SingleLights) {
@@ -196,19 +203,11 @@ TEST(BadInput, MoreSubspacesThanTheDataSupport) {
     for (const Parameters& parameters : extremes) {
         std::string what;
         for (const auto& [key, value] : parameters) what += key + "=" + value + " ";
-        SubspaceTables tables;
+        Tables tables;
         const TrainingReport report = train(*scene, parameters, &tables);
         const bool modest = parameters.contains("light-subspaces") && parameters.at("light-subspaces") == "1";
         EXPECT_EQ(report.note.empty(), modest) << what << ": " << report.note;
-        const auto shared = std::make_shared<const SubspaceTables>(tables);
-        const auto image = [&](uint64_t seed) {
-            const auto renderer = Renderer::create(scene, {"spcbpt", parameters, seed, kMaxDepth}, shared);
-            EXPECT_TRUE(renderer.ok());
-            const Result<Partial> partial = (*renderer)->render(testing::whole_frame(*scene, 8), {});
-            EXPECT_TRUE(partial.ok());
-            EXPECT_EQ(partial->dropped_count, 0u);
-            return testing::develop(*partial, crop);
-        };
+        const auto image = testing::table_image(scene, testing::settings_of("spcbpt", parameters, 0, kMaxDepth), tables, 8);
         const auto means = testing::replicate(image, crop, kSeeds, 500);
         family.add(testing::welch_p_value(expected.frame(), means.frame()),
                    what + std::to_string(expected.frame().mean) + " and " + std::to_string(means.frame().mean));
@@ -238,9 +237,13 @@ TEST(BadInput, CancelledTraining) {
     std::stop_source stop;
     stop.request_stop();
     TrainingReport report;
-    const Result<SubspaceTables> made = make_tables(*scene, {"spcbpt", small("spcbpt"), 1, 3}, stop.get_token(), &report);
-    ASSERT_FALSE(made.ok());
-    EXPECT_EQ(made.status().code(), StatusCode::kCancelled);
+    for (const AlgorithmInfo* row : catalog()) {
+        if (!row->learning) continue;
+        const std::string name(row->name);
+        const auto made = make_tables(*scene, testing::settings_of(name, small(name), 1, 3), stop.get_token(), &report);
+        ASSERT_FALSE(made.ok()) << name;
+        EXPECT_EQ(made.status().code(), StatusCode::kCancelled) << name;
+    }
 }
 
 }  // namespace

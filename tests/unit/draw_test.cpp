@@ -6,8 +6,8 @@
 #include <cmath>
 #include <map>
 
+#include "common/transport/spcbpt.h"
 #include "tests/support/random_tables.h"
-#include "tests/support/table_render.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
@@ -22,13 +22,14 @@ TEST(Draws, AreScaledByTheirProbability) {
     random.spread = 3;
     const SubspaceTables tables = testing::random_tables(scene->emitters(), 21, random);
     for (const int connections : {1, 3, 7}) {
-        testing::CacheOptions options;
-        options.connections = connections;
-        options.paths = 25;
+        constexpr uint64_t kPaths = 25;
+        const auto prepared = std::make_shared<const PreparedTables>(tables);
         const SpcbptAlgorithm<> algorithm{
-            {testing::subspace_selection(*scene, tables, options), connections}, Heuristic::kBalance, options.paths};
+            {spcbpt_selection(prepared, {.connections = connections}), prepared, connections}, Heuristic::kBalance, kPaths};
         UnitPreparation preparation;
-        const auto state = algorithm.prepare({*scene, 77, 6, {}, testing::frame_with_paths(*scene, 1, 0), {}}, &preparation);
+        RenderUnit work;
+        work.iteration_count = 1, work.tile = scene->frame().crop, work.light_path_count = 1;
+        const auto state = algorithm.prepare({*scene, 77, 6, {}, work, {}}, &preparation, AnyContribute{});
         // By place in the index: the prefix, and what one draw of it adds on average.
         std::map<std::pair<uint32_t, uint32_t>, uint32_t> subspace_of;
         for (uint32_t i = 0; i < tables.light_count; ++i) {
@@ -66,7 +67,7 @@ TEST(Draws, AreScaledByTheirProbability) {
             double worst = 0;
             for (const auto& [place, i] : subspace_of) {
                 const PathVertex* y = state.cache.at(place.first);
-                const double paths = double(options.paths) * tables.window[i];
+                const double paths = double(kPaths) * tables.window[i];
                 const double r = double(scalar_of(y[place.second - 1].alpha));
                 const double all = double(state.index.subspaces[i].scale) * paths * connections;     // R_i
                 if (kDraws * connections * double(tables.column(eye)[i]) * r / all < 400) continue;  // too rarely to be normal

@@ -9,9 +9,8 @@
 #include <set>
 #include <tuple>
 
-#include "common/transport/training.h"
+#include "tests/support/estimates.h"
 #include "tests/support/random_tables.h"
-#include "tests/support/statistics.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
@@ -23,16 +22,23 @@ constexpr int kReplications = 24;
 constexpr uint64_t kSamples = 2000;
 constexpr int kMaxDepth = 5;
 
-RenderSettings settings_of(uint64_t seed) {
-    return {"spcbpt",
-            {{"training-paths", "40000"}, {"light-subspaces", "60"}, {"eye-subspaces", "40"}, {"cache", "500"}},
-            seed,
-            kMaxDepth};
+RenderSettings settings_of(uint64_t seed, const std::map<std::string, std::string>& changes = {}) {
+    auto parameters = changes;
+    parameters.insert({{"training-paths", "40000"}, {"light-subspaces", "60"}, {"eye-subspaces", "40"}, {"cache", "500"}});
+    return testing::settings_of("spcbpt", parameters, seed, kMaxDepth);
+}
+
+/// Tables of a small training set.
+Tables learned(const Scene& scene) {
+    TrainingReport report;
+    auto tables = make_tables(scene, settings_of(7, {{"training-paths", "3000"}}), {}, &report);
+    if (!tables.ok()) throw std::runtime_error(tables.status().message());
+    return *std::move(tables);
 }
 
 /// What a unit estimates, by name.
 std::vector<std::pair<std::string, double>> estimates(const TrainingData& data) {
-    std::vector<std::pair<std::string, double>> out{{"image", 0}, {"energy", 0}, {"loss", 0}};
+    std::vector<std::pair<std::string, double>> out{{"image", 0}, {"energy", 0}, {"loss", 0}, {"loss of path tracing", 0}};
     for (int k = 2; k <= kMaxDepth + 1; ++k) out.emplace_back("length " + std::to_string(k), 0.0);
     const double n = double(data.samples);
     for (const double b : data.block_sum) out[0].second += b / n;
@@ -40,27 +46,26 @@ std::vector<std::pair<std::string, double>> estimates(const TrainingData& data) 
         for (uint32_t i = 0; i < p.vertex_count; ++i)
             out[1].second += double(data.vertices[p.first_vertex + i].density) / double(data.light_samples);
     for (const TrainingPath& p : data.paths) {
-        out[p.vertex_count].second += double(p.estimate) / n;  // k = vertex_count - 1 stands at 3 + k - 2
-        double density = 0;                                    // of a renderer with N Gamma / Q = 1
+        out[p.vertex_count + 1].second += double(p.estimate) / n;  // k = vertex_count - 1 stands at 4 + k - 2
+        double density = double(p.lens);                           // of a renderer with N Gamma / Q = 1
         for (uint32_t i = 0; i < p.vertex_count; ++i) density += double(data.vertices[p.first_vertex + i].density);
         if (density > 0) out[2].second += double(p.square) / density / n;
+        const double from_camera = double(data.vertices[p.first_vertex].density) + double(p.next_event);
+        if (from_camera > 0) out[3].second += double(p.square) / from_camera / n;
     }
     return out;
 }
 
-std::vector<std::vector<double>> replicate(const Scene& scene, const SubspaceTables* guide, uint64_t first_seed,
+std::vector<std::vector<double>> replicate(const Scene& scene, const Tables& guide, uint64_t first_seed,
                                            const std::string& energy_paths = "1") {
     std::vector<std::vector<double>> values;
     for (uint64_t r = 0; r < kReplications; ++r) {
-        RenderSettings settings = settings_of(first_seed + r);
-        settings.parameters["energy-paths"] = energy_paths;
-        const auto generator = TrainingGenerator::create(scene, settings, guide);
-        if (!generator.ok()) throw std::runtime_error(generator.status().message());
-        const Result<TrainingData> data = generator->trace({r * kSamples, kSamples, kReplications * kSamples}, {});
-        if (!data.ok()) throw std::runtime_error(data.status().message());
-        const Status valid = data->validate(scene.emitters().all().size());
+        const RenderSettings settings = settings_of(first_seed + r, {{"energy-paths", energy_paths}});
+        const TrainingData data =
+            testing::trace_training(scene, settings, {r * kSamples, kSamples, kReplications * kSamples}, guide);
+        const Status valid = data.validate(scene.emitters().all().size());
         EXPECT_TRUE(valid.ok()) << valid.message();
-        const auto numbers = estimates(*data);
+        const auto numbers = estimates(data);
         values.resize(numbers.size());
         for (size_t i = 0; i < numbers.size(); ++i) values[i].push_back(numbers[i].second);
     }
@@ -71,18 +76,13 @@ TEST(GuidedTraining, EstimatesWhatThePilotEstimates) {
     testing::TestFamily family;
     for (const testing::NamedScene& named : testing::kScenes) {
         const auto scene = named.make();
-        const auto names = estimates(*trace_training(*scene, settings_of(1), {0, 100, 100}, {}));
-        const auto pilot = replicate(*scene, nullptr, 100);
+        const auto names = estimates(testing::trace_training(*scene, settings_of(1), {0, 100, 100}));
+        const auto pilot = replicate(*scene, {}, 100);
         testing::RandomTableOptions random;
         random.spread = 2, random.max_window = 3;
-        TrainingReport report;
-        RenderSettings small = settings_of(7);
-        small.parameters["training-paths"] = "3000";
-        const Result<SubspaceTables> learned = make_tables(*scene, small, {}, &report);
-        ASSERT_TRUE(learned.ok());
-        const SubspaceTables wrong = testing::random_tables(scene->emitters(), 3, random);
-        for (const auto& [what, guide] : {std::pair{"learned", &*learned}, std::pair{"random", &wrong}}) {
-            const auto guided = replicate(*scene, guide, 1000);
+        const Tables right = learned(*scene), wrong(testing::random_tables(scene->emitters(), 3, random));
+        for (const auto& [what, guide] : {std::pair{"learned", &right}, std::pair{"random", &wrong}}) {
+            const auto guided = replicate(*scene, *guide, 1000);
             for (size_t i = 0; i < names.size(); ++i) {
                 const Sample a(pilot[i]), b(guided[i]);
                 if (a.mean == 0 && b.mean == 0) continue;
@@ -100,13 +100,11 @@ TEST(GuidedTraining, EstimatesWhatThePilotEstimates) {
 TEST(GuidedTraining, EnergyIsMeasuredWithAsManyLightSubPathsAsAskedFor) {
     testing::TestFamily family;
     const auto scene = testing::diffuse_box();
-    const SubspaceTables table = testing::random_tables(scene->emitters(), 3);
-    const Sample plain(replicate(*scene, nullptr, 1)[1]);
+    const Sample plain(replicate(*scene, {}, 1)[1]);
     uint64_t seed = 100;
-    for (const SubspaceTables* guide : {static_cast<const SubspaceTables*>(nullptr), &table}) {
+    for (const Tables& guide : {Tables(), Tables(testing::random_tables(scene->emitters(), 3))}) {
         for (const double ratio : {0.25, 1.0, 2.5}) {
-            RenderSettings settings = settings_of(1);
-            settings.parameters["energy-paths"] = std::to_string(ratio);
+            const RenderSettings settings = settings_of(1, {{"energy-paths", std::to_string(ratio)}});
             const auto generator = TrainingGenerator::create(*scene, settings, guide);
             ASSERT_TRUE(generator.ok());
             uint64_t traced = 0;
@@ -136,14 +134,10 @@ TEST(GuidedTraining, EnergyIsMeasuredWithAsManyLightSubPathsAsAskedFor) {
 TEST(GuidedTraining, InfiniteLightsLieInTheDirectionOfTheirLight) {
     int seen = 0;
     for (const auto& scene : {testing::environment_lit(), testing::delta_lights()}) {
-        const SubspaceTables guide = testing::random_tables(scene->emitters(), 9);
-        for (const SubspaceTables* g : {static_cast<const SubspaceTables*>(nullptr), &guide}) {
-            const auto generator = TrainingGenerator::create(*scene, settings_of(4), g);
-            ASSERT_TRUE(generator.ok());
-            const Result<TrainingData> data = generator->trace({0, 4000, 4000}, {});
-            ASSERT_TRUE(data.ok());
-            for (const TrainingPath& p : data->paths) {
-                const TrainingVertex* v = &data->vertices[p.first_vertex];
+        for (const Tables& guide : {Tables(), Tables(testing::random_tables(scene->emitters(), 9))}) {
+            const TrainingData data = testing::trace_training(*scene, settings_of(4), {0, 4000, 4000}, guide);
+            for (const TrainingPath& p : data.paths) {
+                const TrainingVertex* v = &data.vertices[p.first_vertex];
                 // Light tracing starts from where its path started, which is the right place for it.
                 if (!scene->emitters()[v[0].emitter].is_infinite()) continue;
                 const Vec3 d = normalize(v[0].position - v[1].position);
@@ -161,8 +155,8 @@ TEST(GuidedTraining, UnitsShareNoLightSubPath) {
     const auto scene = testing::diffuse_box();
     testing::RandomTableOptions random;
     random.max_window = 4;
-    const SubspaceTables guide = testing::random_tables(scene->emitters(), 5, random);
-    const auto generator = TrainingGenerator::create(*scene, settings_of(2), &guide);
+    const Tables guide(testing::random_tables(scene->emitters(), 5, random));
+    const auto generator = TrainingGenerator::create(*scene, settings_of(2), guide);
     ASSERT_TRUE(generator.ok());
     std::set<std::tuple<float, float, float>> starts;
     size_t paths = 0;
@@ -180,8 +174,8 @@ TEST(GuidedTraining, UnitsShareNoLightSubPath) {
 
 TEST(GuidedTraining, DoesNotDependOnThreads) {
     const auto scene = testing::glossy();
-    const SubspaceTables guide = testing::random_tables(scene->emitters(), 5);
-    const auto generator = TrainingGenerator::create(*scene, settings_of(2), &guide);
+    const Tables guide(testing::random_tables(scene->emitters(), 5));
+    const auto generator = TrainingGenerator::create(*scene, settings_of(2), guide);
     ASSERT_TRUE(generator.ok());
     std::string one, two;
     for (const auto& [threads, bytes] : {std::pair{1, &one}, std::pair{2, &two}}) {
@@ -194,32 +188,38 @@ TEST(GuidedTraining, DoesNotDependOnThreads) {
 /// A sample's first diffuse vertex finds most of its light; the ones behind it teach other eye subspaces, and keep paths too.
 TEST(GuidedTraining, ASampleKeepsTwoPathsOfEveryLength) {
     const auto scene = testing::diffuse_box();
-    TrainingReport report;
-    RenderSettings small = settings_of(7);
-    small.parameters["training-paths"] = "3000";
-    const Result<SubspaceTables> guide = make_tables(*scene, small, {}, &report);
-    ASSERT_TRUE(guide.ok());
-    const auto generator = TrainingGenerator::create(*scene, settings_of(1), &*guide);
-    ASSERT_TRUE(generator.ok());
     constexpr uint64_t kTraced = 2000;
-    const Result<TrainingData> data = generator->trace({0, kTraced, kTraced}, {});
-    ASSERT_TRUE(data.ok());
-    EXPECT_GT(data->paths.size(), (size_t(kTrainingLengths) + 1) * kTraced);  // more than one of every length would be
-    EXPECT_LE(data->paths.size(), (kTrainingPathsPerSample + 1) * kTraced);
+    const TrainingData data = testing::trace_training(*scene, settings_of(1), {0, kTraced, kTraced}, learned(*scene));
+    EXPECT_GT(data.paths.size(), (size_t(kTrainingLengths) + 1) * kTraced);  // more than one of every length would be
+    EXPECT_LE(data.paths.size(), (kTrainingPathsPerSample + 1) * kTraced);
 }
 
 TEST(GuidedTraining, TwoRoundsAreMadeOfWholeUnits) {
-    RenderSettings settings = settings_of(1);
-    const auto pilot = [&](const char* samples, const char* share) {
-        settings.parameters["training-paths"] = samples;
-        settings.parameters["pilot"] = share;
-        return TransportParameters::read(settings)->pilot_samples;
+    const auto pilot = [&](uint64_t samples, double share) {
+        const auto settings = settings_of(1).algorithm.with("training-paths", double(samples)).with("pilot", share);
+        const LearningPlan plan = settings.info().learning->plan(settings);
+        EXPECT_EQ(plan.samples, samples);
+        EXPECT_EQ(plan.first_sample(plan.rounds.size()), samples);
+        for (size_t round = 0; round < plan.rounds.size(); ++round) EXPECT_EQ(plan.rounds[round].guided, round > 0);
+        return plan.rounds.size() < 2 ? 0 : plan.rounds[0].samples;
     };
-    EXPECT_EQ(pilot("500000", "0"), 0u);
-    EXPECT_EQ(pilot("500000", "0.2"), 6 * kTrainingUnitSamples);
-    EXPECT_EQ(pilot("500000", "1"), 29 * kTrainingUnitSamples);  // something is left for the second round
-    EXPECT_EQ(pilot("40000", "0.001"), kTrainingUnitSamples);
-    EXPECT_EQ(pilot("20000", "0.2"), 0u);  // too small for two
+    EXPECT_EQ(pilot(500000, 0), 0u);
+    EXPECT_EQ(pilot(500000, 0.2), 6 * kTrainingUnitSamples);
+    EXPECT_EQ(pilot(500000, 1), 29 * kTrainingUnitSamples);  // something is left for the second round
+    EXPECT_EQ(pilot(40000, 0.001), kTrainingUnitSamples);
+    EXPECT_EQ(pilot(20000, 0.2), 0u);  // too small for two
+}
+
+/// Only tables with subspaces can guide, and only algorithms with tables learn.
+TEST(GuidedTraining, RefusesWhatCannotGuideOrLearn) {
+    const auto scene = testing::diffuse_box(), other = testing::delta_lights();
+    const Tables foreign(testing::random_tables(other->emitters(), 3));
+    EXPECT_EQ(TrainingGenerator::create(*scene, settings_of(1), foreign).status().code(), StatusCode::kDataLoss);
+    for (const AlgorithmInfo* row : catalog()) {
+        const RenderSettings settings = testing::settings_of(std::string(row->name));
+        const Status status = TrainingGenerator::create(*scene, settings).status();
+        EXPECT_EQ(status.code(), row->learning ? StatusCode::kOk : StatusCode::kFailedPrecondition) << row->name;
+    }
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include <filesystem>
 
 #include "common/import/import.h"
-#include "common/transport/renderer.h"
+#include "tests/support/estimates.h"
 
 namespace lightloom {
 namespace {
@@ -44,9 +44,11 @@ TEST(LargeScene, CoplanarDuplicatesRenderTheSameBytesHoweverTheStructureWasBuilt
         tbb::task_arena(threads).execute([&] {
             auto scene = Scene::build(imported->description, {.width = 96, .height = 54});
             ASSERT_TRUE(scene.ok()) << scene.status().message();
-            const auto renderer = Renderer::create(std::move(scene).value(), {"bdpt", {}, 3, 8});
+            const RenderSettings settings = testing::settings_of("bdpt", {}, 3, 8);
+            const RenderUnit unit = testing::whole_frame(**scene, settings.algorithm, 4);
+            const auto renderer = Renderer::create(std::move(scene).value(), settings);
             ASSERT_TRUE(renderer.ok());
-            auto partial = (*renderer)->render({0, 4, 0, {0, 0, 96, 54}, 0, 4 * 96 * 54}, {});
+            auto partial = (*renderer)->render(unit, {});
             ASSERT_TRUE(partial.ok());
             if (threads == 1) {
                 first = std::move(partial).value();

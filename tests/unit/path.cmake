@@ -3,8 +3,13 @@ lightloom_test(camera_test LINK lt_scene)
 lightloom_test(emitter_test LINK lt_scene)
 lightloom_test(weights_test LINK lt_transport)
 lightloom_test(transport_test LINK lt_transport)
+lightloom_test(tiles_test LINK lt_transport)
 lightloom_test(allocation_test LINK lt_transport)
 lightloom_test(large_scene_test LINK lt_transport lt_import)
+target_sources(weights_test PRIVATE ${LIGHTLOOM_DUMMY_ALGORITHM})
+target_sources(transport_test PRIVATE ${LIGHTLOOM_DUMMY_ALGORITHM} ${LIGHTLOOM_STUB_ROWS})
+target_sources(tiles_test PRIVATE ${LIGHTLOOM_DUMMY_ALGORITHM} ${LIGHTLOOM_STUB_ROWS})
+target_sources(allocation_test PRIVATE ${LIGHTLOOM_DUMMY_ALGORITHM})
 
 # Three looks at the object files. The lists of libraries come from what links what: none can be forgotten.
 lightloom_light_libraries(light_libraries)

@@ -1,14 +1,14 @@
-// The weight suites of the methods with a light-vertex cache: whatever the tables hold, the weights of all techniques sum to one
-// on the very same path, and every technique describes that path, its labels and the throughput of its light prefixes alike.
-// Everything is rebuilt through production code.
+// What the weights of spcbpt read: every technique describes the very same path, its labels and the throughput of its light
+// prefixes alike, and names of subspaces mean nothing. Everything is rebuilt through production code. That the weights sum to one
+// is weights_test, for every row of the catalog.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "common/transport/lvcbpt.h"
 #include "common/transport/spcbpt.h"
+#include "common/transport/unit_renderer.h"
 #include "tests/support/path_generator.h"
 #include "tests/support/random_tables.h"
 #include "tests/support/tally.h"
@@ -33,14 +33,15 @@ bool can_be_hit(const Scene& scene) {
     return std::any_of(emitters.begin(), emitters.end(), [](const Emitter& e) { return !e.is_delta(); });
 }
 
-SubspaceSelection selection_of(const Scene& scene, SubspaceTables tables, double connections, double cache_paths) {
-    SubspaceSelection s;
-    s.prepared = std::make_shared<const PreparedTables>(std::move(tables));
-    s.light_paths_per_iteration = 0.7 * double(scene.frame().crop.area());
-    s.connections = connections;
-    s.cache_paths = cache_paths;
-    s.survival = TypicalSurvival(RouletteRule{});
-    return s;
+using SpcbptWeights = detail::CachedWeights<SubspaceConnections<>>;
+
+SpcbptWeights weights_of(const Scene& scene, SubspaceTables tables, int connections) {
+    const auto prepared = std::make_shared<const PreparedTables>(std::move(tables));
+    const SpcbptSelection selection =
+        spcbpt_selection(prepared, {.light_paths_per_iteration = 0.7 * double(scene.frame().crop.area()),
+                                    .connections = connections,
+                                    .roulette = RouletteRule{}});
+    return {SubspaceConnections<>{selection, prepared, connections}, Heuristic::kBalance};
 }
 
 TEST(TypicalSurvival, CountsTheEventsThatASubPathWentThrough) {
@@ -60,53 +61,6 @@ TEST(TypicalSurvival, CountsTheEventsThatASubPathWentThrough) {
 }
 
 class SubspaceWeights : public ::testing::TestWithParam<testing::NamedScene> {};
-
-/// As the technique itself filled its view in while it was traced (with Russian roulette), and as all others would.
-TEST_P(SubspaceWeights, SumToOneWhateverTheTablesHold) {
-    const auto scene = GetParam().make();
-    const UniformSelection uniform{double(scene->frame().crop.area()), 0.37, TypicalSurvival(RouletteRule{})};
-    Tally lvc, balance, power, aware, correlated, traced;
-    std::vector<int> made(kEdges + 1, 0);
-    for (uint64_t seed = 1; seed <= 3; ++seed) {
-        const SubspaceSelection blind = selection_of(*scene, random_tables(scene->emitters(), seed), double(seed), 0);
-        SubspaceSelection knowing = blind;
-        knowing.cache_paths = 50;
-        SubspaceSelection sharing = blind;
-        sharing.correlation_aware = true;
-        const SubspaceLabeller labeller{blind.prepared->tables, scene->emitters()};
-        testing::for_each_path(
-            *scene, can_be_hit(*scene) ? 4000 : 8000, kEdges, 40 + seed,
-            [&](const FullPath& path, int own, const PathView& view, const Rgb&) {
-                ++made[size_t(own)];
-                const int k = path.k();
-                if (k < 2) return;
-                double sums[6] = {};
-                for (int s = 0; s <= k; ++s) {
-                    const auto r = rebuild(*scene, path, s, &labeller);
-                    if (!r) continue;
-                    const Technique technique{TechniqueKind::kConnect, s};
-                    sums[0] += mis_weight(r->view, technique, uniform);
-                    const double w = mis_weight(r->view, technique, blind);
-                    sums[1] += w;
-                    sums[2] += mis_weight(r->view, technique, blind, Heuristic::kPower);
-                    sums[3] += mis_weight(r->view, technique, knowing);
-                    sums[4] += mis_weight(r->view, technique, sharing);
-                    sums[5] += s == own ? mis_weight(view, technique, blind) : w;
-                }
-                Tally* tallies[] = {&lvc, &balance, &power, &aware, &correlated, &traced};
-                for (int i = 0; i < 6; ++i) tallies[i]->add(sums[i] - 1, path);
-            },
-            &labeller);
-    }
-    lvc.check("lvcbpt");
-    balance.check("spcbpt balance");
-    power.check("spcbpt power");
-    aware.check("spcbpt, ris_aware");
-    correlated.check("spcbpt, correlation_aware");
-    traced.check("spcbpt, own view as traced", kLooseTraced);
-    for (int s = can_be_hit(*scene) ? 0 : 1; s <= 4; ++s)
-        EXPECT_GT(made[size_t(s)], 20) << "technique s = " << s << " was hardly exercised";
-}
 
 /// c_s lies in [1/n, 1], and both ends occur: a camera sub-path that had to be this one, and one that is a rare choice of many.
 TEST(CorrelationFactor, LiesBetweenOneOverTheConnectionsAndOne) {
@@ -139,17 +93,17 @@ TEST_P(SubspaceWeights, EveryTechniqueSeesTheSameLabelsAndThroughput) {
     const auto scene = GetParam().make();
     testing::RandomTableOptions options;
     options.light_count = options.eye_count = 200, options.source_cells = 60, options.tree_leaves = 300;
-    const SubspaceTables tables = random_tables(scene->emitters(), 5, options);
-    const SubspaceLabeller labeller{tables, scene->emitters()};
+    const SpcbptWeights weights = weights_of(*scene, random_tables(scene->emitters(), 5, options), 3);
     Tally throughput, labels;
     testing::for_each_path(
         *scene, can_be_hit(*scene) ? 4000 : 8000, kEdges, 51,
-        [&](const FullPath& path, int, const PathView& traced, const Rgb&) {
+        [&](const FullPath& path, Technique, const PathView& traced, const Rgb&) {
             const int k = path.k();
             if (k < 2) return;
-            for (int s = 0; s <= k; ++s) {
-                const auto other = rebuild(*scene, path, s, &labeller);
-                if (!other) continue;
+            testing::for_each_technique(k, [&](Technique t) {
+                if (t.kind == TechniqueKind::kMerge) return;  // has no labels yet
+                const auto other = rebuild(*scene, path, t, &weights);
+                if (!other) return;
                 // What a connection of s' light vertices reads, where it is possible and light tracing reaches it.
                 double reached = 1;
                 for (int c = 1; c <= k - 1; ++c) {
@@ -161,9 +115,9 @@ TEST_P(SubspaceWeights, EveryTechniqueSeesTheSameLabelsAndThroughput) {
                     labels.add(other->view.eye_label[c] == traced.eye_label[c] ? 0 : 1, path);
                     throughput.add(other->view.light_throughput[c] / traced.light_throughput[c] - 1, path);
                 }
-            }
+            });
         },
-        &labeller);
+        &weights);
     throughput.check("throughput of light prefixes", kLooseTraced);
     // A direction is recomputed to the last bits only: a split between its two values is as likely as that.
     EXPECT_GT(labels.count, 500u);
@@ -197,6 +151,19 @@ TEST(Walk, DoesNotFollowDirectionsOfZeroDensity) {
         }
 }
 
+/// Calls visit(technique, view of a, view of b) for every technique of spcbpt that can make the path.
+template <class Visit>
+void each_weighted(const Scene& scene, const FullPath& path, Technique own, const SpcbptWeights& a, const SpcbptWeights& b,
+                   Visit&& visit) {
+    if (own.kind == TechniqueKind::kNextEvent) return;  // the same point as from a light sub-path
+    testing::for_each_technique(path.k(), [&](Technique t) {
+        if (t.kind == TechniqueKind::kMerge || t.kind == TechniqueKind::kNextEvent) return;
+        const auto ra = rebuild(scene, path, t, &a), rb = rebuild(scene, path, t, &b);
+        ASSERT_EQ(ra.has_value(), rb.has_value());
+        if (ra) visit(t, ra->view, rb->view);
+    });
+}
+
 /// Numbers of subspaces are names: the weights do not know them.
 TEST(Labels, PermutedWithTheirRowsKeepEveryWeight) {
     const auto scene = testing::glossy();
@@ -227,22 +194,18 @@ TEST(Labels, PermutedWithTheirRowsKeepEveryWeight) {
         for (uint32_t j = 0; j < m; ++j) other.gamma[size_t(renamed_eye(j)) * n + renamed(i)] = tables.column(j)[i];
     }
     ASSERT_TRUE(other.validate(scene->emitters()).ok());
-    const SubspaceSelection a = selection_of(*scene, tables, 3, 0), b = selection_of(*scene, other, 3, 0);
-    const SubspaceLabeller labeller_a{a.prepared->tables, scene->emitters()}, labeller_b{b.prepared->tables, scene->emitters()};
+    const SpcbptWeights a = weights_of(*scene, tables, 3), b = weights_of(*scene, other, 3);
     uint64_t compared = 0;
     testing::for_each_path(
         *scene, 500, 6, 61,
-        [&](const FullPath& path, int, const PathView&, const Rgb&) {
-            for (int s = 0; s <= path.k() && path.k() >= 2; ++s) {
-                const auto ra = rebuild(*scene, path, s, &labeller_a), rb = rebuild(*scene, path, s, &labeller_b);
-                ASSERT_EQ(ra.has_value(), rb.has_value());
-                if (!ra) continue;
-                EXPECT_EQ(mis_weight(ra->view, {TechniqueKind::kConnect, s}, a),
-                          mis_weight(rb->view, {TechniqueKind::kConnect, s}, b));
+        [&](const FullPath& path, Technique own, const PathView&, const Rgb&) {
+            if (path.k() < 2) return;
+            each_weighted(*scene, path, own, a, b, [&](Technique t, const PathView& va, const PathView& vb) {
+                EXPECT_EQ(a.weight(va, t), b.weight(vb, t));
                 ++compared;
-            }
+            });
         },
-        &labeller_a);
+        &a);
     EXPECT_GT(compared, 2000u);
 }
 
@@ -274,22 +237,20 @@ TEST(Labels, SplitSubspacesWithSharedGammaKeepEveryWeight) {
         fine.gamma.push_back(tables.column(j)[split] * share);
     }
     ASSERT_TRUE(fine.validate(scene->emitters()).ok());
-    const SubspaceSelection a = selection_of(*scene, tables, 2, 0), b = selection_of(*scene, fine, 2, 0);
-    const SubspaceLabeller labeller_a{a.prepared->tables, scene->emitters()}, labeller_b{b.prepared->tables, scene->emitters()};
+    const SpcbptWeights a = weights_of(*scene, tables, 2), b = weights_of(*scene, fine, 2);
     uint64_t compared = 0, in_new = 0;
     testing::for_each_path(
         *scene, 500, 6, 62,
-        [&](const FullPath& path, int, const PathView&, const Rgb&) {
-            for (int s = 0; s <= path.k() && path.k() >= 2; ++s) {
-                const auto ra = rebuild(*scene, path, s, &labeller_a), rb = rebuild(*scene, path, s, &labeller_b);
-                if (!ra || !rb) continue;
-                const double wa = mis_weight(ra->view, {TechniqueKind::kConnect, s}, a);
-                EXPECT_NEAR(mis_weight(rb->view, {TechniqueKind::kConnect, s}, b), wa, 1e-6 * wa);
+        [&](const FullPath& path, Technique own, const PathView&, const Rgb&) {
+            if (path.k() < 2) return;
+            each_weighted(*scene, path, own, a, b, [&](Technique t, const PathView& va, const PathView& vb) {
+                const double weight = a.weight(va, t);
+                EXPECT_NEAR(b.weight(vb, t), weight, 1e-6 * weight);
                 ++compared;
-                for (int c = 2; c < path.k(); ++c) in_new += rb->view.light_label[c] == n;
-            }
+                for (int c = 2; c < path.k(); ++c) in_new += vb.light_label[c] == n;
+            });
         },
-        &labeller_b);
+        &b);
     EXPECT_GT(compared, 2000u);
     EXPECT_GT(in_new, 50u);
 }

@@ -9,9 +9,8 @@
 #include <limits>
 #include <thread>
 
-#include "common/tables/train_classifier.h"
 #include "common/transport/training.h"
-#include "tests/support/random_tables.h"
+#include "tests/support/table_render.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
@@ -20,29 +19,31 @@ namespace {
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
 
 RenderSettings small_settings(uint64_t seed = 3) {
-    return {"spcbpt",
-            {{"training-paths", "3000"}, {"light-subspaces", "60"}, {"eye-subspaces", "40"}, {"cache", "500"}, {"windows", "4"}},
-            seed,
-            5};
+    return testing::settings_of(
+        "spcbpt",
+        {{"training-paths", "3000"}, {"light-subspaces", "60"}, {"eye-subspaces", "40"}, {"cache", "500"}, {"windows", "4"}}, seed);
+}
+
+/// What spcbpt learns of a scene.
+SubspaceTables learned(const Scene& scene, uint64_t seed = 3) {
+    TrainingReport report;
+    const auto tables = make_tables(scene, small_settings(seed), {}, &report);
+    if (!tables.ok()) throw std::runtime_error(tables.status().message());
+    return *tables->get<SubspaceTables>();
 }
 
 TrainingData small_data(const std::shared_ptr<const Scene>& scene, uint64_t samples = 600) {
-    Result<TrainingData> data = trace_training(*scene, small_settings(), {0, samples, samples}, {});
-    EXPECT_TRUE(data.ok());
-    return *std::move(data);
+    return testing::trace_training(*scene, small_settings(), {0, samples, samples});
 }
 
 TEST(Tables, SerializedAndParsedAreTheSame) {
     for (const testing::NamedScene& named : testing::kScenes) {
         const auto scene = named.make();
         const SubspaceTables random = testing::random_tables(scene->emitters(), 1);
-        TrainingReport report;
-        const Result<SubspaceTables> trained = make_tables(*scene, small_settings(), {}, &report);
-        ASSERT_TRUE(trained.ok()) << named.name << ": " << trained.status().message();
-        for (const SubspaceTables& tables : {random, *trained, trivial_tables(scene->emitters())}) {
+        for (const SubspaceTables& tables : {random, learned(*scene), trivial_tables(scene->emitters())}) {
             ASSERT_TRUE(tables.validate(scene->emitters()).ok()) << named.name;
             const std::string bytes = serialize(tables);
-            const Result<SubspaceTables> again = parse_tables(bytes);
+            const Result<SubspaceTables> again = parse_subspace_tables(bytes);
             ASSERT_TRUE(again.ok()) << again.status().message();
             EXPECT_TRUE(again->validate(scene->emitters()).ok());
             EXPECT_EQ(serialize(*again), bytes);
@@ -65,7 +66,7 @@ TEST(Tables, EveryDamagedByteIsDetected) {
         for (const char flip : {char(0x01), char(0x20), char(0x80)}) {
             std::string damaged = bytes;
             damaged[i] = char(damaged[i] ^ flip);
-            const Result<SubspaceTables> parsed = parse_tables(damaged);
+            const Result<SubspaceTables> parsed = parse_subspace_tables(damaged);
             EXPECT_FALSE(parsed.ok()) << "byte " << i << " flipped by " << int(flip);
             if (!parsed.ok()) {
                 EXPECT_EQ(parsed.status().code(), StatusCode::kDataLoss);
@@ -73,9 +74,82 @@ TEST(Tables, EveryDamagedByteIsDetected) {
         }
     }
     for (size_t size = 0; size < bytes.size(); ++size)
-        EXPECT_FALSE(parse_tables(std::string_view(bytes).substr(0, size)).ok()) << "cut to " << size << " bytes";
-    EXPECT_FALSE(parse_tables(bytes + "x").ok());
-    EXPECT_FALSE(parse_tables(bytes + bytes.substr(bytes.find('\n') + 1)).ok()) << "every table twice";
+        EXPECT_FALSE(parse_subspace_tables(std::string_view(bytes).substr(0, size)).ok()) << "cut to " << size << " bytes";
+    EXPECT_FALSE(parse_subspace_tables(bytes + "x").ok());
+    EXPECT_FALSE(parse_subspace_tables(bytes + bytes.substr(bytes.find('\n') + 1)).ok()) << "every table twice";
+}
+
+/// A part of a container, for its own sake.
+template <int kNumber>
+struct Numbered {
+    int value = 0;
+
+    static const TablePart kPart;
+};
+template <int kNumber>
+const TablePart Numbered<kNumber>::kPart{
+    kNumber == 0   ? "a-part"
+    : kNumber == 1 ? "b-part"
+                   : "c-part",
+    [](const void* part) { return std::string(1, char(static_cast<const Numbered*>(part)->value)); },
+    [](std::string_view bytes) -> Result<std::shared_ptr<const void>> {
+        if (bytes.size() != 1) return data_loss("not one byte");
+        return std::shared_ptr<const void>(std::make_shared<const Numbered>(Numbered{int(bytes[0])}));
+    },
+    [](const void* part, const EmitterSet&) {
+        return static_cast<const Numbered*>(part)->value == 66 ? data_loss("the value is 66") : Status();
+    }};
+
+TEST(Tables, AreNamedPartsThatKnowNothingOfOneAnother) {
+    using A = Numbered<0>;
+    using B = Numbered<1>;
+    using C = Numbered<2>;
+    const TablePart* const both[] = {&A::kPart, &B::kPart};
+    const TablePart* const others[] = {&A::kPart, &C::kPart};
+    const auto scene = testing::diffuse_box();
+    Tables tables;
+    EXPECT_TRUE(tables.empty());
+    EXPECT_TRUE(tables.consist_of({}));
+    tables.set(std::make_shared<const B>(B{7}));
+    EXPECT_FALSE(tables.consist_of(both));
+    tables.set(std::make_shared<const A>(A{5}));
+    EXPECT_TRUE(tables.consist_of(both));
+    EXPECT_FALSE(tables.consist_of(others));
+    EXPECT_FALSE(tables.consist_of(std::span(both).first(1)));
+    EXPECT_EQ(tables.get<A>()->value, 5);
+    EXPECT_EQ(tables.get<C>(), nullptr);
+    EXPECT_TRUE(tables.validate(scene->emitters()).ok());
+
+    // The bytes do not know in which order parts came, and every part comes back.
+    Tables turned(A{5});
+    turned.set(std::make_shared<const B>(B{7}));
+    const std::string bytes = serialize(tables);
+    EXPECT_EQ(serialize(turned), bytes);
+    const auto again = parse_tables(bytes, both);
+    ASSERT_TRUE(again.ok()) << again.status().message();
+    EXPECT_EQ(again->get<A>()->value, 5);
+    EXPECT_EQ(again->get<B>()->value, 7);
+    EXPECT_EQ(serialize(*again), bytes);
+
+    const Status unknown = parse_tables(bytes, others).status();
+    EXPECT_EQ(unknown.code(), StatusCode::kFailedPrecondition);
+    EXPECT_NE(unknown.message().find("b-part"), std::string::npos) << unknown.message();
+    for (size_t i = 0; i < bytes.size(); ++i) {
+        std::string damaged = bytes;
+        damaged[i] = char(damaged[i] ^ 0x01);
+        const Status refused = parse_tables(damaged, both).status();
+        // A byte of a name makes it another part's name, which is nobody's here.
+        EXPECT_TRUE(refused.code() == StatusCode::kDataLoss || refused.code() == StatusCode::kFailedPrecondition) << "byte " << i;
+        if (i == 0) continue;
+        const auto cut = parse_tables(std::string_view(bytes).substr(0, i), both);
+        EXPECT_TRUE(!cut.ok() || !cut->consist_of(both)) << "cut to " << i << " bytes";
+    }
+
+    // A part replaces one of its type, and what is wrong with one is wrong with all.
+    turned.set(std::make_shared<const A>(A{66}));
+    EXPECT_EQ(turned.get<A>()->value, 66);
+    EXPECT_EQ(tables.get<A>()->value, 5);
+    EXPECT_EQ(turned.validate(scene->emitters()).code(), StatusCode::kDataLoss);
 }
 
 TEST(Tables, EveryBadTableIsRefusedByName) {
@@ -146,7 +220,7 @@ TEST(Tables, EveryBadTableIsRefusedByName) {
         EXPECT_EQ(status.code(), StatusCode::kDataLoss) << name;
         EXPECT_FALSE(status.message().empty()) << name;
         // And nothing renders from them.
-        EXPECT_FALSE(Renderer::create(scene, {"spcbpt", {}, 1, 4}, std::make_shared<const SubspaceTables>(bad)).ok()) << name;
+        EXPECT_EQ(Renderer::create(scene, small_settings(), Tables(bad)).status().code(), StatusCode::kDataLoss) << name;
     }
 }
 
@@ -170,9 +244,8 @@ TEST(TrainingData, PartsJoinToTheWhole) {
     const TrainingData whole = small_data(scene, total);
     TrainingData joined;
     for (uint64_t first = 0; first < total; first += 512) {
-        const Result<TrainingData> part = trace_training(*scene, small_settings(), {first, 512, total}, {});
-        ASSERT_TRUE(part.ok());
-        ASSERT_TRUE(joined.append(*part).ok());
+        const TrainingData part = testing::trace_training(*scene, small_settings(), {first, 512, total});
+        ASSERT_TRUE(joined.append(part).ok());
     }
     EXPECT_EQ(serialize(joined), serialize(whole));
     const auto other_frame = testing::environment_lit();
@@ -338,12 +411,7 @@ TEST(Training, IsDeterministicOnAnyNumberOfThreads) {
         const auto scene = make();
         const auto on_threads = [&](int threads, uint64_t seed) {
             std::string bytes;
-            tbb::task_arena(threads).execute([&] {
-                TrainingReport report;
-                const Result<SubspaceTables> tables = make_tables(*scene, small_settings(seed), {}, &report);
-                ASSERT_TRUE(tables.ok());
-                bytes = serialize(*tables);
-            });
+            tbb::task_arena(threads).execute([&] { bytes = serialize(learned(*scene, seed)); });
             return bytes;
         };
         const std::string alone = on_threads(1, 3);
@@ -351,138 +419,6 @@ TEST(Training, IsDeterministicOnAnyNumberOfThreads) {
         EXPECT_EQ(on_threads(4, 3), alone);
         EXPECT_NE(on_threads(1, 4), alone);
     }
-}
-
-std::vector<WeightedEnd> random_ends(int count, uint64_t seed, bool on_a_line) {
-    Rng rng({seed, Stage::kTraining, 0, 0});
-    std::vector<WeightedEnd> ends;
-    for (int i = 0; i < count; ++i) {
-        WeightedEnd e;
-        const Vec3 p{rng.uniform(), rng.uniform(), rng.uniform()};
-        e.end.position = on_a_line ? Vec3{4 * p.x, 1, 2} : p;
-        e.end.normal = on_a_line || rng.uniform() < 0.5f ? Vec3{0, 1, 0} : Vec3{0, -1, 0};
-        const Vec2 u = rng.uniform2();
-        e.end.direction = on_a_line ? Vec3{0, 1, 0} : face_forward(sample_sphere(u), e.end.normal);
-        e.weight = 0.1f + rng.uniform();
-        ends.push_back(e);
-    }
-    return ends;
-}
-
-TEST(Classifier, LabelsStayBelowTheirCountAndItsSizeIsBounded) {
-    const auto ends = random_ends(4000, 1, false);
-    for (const uint32_t subspaces : {1u, 2u, 3u, 17u, 256u, 5000u}) {
-        ClassifierOptions options;
-        options.subspaces = subspaces, options.first_label = 7, options.seed = 2;
-        const SubspaceTree tree = train_classifier(ends, options);
-        EXPECT_TRUE(tree.validate(7 + subspaces).ok()) << subspaces;
-        EXPECT_LE(tree.nodes().size(), size_t(64 * subspaces + 1));
-        std::vector<bool> used(subspaces, false);
-        for (const WeightedEnd& e : ends) {
-            const uint32_t label = tree.label(e.end);
-            ASSERT_GE(label, 7u);
-            ASSERT_LT(label, 7 + subspaces);
-            used[label - 7] = true;
-        }
-        if (subspaces <= 256) {
-            EXPECT_GT(std::count(used.begin(), used.end(), true), 8 * int(subspaces) / 10);
-        }
-        // The same again.
-        const SubspaceTree again = train_classifier(ends, options);
-        ASSERT_EQ(again.nodes().size(), tree.nodes().size());
-        EXPECT_EQ(std::memcmp(again.nodes().data(), tree.nodes().data(), tree.nodes().size() * sizeof(SubspaceTree::Node)), 0);
-    }
-}
-
-/// Breadth first, with splits that decide nothing, as a trainer leaves them.
-SubspaceTree random_tree(uint64_t seed) {
-    Rng rng({seed, Stage::kTraining, 0, 0});
-    std::vector<SubspaceTree::Node> nodes{SubspaceTree::make_leaf(0)};
-    for (uint32_t i = 0; i < nodes.size() && nodes.size() < 4000; ++i) {
-        if (i > 20 && rng.uniform() < 0.3f) continue;
-        const uint32_t axis = i == 0 ? 0 : uint32_t(rng.next_u64() % SubspaceTree::kAxes), left = uint32_t(nodes.size());
-        nodes[i] = SubspaceTree::make_inner(axis, 2 * rng.uniform() - 1, left);
-        for (int child = 0; child < 2; ++child) nodes.push_back(SubspaceTree::make_leaf(uint32_t(rng.next_u64() % 5)));
-    }
-    return SubspaceTree(std::move(nodes));
-}
-
-TEST(Classifier, CompactingAndSettlingChangeNoLabel) {
-    for (const uint64_t seed : {1, 2, 3}) {
-        const SubspaceTree tree = random_tree(seed), compact = tree.compacted(), other = random_tree(seed + 10);
-        EXPECT_TRUE(compact.validate(5).ok());
-        EXPECT_LT(compact.nodes().size(), tree.nodes().size() - 200);
-        Rng rng({seed, Stage::kTraining, 1, 0});
-        const auto vector = [&] { return Vec3{2 * rng.uniform() - 1, 2 * rng.uniform() - 1, 2 * rng.uniform() - 1}; };
-        uint32_t settled_below_root = 0;
-        for (int i = 0; i < 20000; ++i) {
-            const SubPathEnd end{vector(), vector(), vector()};
-            const auto [label, branch] = compact.label_and_settle(end, other);
-            ASSERT_EQ(label, tree.label(end));
-            ASSERT_EQ(label, compact.label(end));
-            SubPathEnd turned = end;
-            turned.direction = vector();
-            ASSERT_EQ(other.label(turned, branch), other.label(turned));
-            settled_below_root += branch > 0;
-        }
-        EXPECT_GT(settled_below_root, 0u);
-    }
-    EXPECT_EQ(SubspaceTree().compacted().nodes().size(), 1u);
-}
-
-/// Neighbouring numbers are neighbours in space: on a line they ascend with it, and dropping lower bits coarsens.
-TEST(Classifier, LabelsAreNested) {
-    auto ends = random_ends(5000, 3, true);
-    ClassifierOptions options;
-    options.subspaces = 64, options.seed = 4;
-    const SubspaceTree tree = train_classifier(ends, options);
-    std::sort(ends.begin(), ends.end(),
-              [](const WeightedEnd& a, const WeightedEnd& b) { return a.end.position.x < b.end.position.x; });
-    uint32_t previous = 0;
-    for (const WeightedEnd& e : ends) {
-        const uint32_t label = tree.label(e.end);
-        EXPECT_GE(label, previous);
-        previous = std::max(previous, label);
-    }
-    EXPECT_GT(previous, 40u);
-
-    // In space: two ends of one coarse class are nearer than two of any, and coarser classes are wider.
-    const auto cloud = random_ends(3000, 5, false);
-    const SubspaceTree in_space = train_classifier(cloud, options);
-    double last = 0;
-    for (const uint32_t bits : {0u, 2u, 4u, 6u}) {
-        double sum = 0, pairs = 0;
-        for (size_t i = 0; i < cloud.size(); i += 3)
-            for (size_t j = i + 1; j < cloud.size(); j += 5) {
-                if (in_space.label(cloud[i].end) >> bits != in_space.label(cloud[j].end) >> bits) continue;
-                sum += double(length_squared(cloud[i].end.position - cloud[j].end.position) +
-                              length_squared(cloud[i].end.normal - cloud[j].end.normal));
-                pairs += 1;
-            }
-        EXPECT_GT(sum / pairs, last) << bits;
-        last = sum / pairs;
-    }
-}
-
-TEST(Classifier, SurvivesWhatCannotBeTrained) {
-    ClassifierOptions options;
-    options.subspaces = 100, options.first_label = 3;
-    const auto only_label = [&](const std::vector<WeightedEnd>& ends) {
-        const SubspaceTree tree = train_classifier(ends, options);
-        EXPECT_TRUE(tree.validate(103).ok());
-        return tree.label({{0, 0, 0}, {0, 1, 0}, {0, 1, 0}});
-    };
-    EXPECT_EQ(only_label({}), 3u);
-    auto weightless = random_ends(50, 6, false);
-    for (WeightedEnd& e : weightless) e.weight = 0;
-    EXPECT_EQ(only_label(weightless), 3u);
-    const auto one = random_ends(1, 7, false);
-    EXPECT_EQ(only_label(one), 3u);
-    EXPECT_EQ(only_label(std::vector<WeightedEnd>(500, one[0])), 3u);
-    // All the light in one place.
-    auto spike = random_ends(500, 8, false);
-    spike[17].weight = 1e30f;
-    only_label(spike);
 }
 
 }  // namespace

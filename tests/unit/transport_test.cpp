@@ -5,48 +5,25 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include <cstring>
 #include <limits>
 #include <mutex>
 #include <set>
 #include <thread>
 
-#include "tests/support/estimates.h"
+#include "common/transport/light_cache.h"
+#include "tests/support/row_render.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
 namespace {
 
+using testing::expect_identical;
+using testing::frame_of;
+using testing::has_cache;
+using testing::render;
+using testing::row_settings;
 using testing::SceneBuilder;
 using testing::whole_frame;
-
-const char* const kAlgorithms[] = {"path", "light", "bdpt"};
-const char* const kAllAlgorithms[] = {"path", "light", "bdpt", "lvcbpt", "spcbpt"};
-
-Partial render(const std::shared_ptr<const Scene>& scene, const std::string& algorithm, const UnitWork& work, uint64_t seed = 5,
-               std::map<std::string, std::string> parameters = {}) {
-    RenderSettings settings{algorithm, testing::with_small_training(algorithm, std::move(parameters)), seed, 5};
-    Result<std::unique_ptr<Renderer>> renderer = create_with_tables(scene, settings, {});
-    if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
-    Result<Partial> partial = (*renderer)->render(work, {});
-    if (!partial.ok()) throw std::runtime_error(partial.status().message());
-    return std::move(partial).value();
-}
-
-/// Bit for bit, counters included.
-void expect_identical(const Partial& a, const Partial& b, const std::string& what) {
-    ASSERT_EQ(a.camera.size(), b.camera.size()) << what;
-    EXPECT_EQ(std::memcmp(a.camera.data(), b.camera.data(), a.camera.size() * sizeof(double)), 0) << what;
-    ASSERT_EQ(a.splats.size(), b.splats.size()) << what;
-    for (size_t i = 0; i < a.splats.size(); ++i) {
-        EXPECT_EQ(a.splats[i].pixel, b.splats[i].pixel) << what;
-        EXPECT_EQ(std::memcmp(a.splats[i].rgb.data(), b.splats[i].rgb.data(), sizeof(a.splats[i].rgb)), 0) << what;
-    }
-    EXPECT_EQ(a.counters.rays, b.counters.rays) << what;
-    EXPECT_EQ(a.counters.vertices, b.counters.vertices) << what;
-    EXPECT_EQ(a.counters.connections, b.counters.connections) << what;
-    EXPECT_EQ(a.dropped, b.dropped) << what;
-}
 
 /// Pairs of triangles in the very same place with different materials: which one a ray reports must
 /// not depend on anything.
@@ -65,16 +42,18 @@ TEST(Determinism, OneTwoAndEightThreadsMakeTheSameBytes) {
     for (const auto make : {testing::diffuse_box, testing::environment_lit, coplanar_duplicates}) {
         // The scene is built twice: its acceleration structure must come out the same.
         const auto scene = make(), again = make();
-        for (const char* algorithm : kAllAlgorithms) {
-            const UnitWork work = whole_frame(*scene, 4);
+        for (const AlgorithmInfo* row : catalog()) {
+            const RenderUnit work = frame_of(*scene, *row, 4);
             Partial alone;
-            tbb::task_arena(1).execute([&] { alone = render(scene, algorithm, work); });
+            tbb::task_arena(1).execute([&] { alone = render(scene, *row, work); });
+            EXPECT_EQ(alone.samples_per_pixel, row->camera_samples ? 4u : 0u) << row->name;
+            EXPECT_TRUE(check_partial(alone, scene->frame()).ok()) << row->name;
             // Chunks are dealt to threads as these become free, so repeated runs take them in
             // different orders.
             for (const int threads : {2, 8, 8, 8}) {
                 Partial partial;
-                tbb::task_arena(threads).execute([&] { partial = render(threads == 2 ? again : scene, algorithm, work); });
-                expect_identical(alone, partial, std::string(algorithm) + " on " + std::to_string(threads) + " threads");
+                tbb::task_arena(threads).execute([&] { partial = render(threads == 2 ? again : scene, *row, work); });
+                expect_identical(alone, partial, std::string(row->name) + " on " + std::to_string(threads) + " threads");
             }
         }
     }
@@ -82,153 +61,92 @@ TEST(Determinism, OneTwoAndEightThreadsMakeTheSameBytes) {
 
 TEST(Determinism, SeedsAndIterationsMakeDifferentSamples) {
     const auto scene = testing::diffuse_box();
-    for (const char* algorithm : {"path", "bdpt", "lvcbpt", "spcbpt"}) {
-        const Partial a = render(scene, algorithm, whole_frame(*scene, 1));
-        const Partial b = render(scene, algorithm, whole_frame(*scene, 1), 6);
-        UnitWork later = whole_frame(*scene, 1);
+    for (const AlgorithmInfo* row : catalog()) {
+        const RenderUnit work = frame_of(*scene, *row, 1);
+        const Partial a = render(scene, *row, work), b = render(scene, *row, work, 6);
+        EXPECT_TRUE(a.camera != b.camera || a.splats != b.splats) << row->name;
+        // Camera samples are keyed by their iteration, and light paths by their number.
+        if (!row->camera_samples || row->traces == Traces::kLight) continue;
+        RenderUnit later = work;
         later.first_iteration = 1;
-        const Partial c = render(scene, algorithm, later);
-        EXPECT_NE(a.camera, b.camera) << algorithm;
-        EXPECT_NE(a.camera, c.camera) << algorithm;
+        EXPECT_NE(a.camera, render(scene, *row, later).camera) << row->name;
     }
 }
 
-/// What `replay` does: one pixel and iteration of a unit, with the whole unit's cache.
-TEST(Tiles, ASampleOfACachedUnitCanBeRenderedAlone) {
+/// A prepared algorithm that asks for it has a new state in every iteration, and no light sub-path twice: a unit is the sum of its
+/// iterations.
+TEST(Determinism, StatesOfIterationsAreIndependent) {
     const auto scene = testing::diffuse_box();
-    const Rect crop = scene->frame().crop;
-    const Rect tile{3, 4, 8, 9};
-    for (const char* algorithm : {"lvcbpt", "spcbpt"}) {
-        // Fewer counted paths than the cache holds, so that both kinds of keys matter.
-        const UnitWork unit{2, 2, 2, tile, 17, 20};
-        const Partial whole = render(scene, algorithm, unit);
-        UnitWork sample = unit;
-        sample.owner_tile = tile;
-        sample.tile = {5, 6, 6, 7};
-        sample.iteration_count = 1;
-        double sum[3] = {};
-        for (const uint64_t iteration : {2, 3}) {
-            sample.first_iteration = iteration;
-            const Partial alone = render(scene, algorithm, sample);
-            for (size_t c = 0; c < 3; ++c) sum[c] += alone.camera[c];
-        }
-        for (size_t c = 0; c < 3; ++c)
-            EXPECT_EQ(sum[c], whole.camera[3 * size_t((6 - 4) * tile.width() + (5 - 3)) + c]) << algorithm;
-        EXPECT_TRUE(crop.contains(5, 6));
+    const AlgorithmInfo& row = **find_algorithm("stub-anew");
+    constexpr uint32_t kIterations = 3;
+    const RenderUnit work = frame_of(*scene, row, kIterations);
+    const Partial whole = render(scene, row, work);
+    const uint64_t paths = work.light_path_count / kIterations;
+    std::vector<double> camera(whole.camera.size(), 0.0);
+    std::vector<Partial> parts;
+    for (uint32_t b = 0; b < kIterations; ++b) {
+        RenderUnit alone = work;
+        alone.first_iteration = b, alone.iteration_count = 1;
+        alone.first_light_path = b * paths, alone.light_path_count = paths;
+        parts.push_back(render(scene, row, alone));
+        for (size_t i = 0; i < camera.size(); ++i) camera[i] += parts.back().camera[i];
     }
+    EXPECT_EQ(camera, whole.camera);
+    EXPECT_EQ(whole.light_paths, work.light_path_count);
+    EXPECT_EQ(whole.counters.light_paths, work.light_path_count);
+    EXPECT_NE(parts[0].splats, parts[1].splats);
 }
 
-/// A camera sample is keyed by its pixel, not by its tile; with rows as tiles and one iteration, so
-/// is its light sub-path.
-TEST(Tiles, HoldExactlyTheSamplesOfTheFrame) {
+/// Notes where the light sub-paths of every state begin.
+struct NotingAlgorithm {
+    static constexpr bool kPerIteration = true;
+    std::vector<double>* starts;
+    uint64_t paths;
+
+    template <class Contribute>
+    int prepare(const UnitScope& scope, UnitPreparation* preparation, Contribute&&) const {
+        const LightCache cache = trace_light_cache(
+            scope, paths, preparation, [](PathVertex*, int) {}, [](const PathVertex*, int, Vec2, uint64_t, auto&) {});
+        for (const LightCache::Path& path : cache.paths) starts->push_back(double(cache.at(path.first_vertex)->p.x));
+        return 0;
+    }
+    template <class Contribute>
+    void trace(SampleContext&, int, Contribute&&) const {}
+    float weight(int, const PathView&, Technique) const { return 1; }
+};
+
+/// Those that are counted, and those that fill a cache beside them.
+TEST(Determinism, IterationsShareNoLightSubPath) {
     const auto scene = testing::diffuse_box();
-    const Rect crop = scene->frame().crop;
-    for (const char* algorithm : kAlgorithms) {
-        const Partial whole = render(scene, algorithm, whole_frame(*scene, 1));
-        std::vector<double> splats(size_t(crop.area()) * 3, 0);
-        for (int y0 = 0; y0 < crop.height(); y0 += 5) {
-            const Rect rows{0, y0, crop.width(), std::min(y0 + 5, crop.height())};
-            const uint64_t first = uint64_t(y0) * uint64_t(crop.width());
-            const Partial part = render(scene, algorithm, {0, 1, 0, rows, first, uint64_t(rows.area())});
-            EXPECT_EQ(std::memcmp(part.camera.data(), &whole.camera[3 * first], part.camera.size() * sizeof(double)), 0)
-                << algorithm;
-            for (const SplatSum& s : part.splats)
-                for (size_t c = 0; c < 3; ++c) splats[3 * s.pixel + c] += s.rgb[c];
-        }
-        // Splats of different tiles meet in a pixel, so their sum is the same up to the order of
-        // additions.
-        for (const SplatSum& s : whole.splats)
-            for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(splats[3 * s.pixel + c], s.rgb[c], 1e-12 * s.rgb[c]) << algorithm;
-    }
-    // No sub-path of its own: any tiling, any number of iterations.
-    const Partial whole = render(scene, "path", whole_frame(*scene, 3));
-    for (int y0 = 0; y0 < crop.height(); y0 += 5)
-        for (int x0 = 0; x0 < crop.width(); x0 += 7) {
-            const Rect tile{x0, y0, std::min(x0 + 7, crop.width()), std::min(y0 + 5, crop.height())};
-            const Partial part = render(scene, "path", {0, 3, 0, tile, 0, 0});
-            for (int64_t i = 0; i < tile.area(); ++i) {
-                const int64_t p = crop.index(tile.x0 + int(i % tile.width()), tile.y0 + int(i / tile.width()));
-                EXPECT_EQ(std::memcmp(&part.camera[size_t(3 * i)], &whole.camera[size_t(3 * p)], 3 * sizeof(double)), 0);
-            }
-        }
-}
+    constexpr uint32_t kIterations = 3;
+    constexpr uint64_t kPaths = 40;
+    std::vector<double> starts;
+    const RenderUnit work = whole_frame(*scene, kIterations, 10);
+    ASSERT_TRUE(render_unit(NotingAlgorithm{&starts, kPaths}, *scene, 3, 6, {}, work, {}).ok());
+    EXPECT_EQ(starts.size(), kIterations * kPaths);
+    EXPECT_EQ(std::set<double>(starts.begin(), starts.end()).size(), starts.size());
 
-/// N1 is a constant of the frame: a frame of 7 x 5 tiles, cut at its edges, has the mean of the
-/// undivided one.
-TEST(Tiles, OfAnySizeKeepTheMean) {
-    SceneBuilder b = testing::cornell_builder();
-    b.description().film.width = 30;
-    b.description().film.height = 22;
-    const std::shared_ptr<const Scene> scene = b.build();
-    const Rect crop = scene->frame().crop;
-    testing::TestFamily family;
-    for (const std::string algorithm : {"light", "bdpt", "lvcbpt", "spcbpt"}) {
-        // Tables per tile, so they are poor ones, and caches of a few hundred paths.
-        std::map<std::string, std::string> poor;
-        if (algorithm == "lvcbpt" || algorithm == "spcbpt") poor = {{"training-paths", "200"}, {"cache", "300"}};
-        const auto tiled = [&](uint64_t seed) {
-            Partial sum = render(scene, algorithm, whole_frame(*scene, 1), seed, poor);
-            sum.camera.assign(sum.camera.size(), 0);
-            sum.splats.clear();
-            sum.samples_per_pixel = 4;
-            sum.light_paths = 0;
-            for (int y0 = 0; y0 < crop.height(); y0 += 5)
-                for (int x0 = 0; x0 < crop.width(); x0 += 7) {
-                    const Rect tile{x0, y0, std::min(x0 + 7, crop.width()), std::min(y0 + 5, crop.height())};
-                    const uint64_t paths = 4 * uint64_t(tile.area());
-                    const Partial part = render(scene, algorithm, {0, 4, 0, tile, sum.light_paths, paths}, seed, poor);
-                    sum.light_paths += paths;
-                    for (int64_t i = 0; i < tile.area(); ++i) {
-                        const int64_t p = crop.index(tile.x0 + int(i % tile.width()), tile.y0 + int(i / tile.width()));
-                        for (int64_t c = 0; c < 3; ++c) sum.camera[size_t(3 * p + c)] = part.camera[size_t(3 * i + c)];
-                    }
-                    sum.splats.insert(sum.splats.end(), part.splats.begin(), part.splats.end());
-                }
-            return testing::develop(sum, crop);
-        };
-        const auto whole = testing::catalog_image(scene, algorithm, 5, 4);
-        testing::compare(testing::replicate(whole, crop, 32, 100), testing::replicate(tiled, crop, 32, 200), algorithm, &family);
-    }
-    family.check();
-}
-
-/// The crop renders what the frame shows there, camera samples and splats alike.
-TEST(Tiles, ACropHasTheMeanOfItsPartOfTheFrame) {
-    SceneBuilder full = testing::cornell_builder(), cropped = testing::cornell_builder();
-    const int window[4] = {8, 24, 4, 20};
-    std::copy(window, window + 4, cropped.description().film.crop);
-    const std::shared_ptr<const Scene> a = full.build(), b = cropped.build();
-    ASSERT_EQ(b->frame().crop, (Rect{8, 4, 24, 20}));
-    testing::TestFamily family;
-    for (const char* algorithm : kAlgorithms) {
-        const auto frame = testing::catalog_image(a, algorithm, 5, 8);
-        const auto part_of_frame = [&](uint64_t seed) {
-            const std::vector<double> image = frame(seed);
-            std::vector<double> part;
-            for (int y = 4; y < 20; ++y)
-                for (int x = 8; x < 24; ++x) part.push_back(image[size_t(y * 32 + x)]);
-            return part;
-        };
-        const Rect crop = b->frame().crop;
-        testing::compare(testing::replicate(part_of_frame, crop, 32, 100),
-                         testing::replicate(testing::catalog_image(b, algorithm, 5, 8), crop, 32, 200), algorithm, &family);
-    }
-    family.check();
+    RenderUnit uneven = work;
+    uneven.light_path_count += 1;
+    const Status refused = render_unit(NotingAlgorithm{&starts, kPaths}, *scene, 3, 6, {}, uneven, {}).status();
+    EXPECT_EQ(refused.code(), StatusCode::kInvalidArgument);
+    EXPECT_NE(refused.message().find("every iteration"), std::string::npos) << refused.message();
 }
 
 /// Holds every sample until a second thread has come, or for ten seconds.
 struct MeetingAlgorithm {
     std::mutex* mutex;
     std::set<std::thread::id>* threads;
-    Rgb sample(SampleContext&) const {
+    template <class Contribute>
+    void trace(SampleContext&, Contribute&&) const {
         const auto arrived = [&] {
             std::lock_guard lock(*mutex);
             threads->insert(std::this_thread::get_id());
             return threads->size();
         };
         for (int i = 0; i < 10000 && arrived() < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-        return {};
     }
+    float weight(const PathView&, Technique) const { return 1; }
 };
 
 /// Building a scene on one thread must leave the others to rendering.
@@ -237,10 +155,10 @@ TEST(Units, AreRenderedOnAllThreads) {
     tbb::global_control allowance(tbb::global_control::max_allowed_parallelism, 2);
     std::mutex mutex;
     std::set<std::thread::id> threads;
-    UnitWork work = whole_frame(*scene, 1);
+    RenderUnit work = whole_frame(*scene, 1, 0);
     work.tile = {0, 0, 32, 4};
     tbb::task_arena(2).execute([&] {
-        EXPECT_TRUE(render_unit(MeetingAlgorithm{&mutex, &threads}, *scene, {}, {}, work, {}).ok());
+        EXPECT_TRUE(render_unit(MeetingAlgorithm{&mutex, &threads}, *scene, 0, 6, {}, work, {}).ok());
     });
     EXPECT_EQ(threads.size(), 2u);
 }
@@ -249,23 +167,27 @@ TEST(Units, AreRenderedOnAllThreads) {
 struct BrokenAlgorithm {
     uint32_t pixel;
     uint64_t iteration;
-    Rgb sample(SampleContext& context) const {
-        if (context.pixel == pixel && context.iteration == iteration) {
-            context.splat({float(context.px) + 0.5f, float(context.py) + 0.5f}, Rgb(std::numeric_limits<float>::infinity()));
-            return {1, std::numeric_limits<float>::quiet_NaN(), 1};
-        }
-        context.splat({float(context.px) + 0.5f, float(context.py) + 0.5f}, Rgb(2.0f));
-        return Rgb(1.0f);
+    template <class Contribute>
+    void trace(SampleContext& context, Contribute&& contribute) const {
+        PathView view;
+        const bool broken = context.pixel == pixel && context.iteration == iteration;
+        const Vec2 film{float(context.px) + 0.5f, float(context.py) + 0.5f};
+        contribute(PathContribution{.value = Rgb(broken ? std::numeric_limits<float>::infinity() : 2.0f),
+                                    .technique = Technique::lens(2),
+                                    .film = film},
+                   view);
+        const float green = broken ? std::numeric_limits<float>::quiet_NaN() : 1.0f;
+        contribute(PathContribution{.value = {1, green, 1}, .technique = Technique::hit()}, view);
     }
+    float weight(const PathView&, Technique) const { return 1; }
 };
 
 TEST(NonFinite, SamplesAreDroppedCountedAndRecorded) {
     const auto scene = testing::diffuse_box();
-    RenderSettings settings;
     const uint32_t pixel = 333;
-    UnitWork work = whole_frame(*scene, 4);
+    RenderUnit work = whole_frame(*scene, 4, uint64_t(scene->frame().crop.area()));
     work.first_iteration = 10;
-    const Result<Partial> partial = render_unit(BrokenAlgorithm{pixel, 12}, *scene, settings, {}, work, {});
+    const Result<Partial> partial = render_unit(BrokenAlgorithm{pixel, 12}, *scene, 0, 6, {}, work, {});
     ASSERT_TRUE(partial.ok());
     EXPECT_EQ(partial->dropped_count, 2u);
     ASSERT_EQ(partial->dropped.size(), 2u);
@@ -278,14 +200,49 @@ TEST(NonFinite, SamplesAreDroppedCountedAndRecorded) {
     EXPECT_TRUE(check_partial(*partial, scene->frame()).ok());
 }
 
+/// The same of an algorithm with loops of its own: what it hands to its sink.
+struct BrokenOwned {
+    uint32_t pixel;  ///< Row-major in the tile.
+
+    void run(const UnitScope& scope, UnitSink& sink) const {
+        sink.open(2);
+        sink.camera(1, pixel, scope.work.first_iteration, {1, std::numeric_limits<float>::quiet_NaN(), 1});
+        sink.camera(0, pixel, scope.work.first_iteration, Rgb(1.0f));
+        sink.splat(1, pixel, scope.work.first_iteration, Rgb(std::numeric_limits<float>::infinity()));
+        sink.splat(1, pixel, scope.work.first_iteration, Rgb(2.0f));
+    }
+};
+
+TEST(NonFinite, SamplesOfOwnLoopsAreDroppedCountedAndRecorded) {
+    const auto scene = testing::diffuse_box();
+    RenderUnit work = whole_frame(*scene, 1, 0);
+    work.tile = {4, 6, 12, 10};
+    work.first_iteration = 7;
+    const uint32_t pixel = 8 * 2 + 3, in_crop = uint32_t(scene->frame().crop.index(4 + 3, 6 + 2));
+    const Result<Partial> partial = render_unit(BrokenOwned{pixel}, *scene, 0, 6, {}, work, {});
+    ASSERT_TRUE(partial.ok());
+    EXPECT_EQ(partial->dropped_count, 2u);
+    ASSERT_EQ(partial->dropped.size(), 2u);
+    EXPECT_EQ(partial->dropped[0], (DroppedSample{7, in_crop, false}));
+    EXPECT_EQ(partial->dropped[1], (DroppedSample{7, pixel, true}));
+    EXPECT_EQ(partial->camera[3 * pixel], 1);
+    ASSERT_EQ(partial->splats.size(), 1u);
+    EXPECT_EQ(partial->splats[0].rgb[0], 2);
+}
+
 /// Records are bounded, the count is not.
 struct NeverFinite {
-    Rgb sample(SampleContext&) const { return Rgb(std::numeric_limits<float>::infinity()); }
+    template <class Contribute>
+    void trace(SampleContext&, Contribute&& contribute) const {
+        PathView view;
+        contribute(PathContribution{.value = Rgb(std::numeric_limits<float>::infinity())}, view);
+    }
+    float weight(const PathView&, Technique) const { return 1; }
 };
 
 TEST(NonFinite, RecordsAreBounded) {
     const auto scene = testing::diffuse_box();
-    const Result<Partial> partial = render_unit(NeverFinite{}, *scene, {}, {}, whole_frame(*scene, 2), {});
+    const Result<Partial> partial = render_unit(NeverFinite{}, *scene, 0, 6, {}, whole_frame(*scene, 2, 0), {});
     ASSERT_TRUE(partial.ok());
     EXPECT_EQ(partial->dropped_count, 2 * uint64_t(scene->frame().crop.area()));
     EXPECT_EQ(partial->dropped.size(), Partial::kMaxDroppedRecords);
@@ -293,13 +250,48 @@ TEST(NonFinite, RecordsAreBounded) {
 
 TEST(Units, OutsideTheFrameOrCancelledAreRefused) {
     const auto scene = testing::diffuse_box();
-    for (const Rect tile : {Rect{0, 0, 33, 4}, Rect{-1, 0, 4, 4}, Rect{4, 4, 4, 8}})
-        EXPECT_FALSE(render_unit(PathAlgorithm{}, *scene, {}, {}, {0, 1, 0, tile, 0, 0}, {}).ok());
     std::stop_source stop;
     stop.request_stop();
-    const Result<Partial> partial = render_unit(PathAlgorithm{}, *scene, {}, {}, whole_frame(*scene, 1), stop.get_token());
-    ASSERT_FALSE(partial.ok());
-    EXPECT_EQ(partial.status().code(), StatusCode::kCancelled);
+    for (const AlgorithmInfo* row : catalog()) {
+        const auto renderer = create_with_tables(scene, row_settings(*row), {});
+        ASSERT_TRUE(renderer.ok()) << row->name;
+        RenderUnit work = frame_of(*scene, *row, 1);
+        const auto partial = (*renderer)->render(work, stop.get_token());
+        ASSERT_FALSE(partial.ok()) << row->name;
+        EXPECT_EQ(partial.status().code(), StatusCode::kCancelled) << row->name;
+        for (const Rect tile : {Rect{0, 0, 33, 4}, Rect{-1, 0, 4, 4}, Rect{4, 4, 4, 8}}) {
+            work.tile = tile;
+            EXPECT_EQ((*renderer)->render(work, {}).status().code(), StatusCode::kInvalidArgument) << row->name;
+        }
+    }
+}
+
+/// What is shown one by one adds up to what is rendered.
+TEST(Units, ShowEveryContribution) {
+    const auto scene = testing::diffuse_box();
+    const Rect crop = scene->frame().crop;
+    for (const AlgorithmInfo* row : catalog()) {
+        const auto renderer = create_with_tables(scene, row_settings(*row), {});
+        ASSERT_TRUE(renderer.ok()) << row->name;
+        const RenderUnit work = frame_of(*scene, *row, 2);
+        std::vector<double> camera(size_t(crop.area()) * 3, 0.0), splats = camera;
+        uint64_t seen = 0;
+        const auto see = [&](const SeenContribution& c) {
+            ++seen;
+            EXPECT_LT(c.pixel, uint32_t(crop.area()));
+            const Rgb value = c.found.value * float(c.weight);
+            double* sum = &(c.found.technique.splats() ? splats : camera)[3 * size_t(c.pixel)];
+            sum[0] += value.r, sum[1] += value.g, sum[2] += value.b;
+        };
+        const auto watched = (*renderer)->watch(work, see, {}), rendered = (*renderer)->render(work, {});
+        ASSERT_TRUE(watched.ok() && rendered.ok()) << row->name;
+        expect_identical(*watched, *rendered, std::string(row->name));
+        if (seen == 0) continue;  // loops of its own
+        for (size_t i = 0; i < camera.size(); ++i)
+            ASSERT_NEAR(camera[i], rendered->camera[i], 1e-5 * rendered->camera[i]) << row->name;
+        for (const SplatSum& s : rendered->splats)
+            for (size_t c = 0; c < 3; ++c) ASSERT_NEAR(splats[3 * s.pixel + c], s.rgb[c], 1e-5 * s.rgb[c]) << row->name;
+    }
 }
 
 /// Ground that fills the view under a sky of radiance 1 shows its albedo, whatever the size of the
@@ -312,7 +304,10 @@ TEST(SelfIntersection, LargeGroundShowsItsAlbedo) {
         b.description().film.width = b.description().film.height = 16;
         b.description().infinite_lights.push_back({.radiance = Rgb(1.0f)});
         const auto scene = b.build();
-        for (const char* algorithm : {"path", "bdpt"}) {
+        for (const AlgorithmInfo* row : catalog()) {
+            // Light sub-paths of so large a scene rarely come into view.
+            if (row->traces == Traces::kLight || !row->camera_samples || has_cache(*row)) continue;
+            const std::string algorithm(row->name);
             const auto image = testing::catalog_image(scene, algorithm, 5, 4);
             const testing::RegionMeans means = testing::replicate(image, scene->frame().crop, 16, 77);
             const testing::Sample sample(means.values[0]);
@@ -340,9 +335,10 @@ TEST(Roulette, CanBeSwitchedOff) {
     b.room({-1, -1, -1}, {1, 1, 1}, b.diffuse(Rgb(1.0f)));
     b.look({0, 0, -0.9f}, {0, 0, 1}, 80);
     const auto scene = b.build();
-    const auto renderer = Renderer::create(scene, {"path", {{"rr-min", "1"}, {"rr-start", "2"}}, 3, 20});
+    const RenderSettings settings = testing::settings_of("path", {{"rr-min", "1"}, {"rr-start", "2"}}, 3, 20);
+    const auto renderer = Renderer::create(scene, settings);
     ASSERT_TRUE(renderer.ok());
-    const Result<Partial> partial = (*renderer)->render(whole_frame(*scene, 4), {});
+    const Result<Partial> partial = (*renderer)->render(whole_frame(*scene, settings.algorithm, 4), {});
     ASSERT_TRUE(partial.ok());
     EXPECT_EQ(partial->counters.vertices, partial->counters.camera_samples * 21);
 }
@@ -355,24 +351,28 @@ TEST(Means, TheSkyAloneFillsEveryPixel) {
     b.sphere({0, 0, -50}, 0.01f, b.diffuse(Rgb(0.5f)));  // behind the camera
     b.look({0, 0, 0}, {0, 0, 1}, 60);
     const auto scene = b.build();
-    for (const char* algorithm : kAllAlgorithms)
-        for (const double v : testing::catalog_image(scene, algorithm, 5, 2)(3)) EXPECT_NEAR(v, 0.5, 1e-6) << algorithm;
+    for (const AlgorithmInfo* row : catalog()) {
+        if (!row->camera_samples) continue;  // how many samples a pixel has is random then
+        for (const double v : testing::catalog_image(scene, std::string(row->name), 5, 2)(3))
+            EXPECT_NEAR(v, 0.5, 1e-6) << row->name;
+    }
 }
 
-/// All algorithms in a few seconds; tests/statistical does the same per path length on many
-/// scenes.
+/// All algorithms in a few seconds; tests/statistical does the same per path length on many scenes.
 TEST(Means, OfAllAlgorithmsAgree) {
     testing::TestFamily family;
     for (const auto make : {testing::diffuse_box, testing::environment_lit}) {
         const auto scene = make();
         const Rect crop = scene->frame().crop;
+        const auto rows = catalog();
         std::vector<testing::RegionMeans> estimates;
-        for (const char* algorithm : kAllAlgorithms)
-            estimates.push_back(
-                testing::replicate(testing::catalog_image(scene, algorithm, 5, 8), crop, 32, 1000 * (estimates.size() + 1)));
-        for (size_t i = 0; i < estimates.size(); ++i)
-            EXPECT_TRUE(testing::compare(estimates[i], estimates[(i + 1) % estimates.size()],
-                                         std::string(kAllAlgorithms[i]) + " and the next", &family));
+        for (const AlgorithmInfo* row : rows)
+            estimates.push_back(testing::replicate(testing::catalog_image(scene, std::string(row->name), 5, 8), crop, 32,
+                                                   1000 * (estimates.size() + 1)));
+        for (size_t i = 0; i < rows.size(); ++i) {
+            const std::string what = std::string(rows[i]->name) + " and the next";
+            EXPECT_TRUE(testing::compare(estimates[i], estimates[(i + 1) % rows.size()], what, &family)) << what;
+        }
     }
     family.check();
 }

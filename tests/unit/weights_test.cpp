@@ -1,6 +1,5 @@
-// The weight suites: on the very same path, the weights of all techniques sum to one, and every
-// technique describes that path by the same PathView. Everything is rebuilt through production
-// code.
+// The weight suites: on the very same path, the weights of all techniques sum to one, and every technique describes that path by
+// the same PathView. Everything is rebuilt through production code, for every row of the catalog, whatever its tables hold.
 
 #include <gtest/gtest.h>
 
@@ -8,10 +7,9 @@
 #include <cmath>
 
 #include "common/transport/bdpt.h"
-#include "common/transport/light.h"
-#include "common/transport/path.h"
 #include "tests/support/path_generator.h"
 #include "tests/support/stub_algorithms.h"
+#include "tests/support/table_render.h"
 #include "tests/support/tally.h"
 #include "tests/support/test_scenes.h"
 
@@ -20,84 +18,162 @@ namespace {
 
 using testing::FullPath;
 using testing::MergeStubSelection;
-using testing::PairingStubSelection;
 using testing::Tally;
 
-/// Sum of the weights of all techniques that can make `path`, each from its own rebuilt view.
-template <class Selection>
-double weight_sum(const Scene& scene, const FullPath& path, const Selection& selection, Heuristic heuristic) {
-    double sum = 0;
-    const int k = path.k();
-    std::optional<testing::Rebuilt> any;
-    for (int s = selection.s_min(k); s <= selection.s_max(k); ++s) {
-        const auto r = testing::rebuild(scene, path, s);
-        if (!r) continue;
-        sum += mis_weight(r->view, {TechniqueKind::kConnect, s}, selection, heuristic);
-        any = r;
+constexpr int kEdges = 7;
+
+/// What was traced against what is rebuilt: directions that were sampled, and throughput accumulated along the other sub-path, so
+/// that narrow lobes and total reflection amplify the last bits more often than between two rebuilt views. The tail of that falls
+/// as one over the deviation; a wrong factor would show up in a good part of the paths.
+constexpr double kLooseTraced = 6e-3;
+
+bool can_be_hit(const Scene& scene) {
+    const auto& emitters = scene.emitters().all();
+    return std::any_of(emitters.begin(), emitters.end(), [](const Emitter& e) { return !e.is_delta(); });
+}
+
+/// Weights under test. The members of a family read the same of a path, so that it is rebuilt once for all of them.
+struct Member {
+    std::string name;
+    std::unique_ptr<PathWeights> weights;
+    Heuristic heuristic = Heuristic::kBalance;
+    Tally rebuilt{}, traced{};
+};
+using Family = std::vector<Member>;
+
+/// A row with its defaults, with each value of each of its choices, and with few and many connections; all with the same tables.
+/// Empty where single paths cannot be asked about.
+Family family_of(const AlgorithmInfo& row, const std::shared_ptr<const Scene>& scene, uint64_t seed) {
+    const std::string name(row.name);
+    auto parameters = testing::with_small_training(name, {});
+    if (parameters.contains("cache")) parameters["cache"] = "50";
+    std::vector<std::pair<std::string, std::string>> changes{{"", ""}};
+    for (const ParameterInfo& p : row.parameters) {
+        for (const std::string_view choice : p.choices) changes.emplace_back(p.name, choice);
+        if (p.name == "connections") changes.insert(changes.end(), {{"connections", "1"}, {"connections", "5"}});
     }
-    if constexpr (Selection::kMerges) {
-        for (int i = 1; any && i < k; ++i)
-            if (!any->view.delta[i]) sum += mis_weight(any->view, {TechniqueKind::kMerge, i}, selection, heuristic);
+    const Tables tables = testing::random_tables_for(row, *scene, seed);
+    Family family;
+    for (const auto& [parameter, value] : changes) {
+        auto set = parameters;
+        if (!parameter.empty()) set[parameter] = value;
+        const RenderSettings settings = testing::settings_of(name, set, seed);
+        const auto renderer = Renderer::create(scene, settings, tables);
+        if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
+        auto weights = (*renderer)->weights();
+        if (!weights) return {};
+        family.push_back({name + (parameter.empty() ? "" : ", " + parameter + "=" + value), std::move(weights),
+                          settings.algorithm.has(kHeuristic.name) ? heuristic_of(settings.algorithm) : Heuristic::kBalance});
     }
-    return sum;
+    return family;
+}
+
+/// Methods to come, as stubs.
+Family family_of_stubs(const Scene& scene) {
+    const BdptSelection bdpt = testing::bdpt_selection(scene);
+    const TypicalSurvival survival{RouletteRule{}};
+    Family family;
+    family.push_back({"merge stub", testing::weights_of(MergeStubSelection{bdpt})});
+    family.push_back({"merge stub, power", testing::weights_of(MergeStubSelection{bdpt}, Heuristic::kPower), Heuristic::kPower});
+    family.push_back({"pairing stub", testing::weights_of(testing::PairingStubSelection{bdpt})});
+    family.push_back({"next event beside the cache", testing::weights_of(testing::NextEventBesideCacheSelection{
+                                                         {bdpt.light_paths_per_iteration, 0.37, survival}})});
+    return family;
+}
+
+/// Adds what all techniques of a member together weigh, each as it would have seen the path had it made it, and the same with the
+/// path's own technique as it did see it. Nothing for members that have no such technique. Of equal densities the maximum heuristic
+/// picks one by an order that holds within one view only: rounding decides otherwise in another.
+void add_sums(const Scene& scene, const FullPath& path, Technique own, const PathView& traced, Family* family) {
+    std::vector<std::pair<double, double>> sums(family->size());
+    testing::for_each_technique(path.k(), [&](Technique t) {
+        if (t.kind == TechniqueKind::kMerge ? traced.delta[t.s] : !can_connect(traced, t.s)) return;
+        if (std::none_of(family->begin(), family->end(), [&](const Member& m) { return m.weights->sigma(traced, t) > 0; })) return;
+        const auto other = testing::rebuild(scene, path, t, family->front().weights.get());
+        if (!other) return;
+        for (size_t i = 0; i < family->size(); ++i) {
+            const PathWeights& weights = *(*family)[i].weights;
+            if (!(weights.sigma(other->view, t) > 0)) continue;
+            const bool maximum = (*family)[i].heuristic == Heuristic::kMaximum;
+            const double weight = weights.weight(maximum ? traced : other->view, t);
+            sums[i].first += weight;
+            sums[i].second += t == own ? weights.weight(traced, own) : weight;
+        }
+    });
+    for (size_t i = 0; i < family->size(); ++i) {
+        Member& m = (*family)[i];
+        if (!(m.weights->sigma(traced, own) > 0)) continue;
+        m.rebuilt.add(sums[i].first - 1, path);
+        m.traced.add(sums[i].second - 1, path);
+    }
 }
 
 class Weights : public ::testing::TestWithParam<testing::NamedScene> {};
 
+/// With Russian roulette where a path was traced, without where it is rebuilt: weights do not know it.
 TEST_P(Weights, SumToOneOverAllTechniques) {
     const auto scene = GetParam().make();
-    BdptSelection bdpt;
-    bdpt.light_paths_per_iteration = double(scene->frame().crop.area());
-    const MergeStubSelection merging{bdpt};
-    const PairingStubSelection pairing{bdpt};
-    Tally tallies[6];
-    std::vector<int> made(16, 0);
-    const auto& emitters = scene->emitters().all();
-    const bool hits = std::any_of(emitters.begin(), emitters.end(), [](const Emitter& e) { return !e.is_delta(); });
+    const bool hits = can_be_hit(*scene);
     // A scene without lights that can be hit has far fewer paths to offer.
-    testing::for_each_path(*scene, hits ? 10000 : 30000, 7, 11, [&](const FullPath& path, int s, const PathView&, const Rgb&) {
-        ++made[size_t(s)];
-        if (path.k() < 2) return;
-        tallies[0].add(weight_sum(*scene, path, bdpt, Heuristic::kBalance) - 1, path);
-        tallies[1].add(weight_sum(*scene, path, bdpt, Heuristic::kPower) - 1, path);
-        tallies[2].add(weight_sum(*scene, path, merging, Heuristic::kBalance) - 1, path);
-        tallies[3].add(weight_sum(*scene, path, pairing, Heuristic::kBalance) - 1, path);
-        if (s <= 1) tallies[4].add(weight_sum(*scene, path, PathSelection{}, Heuristic::kBalance) - 1, path);
-        if (s == path.k()) tallies[5].add(weight_sum(*scene, path, LightSelection{}, Heuristic::kBalance) - 1, path);
-    });
-    const char* names[] = {"bdpt balance", "bdpt power", "merge stub", "pairing stub", "path", "light"};
-    for (int i = 0; i < 6; ++i) tallies[i].check(names[i]);
+    const int count = hits ? 4000 : 10000;
+    std::vector<int> made(kEdges + 1, 0);
+    const auto check = [&](const auto& make) {
+        Family all;
+        for (uint64_t seed = 1; seed <= 3; ++seed) {
+            Family family = make(seed);
+            if (family.empty()) return;
+            testing::for_each_path(
+                *scene, count, kEdges, 40 + seed,
+                [&](const FullPath& path, Technique own, const PathView& view, const Rgb&) {
+                    ++made[size_t(own.s)];
+                    if (path.k() >= 2) add_sums(*scene, path, own, view, &family);
+                },
+                family.front().weights.get());
+            if (all.empty()) {
+                all = std::move(family);
+                continue;
+            }
+            for (size_t i = 0; i < all.size(); ++i) all[i].rebuilt += family[i].rebuilt, all[i].traced += family[i].traced;
+        }
+        for (const Member& m : all) {
+            m.rebuilt.check(m.name);
+            // Squares of densities deviate twice as much.
+            if (m.heuristic == Heuristic::kBalance) m.traced.check(m.name + ", own view as traced", kLooseTraced);
+        }
+    };
+    for (const AlgorithmInfo* row : catalog()) check([&](uint64_t seed) { return family_of(*row, scene, seed); });
+    check([&](uint64_t) { return family_of_stubs(*scene); });
     for (int s = hits ? 0 : 1; s <= 4; ++s) EXPECT_GT(made[size_t(s)], 20) << "technique s = " << s << " was hardly exercised";
 }
 
 TEST_P(Weights, EveryTechniqueSeesTheSamePath) {
     const auto scene = GetParam().make();
     Tally densities, contributions;
-    testing::for_each_path(*scene, 1500, 6, 12, [&](const FullPath& path, int own, const PathView&, const Rgb&) {
+    testing::for_each_path(*scene, 1500, 6, 12, [&](const FullPath& path, Technique own, const PathView&, const Rgb&) {
         const int k = path.k();
         if (k < 2) return;
         // f = contribution * density of the technique: the same number for all of them.
-        const auto f_of = [&](const PathView& v, const Rgb& c, int s) {
-            double density = s == 1 ? v.next_event : 1;
-            for (int i = 0; i < k; ++i)
-                if (!(s == 1 && i == 0)) density *= i < s ? v.fwd[i] : v.rev[i];
+        const auto f_of = [&](const PathView& v, const Rgb& c, Technique t) {
+            const bool next_event = t.kind == TechniqueKind::kNextEvent, merge = t.kind == TechniqueKind::kMerge;
+            double density = next_event ? v.next_event : merge ? v.fwd[t.s] : 1;
+            for (int i = next_event ? 1 : 0; i < k; ++i) density *= i < t.s ? v.fwd[i] : v.rev[i];
             return density * scalar_of(c);
         };
         const auto mine = testing::rebuild(*scene, path, own);
         if (!mine) return;
         const double f = f_of(mine->view, mine->contribution, own);
-        for (int s = 0; s <= k; ++s) {
-            const auto other = testing::rebuild(*scene, path, s);
-            if (!other) continue;
+        testing::for_each_technique(k, [&](Technique t) {
+            const auto other = testing::rebuild(*scene, path, t);
+            if (!other) return;
             EXPECT_EQ(other->view.k, k);
             for (int i = 0; i < k; ++i) {
                 EXPECT_EQ(other->view.delta[i], path.x[size_t(i)].delta);
                 densities.add(other->view.fwd[i] / mine->view.fwd[i] - 1, path);
                 if (mine->view.rev[i] > 0) densities.add(other->view.rev[i] / mine->view.rev[i] - 1, path);
             }
-            densities.add(other->view.next_event / mine->view.next_event - 1, path);
-            contributions.add(f_of(other->view, other->contribution, s) / f - 1, path);
-        }
+            if (mine->view.next_event > 0) densities.add(other->view.next_event / mine->view.next_event - 1, path);
+            contributions.add(f_of(other->view, other->contribution, t) / f - 1, path);
+        });
     });
     densities.check("densities");
     contributions.check("path integrand");
@@ -124,6 +200,10 @@ PathView synthetic_view(int k, uint64_t seed, double scale) {
     return view;
 }
 
+bool possible(const PathView& view, Technique t) {
+    return t.kind == TechniqueKind::kMerge ? !view.delta[t.s] : can_connect(view, t.s);
+}
+
 TEST(WeightEvaluator, PartitionOfUnityOnSyntheticPaths) {
     for (uint64_t seed = 0; seed < 2000; ++seed) {
         const int k = 2 + int(seed % 9);
@@ -131,12 +211,9 @@ TEST(WeightEvaluator, PartitionOfUnityOnSyntheticPaths) {
         const MergeStubSelection selection{{4096}, 1000, 0.01};
         for (const Heuristic h : {Heuristic::kBalance, Heuristic::kPower, Heuristic::kMaximum}) {
             double sum = 0;
-            for (int s = 0; s <= k; ++s) {
-                const bool blocked = (s > 0 && view.delta[s - 1]) || (s > 0 && s < k && view.delta[s]);
-                if (!blocked) sum += mis_weight(view, {TechniqueKind::kConnect, s}, selection, h);
-            }
-            for (int i = 1; i < k; ++i)
-                if (!view.delta[i]) sum += mis_weight(view, {TechniqueKind::kMerge, i}, selection, h);
+            testing::for_each_technique(k, [&](Technique t) {
+                if (possible(view, t)) sum += mis_weight(view, t, selection.on(view), h);
+            });
             EXPECT_NEAR(sum, 1, 1e-10) << "seed " << seed << " k " << k;
         }
     }
@@ -146,23 +223,22 @@ TEST(WeightEvaluator, EqualsExplicitProducts) {
     for (uint64_t seed = 0; seed < 500; ++seed) {
         const int k = 2 + int(seed % 7);
         const PathView view = synthetic_view(k, seed, 1);
-        const BdptSelection selection{1000};
-        std::vector<double> rho(size_t(k) + 1, 0);
+        const MergeStubSelection selection{{1000}, 100, 0.1};
+        const auto on = selection.on(view);
+        std::vector<std::pair<Technique, double>> rho;
         double sum = 0;
-        for (int s = 0; s <= k; ++s) {
-            if ((s > 0 && view.delta[s - 1]) || (s > 0 && s < k && view.delta[s])) continue;
-            double p = selection.connect_factor(view, s);
-            for (int i = 0; i < k; ++i) p *= i < s ? view.fwd[i] : view.rev[i];
-            sum += rho[size_t(s)] = p;
-        }
-        for (int s = 0; s <= k; ++s)
-            if (rho[size_t(s)] > 0) {
-                EXPECT_NEAR(mis_weight(view, {TechniqueKind::kConnect, s}, selection), rho[size_t(s)] / sum, 1e-12);
-            }
+        testing::for_each_technique(k, [&](Technique t) {
+            double p = possible(view, t) ? sigma(on, t) : 0;
+            if (t.kind == TechniqueKind::kMerge) p *= view.fwd[t.s];
+            for (int i = 0; i < k; ++i) p *= i < t.s ? view.fwd[i] : view.rev[i];
+            if (!(p > 0)) return;
+            rho.emplace_back(t, p);
+            sum += p;
+        });
+        for (const auto& [t, p] : rho) EXPECT_NEAR(mis_weight(view, t, on), p / sum, 1e-12) << to_string(t.kind) << ' ' << t.s;
     }
 }
 
-/// Depth 64 and scenes scaled by 1e-4 and 1e4: whole-path products would leave the range of double.
 /// Two vertices in the same place have an infinite density; the evaluator once never came back from one.
 TEST(WeightEvaluator, InfiniteDensitiesEnd) {
     WideProduct product;
@@ -172,6 +248,7 @@ TEST(WeightEvaluator, InfiniteDensitiesEnd) {
     EXPECT_EQ(product.value(1), HUGE_VAL);
 }
 
+/// Depth 64 and scenes scaled by 1e-4 and 1e4: whole-path products would leave the range of double.
 TEST(WeightEvaluator, LongPathsAndScaledScenesKeepTheirWeights) {
     for (uint64_t seed = 0; seed < 50; ++seed) {
         const int k = 64;
@@ -180,13 +257,12 @@ TEST(WeightEvaluator, LongPathsAndScaledScenesKeepTheirWeights) {
         for (const double scale : {1e-4, 1e4}) {
             const PathView scaled = synthetic_view(k, seed, scale);
             double sum = 0;
-            for (int s = 0; s <= k; ++s) {
-                if ((s > 0 && base.delta[s - 1]) || (s > 0 && s < k && base.delta[s])) continue;
-                const double a = mis_weight(base, {TechniqueKind::kConnect, s}, selection);
-                const double b = mis_weight(scaled, {TechniqueKind::kConnect, s}, selection);
+            testing::for_each_technique(k, [&](Technique t) {
+                if (!possible(base, t) || !(sigma(selection.on(base), t) > 0)) return;
+                const double a = mis_weight(base, t, selection.on(base)), b = mis_weight(scaled, t, selection.on(scaled));
                 EXPECT_NEAR(a, b, 1e-9);
                 sum += b;
-            }
+            });
             EXPECT_NEAR(sum, 1, 1e-9);
         }
     }
