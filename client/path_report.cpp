@@ -153,15 +153,19 @@ void append_path(std::string& out, const ReportedPath& path, size_t number, bool
     append(out, "\n");
     bool labels = false;
     for (const ReportedVertex& v : path.vertices) labels |= v.light_label >= 0 || v.eye_label >= 0;
-    append(out, "   %-5s %-21s %-26s %-26s %12s %12s %9s%s\n", "", "", "position", "normal", "fwd", "rev", "survival",
+    append(out, "   %-5s %-25s %-26s %-24s %12s %12s %9s%s\n", "", "", "position", "normal", "fwd", "rev", "survival",
            labels ? "  light/eye" : "");
     for (size_t i = 0; i < path.vertices.size(); ++i) {
         const ReportedVertex& v = path.vertices[i];
         const bool lens = i + 1 == path.vertices.size();
         std::string kind(v.kind);
-        if (v.emitter >= 0) kind += " " + std::to_string(v.emitter);
+        if (v.emitter >= 0) {
+            if (i > 0) kind += ", emitter";
+            kind += ' ';
+            kind += std::to_string(v.emitter);
+        }
         if (v.dirac) kind += ", Dirac";
-        append(out, "   x%-4zu %-21s %-26s %-26s", i, kind.c_str(), vec_text(v.position).c_str(),
+        append(out, "   x%-4zu %-25s %-26s %-24s", i, kind.c_str(), vec_text(v.position).c_str(),
                lens ? "" : vec_text(v.normal).c_str());
         if (!lens) append(out, " %12.6g %12.6g %9.4g", v.fwd, v.rev, double(v.survival));
         if (labels && !lens)

@@ -73,7 +73,10 @@ bool is_ours(const std::string& name) {
 std::string PyramidKey::name() const {
     std::string word(to_string(kind));
     std::replace(word.begin(), word.end(), ' ', '-');
-    return k == kLonger ? "longer-" + word : "k" + std::to_string(k) + "-s" + std::to_string(s) + "-" + word;
+    if (k == kLonger) return "longer-" + word;
+    std::string name(1, 'k');
+    name += std::to_string(k) + "-s" + std::to_string(s);
+    return name + '-' + word;
 }
 
 void UnitPictures::add(const SeenContribution& seen) {
@@ -225,7 +228,10 @@ Status write_pyramid(const std::string& directory, const Pyramid& pyramid, const
     const auto share = [](double part, double whole) { return whole > 0 ? part / whole : 0; };
     for (PyramidRow& row : page.rows) {
         row.light_share = share(row.mean, page.mean);
-        row.stops = stops_for(row.mean);
+        double brightest = 0;
+        for (const PyramidPicture& picture : row.pictures) brightest = std::max(brightest, picture.weighted);
+        row.weighted_stops = stops_for(brightest);
+        row.unweighted_stops = stops_for(row.mean);
         for (PyramidPicture& picture : row.pictures) {
             picture.light_share = share(picture.weighted, page.mean);
             picture.row_share = share(picture.unweighted, row.mean);
@@ -253,8 +259,8 @@ Status write_pyramid(const std::string& directory, const Pyramid& pyramid, const
     auto key = keys.begin();
     for (const PyramidRow& row : page.rows) {
         for (const PyramidPicture& picture : row.pictures) {
-            LL_RETURN_IF_ERROR(write("weighted-" + picture.name, pyramid.weighted(*key, scale), row.stops));
-            LL_RETURN_IF_ERROR(write("unweighted-" + picture.name, pyramid.unweighted(*key, scale), row.stops));
+            LL_RETURN_IF_ERROR(write("weighted-" + picture.name, pyramid.weighted(*key, scale), row.weighted_stops));
+            LL_RETURN_IF_ERROR(write("unweighted-" + picture.name, pyramid.unweighted(*key, scale), row.unweighted_stops));
             ++key;
         }
     }

@@ -35,6 +35,8 @@ tbody th{width:7rem;min-width:7rem;padding-right:.75rem;position:sticky;left:0;b
 tbody th b{font-size:1.1rem;display:block}
 td figure{margin:0 0 .6rem;width:clamp(104px,calc((100vw - 11rem)/var(--columns) - .8rem),300px)}
 td figure:last-child{margin-bottom:0}
+.together{display:flex;gap:.7rem}
+.together figure{margin:0}
 td figcaption{font-size:12px;line-height:1.4;margin-top:.25rem}
 figcaption b{font-weight:600}
 figcaption span{color:var(--soft);white-space:nowrap}
@@ -92,7 +94,9 @@ std::string percent(double share) {
 
 std::string stops_text(int stops) {
     if (stops == 0) return "as stored";
-    return (stops > 0 ? "+" : "−") + std::to_string(std::abs(stops)) + (std::abs(stops) == 1 ? " stop" : " stops");
+    std::string out(stops > 0 ? "+" : "−");
+    out += std::to_string(std::abs(stops));
+    return out + (std::abs(stops) == 1 ? " stop" : " stops");
 }
 
 std::string bar(double share, const char* kind) {
@@ -102,79 +106,89 @@ std::string bar(double share, const char* kind) {
 
 std::string picture_html(const PyramidPicture& p, const PyramidRow& row) {
     const std::string kind(to_string(p.kind));
-    const bool merge = p.kind == TechniqueKind::kMerge;
-    std::string split;
-    if (row.k > 0) split = "s " + std::to_string(p.s) + (merge ? "" : ", t " + std::to_string(row.k + 1 - p.s));
-    const auto image = [&](const char* weighting, const char* visible) {
-        const std::string file = std::string(weighting) + "-" + p.name;
-        return "<a class=" + std::string(visible) + " href=\"" + file + ".exr\"><img loading=lazy src=\"" + file + ".png\" alt=\"" +
-               kind + (split.empty() ? "" : ", " + split) + ", " + weighting + "\"></a>";
+    std::string split = "all s";
+    if (row.k > 0) split = "s " + std::to_string(p.s);
+    if (row.k > 0 && p.kind != TechniqueKind::kMerge) split += ", t " + std::to_string(row.k + 1 - p.s);
+    const auto image = [&](const std::string& weighting, const std::string& shown) {
+        const std::string file = weighting + "-" + p.name;
+        return "<a class=" + shown + " href=\"" + file + ".exr\"><img loading=lazy src=\"" + file + ".png\" alt=\"" + kind + ", " +
+               split + ", " + weighting + "\"></a>";
     };
-    return "<figure>" + image("weighted", "w") + image("unweighted", "u") + "<figcaption><div class=row><b>" + kind + "</b><span>" +
-           split + "</span></div>" + "<div class=w><div class=row><span>light</span>" + percent(p.light_share) + "</div>" +
-           bar(p.light_share, "light") + "<div class=row><span>variance</span>" + percent(p.noise_share) + "</div>" +
-           bar(p.noise_share, "noise") + "<div class=row><span>mean</span>" + formatted("%.3g", p.weighted) + "</div></div>" +
-           "<div class=u><div class=row><span>of the row</span>" + percent(p.row_share) + "</div>" + bar(p.row_share, "light") +
-           "<div class=row><span>mean</span>" + formatted("%.3g", p.unweighted) + "</div></div></figcaption></figure>\n";
+    const auto line = [](const char* name, const std::string& value) {
+        return "<div class=row><span>" + std::string(name) + "</span>" + value + "</div>";
+    };
+    std::string out = "<figure>" + image("weighted", "w") + image("unweighted", "u");
+    out += "<figcaption><div class=row><b>" + kind + "</b><span>" + split + "</span></div>";
+    out += "<div class=w>" + line("light", percent(p.light_share)) + bar(p.light_share, "light");
+    out += line("variance", percent(p.noise_share)) + bar(p.noise_share, "noise");
+    out += line("mean", formatted("%.3g", p.weighted)) + "</div>";
+    out += "<div class=u>" + line("of the row", percent(p.row_share)) + bar(p.row_share, "light");
+    out += line("mean", formatted("%.3g", p.unweighted)) + "</div>";
+    return out + "</figcaption></figure>\n";
 }
 
-/// By number of light vertices; the last row has no such number and keeps the order of kinds.
-size_t column_of(const PyramidPicture& p, const PyramidRow& row) { return row.k > 0 ? size_t(p.s) : size_t(p.kind); }
+std::string row_html(const PyramidRow& row, int depth, size_t columns) {
+    const std::string edges = row.k > 0 ? "k = " + std::to_string(row.k) : "k &gt; " + std::to_string(depth);
+    std::string out = "<tr><th scope=row><b>" + edges + "</b>" + percent(row.light_share) + " of the light<br><span class=note>";
+    out +=
+        "<span class=w>" + stops_text(row.weighted_stops) + "</span><span class=u>" + stops_text(row.unweighted_stops) + "</span>";
+    out += "</span></th>\n";
+    if (row.k == 0) {  // These have no place among the columns.
+        out += "<td colspan=" + std::to_string(columns) + "><div class=together>";
+        for (const PyramidPicture& p : row.pictures) out += picture_html(p, row);
+        return out + "</div></td></tr>\n";
+    }
+    for (size_t s = 0; s < columns; ++s) {
+        out += "<td>";
+        for (const PyramidPicture& p : row.pictures)
+            if (size_t(p.s) == s) out += picture_html(p, row);
+        out += "</td>";
+    }
+    return out + "</tr>\n";
+}
+
+constexpr const char* kSwitch = R"(<div class=switch role=group aria-label="Which pictures">
+<button value=weighted aria-pressed=true>weighted</button><button value=unweighted aria-pressed=false>unweighted</button></div>
+)";
+constexpr const char* kLegend = R"(<div class=w><p>What each technique gives to the image: its contributions times their weights.
+All pictures together are the image.</p>
+<p class=note><i class="key light"></i>share of the image’s mean luminance<br>
+<i class="key noise"></i>share of the variance, each pixel’s relative to its squared luminance + 0.01; techniques that vary
+together make the image’s own differ from the sum</p></div>
+<div class=u><p>What each technique finds by itself, without weights. Pictures of one row estimate the same light, each as far as
+its technique can find it.</p>
+<p class=note><i class="key light"></i>mean luminance relative to that of the row’s weighted pictures together</p></div>
+<p class=note>Rows: edges k of the path. Columns: light vertices s. The pictures of a row are brightened by the same whole stops;
+the EXR behind each is not.)";
 
 }  // namespace
 
 std::string pyramid_html(const PyramidPage& page) {
     size_t columns = 1;
     for (const PyramidRow& row : page.rows)
-        for (const PyramidPicture& p : row.pictures) columns = std::max(columns, column_of(p, row) + 1);
+        for (const PyramidPicture& p : row.pictures) columns = std::max(columns, size_t(p.s) + 1);
     const std::string title = escaped(page.scene) + ", " + escaped(page.algorithm) + ", by technique";
-    std::string out =
-        "<!doctype html>\n<html lang=en><head><meta charset=utf-8>"
-        "<meta name=viewport content=\"width=device-width,initial-scale=1\">\n<title>" +
-        title + "</title>\n<style>" + kStyle + "\n</style></head>\n<body>\n<header><div><h1>" + title + "</h1>\n";
-    out += "<p class=facts>" + std::to_string(page.samples_per_pixel) + " samples per pixel, " + std::to_string(page.width) +
-           " × " + std::to_string(page.height) + ", paths of at most " + std::to_string(page.max_depth + 1) + " edges, seed " +
-           std::to_string(page.seed) + ", lightloom " + escaped(page.build);
+    std::string out = "<!doctype html>\n<html lang=en><head><meta charset=utf-8>";
+    out += "<meta name=viewport content=\"width=device-width,initial-scale=1\">\n<title>" + title + "</title>\n<style>";
+    out += kStyle;
+    out += "\n</style></head>\n<body>\n<header><div><h1>" + title + "</h1>\n<p class=facts>";
+    out += std::to_string(page.samples_per_pixel) + (page.samples_per_pixel == 1 ? " sample" : " samples") + " per pixel, ";
+    out += std::to_string(page.width) + " × " + std::to_string(page.height) + ", paths of at most ";
+    out += std::to_string(page.max_depth + 1) + " edges, seed " + std::to_string(page.seed) + ", lightloom " + escaped(page.build);
     for (const auto& [key, value] : page.parameters) out += ", " + escaped(key) + "=" + escaped(value);
-    out +=
-        "</p>\n<div class=switch role=group aria-label=\"Which pictures\"><button value=weighted "
-        "aria-pressed=true>weighted</button>"
-        "<button value=unweighted aria-pressed=false>unweighted</button></div>\n";
-    out +=
-        "<div class=w><p>What each technique gives to the image: its contributions times their weights. All pictures together "
-        "are the image.</p><p class=note><i class=\"key light\"></i>share of the image’s mean luminance <i class=\"key noise\" "
-        "style=\"margin-left:.8em\"></i>share of the variance, relative to the squared luminance of each pixel plus 0.01" +
-        std::string(page.samples_per_pixel < 2 ? " (not known from one sample per pixel)" : "") + "</p></div>\n";
-    out +=
-        "<div class=u><p>What each technique finds by itself, without weights. Pictures of one row estimate the same light, each "
-        "as "
-        "far as its technique can find it.</p><p class=note><i class=\"key light\"></i>mean luminance relative to that of the "
-        "row’s "
-        "weighted pictures together</p></div>\n";
-    out +=
-        "<p class=note>Rows: edges k of the path. Columns: light vertices s. Every row is brightened by whole stops of its own; "
-        "the EXR behind a picture is not.";
+    out += "</p>\n";
+    out += kSwitch;
+    out += kLegend;
     if (page.not_finite > 0) out += " " + std::to_string(page.not_finite) + " contributions that are not finite are left out.";
-    out +=
-        "</p></div>\n<figure><a href=\"image.exr\"><img src=\"image.png\" alt=\"the image\"></a><figcaption class=note>the "
-        "image, " +
-        stops_text(page.stops) + ", mean luminance " + formatted("%.4g", page.mean) + "</figcaption></figure></header>\n";
-    out += "<main class=scroll><table style=\"--columns:" + std::to_string(columns) + "\">\n<thead><tr><th></th>";
+    out += "</p></div>\n<figure><a href=\"image.exr\"><img src=\"image.png\" alt=\"the image\"></a><figcaption class=note>";
+    out += "the image, " + stops_text(page.stops) + ", mean luminance " + formatted("%.4g", page.mean) + "</figcaption></figure>";
+    out += "</header>\n<main class=scroll><table style=\"--columns:" + std::to_string(columns) + "\">\n<thead><tr><th></th>";
     for (size_t s = 0; s < columns; ++s) out += "<th scope=col>s = " + std::to_string(s) + "</th>";
     out += "</tr></thead>\n<tbody>\n";
-    for (const PyramidRow& row : page.rows) {
-        out += "<tr><th scope=row><b>" + (row.k > 0 ? "k = " + std::to_string(row.k) : "k &gt; " + std::to_string(page.depth)) +
-               "</b>" + percent(row.light_share) + " of the light<br><span class=note>" + stops_text(row.stops) +
-               (row.k > 0 ? "" : "<br>all s together") + "</span></th>\n";
-        for (size_t column = 0; column < columns; ++column) {
-            out += "<td>";
-            for (const PyramidPicture& p : row.pictures)
-                if (column_of(p, row) == column) out += picture_html(p, row);
-            out += "</td>";
-        }
-        out += "</tr>\n";
-    }
-    return out + "</tbody></table></main>\n<script>" + kScript + "\n</script>\n</body></html>\n";
+    for (const PyramidRow& row : page.rows) out += row_html(row, page.depth, columns);
+    out += "</tbody></table></main>\n<script>";
+    out += kScript;
+    return out + "\n</script>\n</body></html>\n";
 }
 
 std::string pyramid_json(const PyramidPage& page) {
@@ -192,7 +206,8 @@ std::string pyramid_json(const PyramidPage& page) {
                                 {"unweighted_mean", p.unweighted},
                                 {"light_share", p.light_share},
                                 {"noise_share", std::isnan(p.noise_share) ? Json() : Json(p.noise_share)},
-                                {"png_stops", row.stops}});
+                                {"weighted_png_stops", row.weighted_stops},
+                                {"unweighted_png_stops", row.unweighted_stops}});
         }
     }
     const Json json = {{"lightloom_pyramid", 1},

@@ -22,8 +22,10 @@ struct PyramidPicture {
 
 /// Paths of one length.
 struct PyramidRow {
-    int k = 0;        ///< Edges; 0: all that are longer than the rows before.
-    int stops = 0;    ///< By which its PNG files are brighter than the EXR.
+    int k = 0;  ///< Edges; 0: all that are longer than the rows before.
+    /// By which its PNG files are brighter than the EXR: the brightest weighted picture of the row, and the whole light of the row,
+    /// which every unweighted picture may have found, are as bright as the whole image.
+    int weighted_stops = 0, unweighted_stops = 0;
     double mean = 0;  ///< Luminance of its weighted pictures together.
     double light_share = 0;
     std::vector<PyramidPicture> pictures;  ///< From the light's end of the path to the camera's.
