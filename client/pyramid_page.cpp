@@ -33,14 +33,14 @@ thead th{color:var(--soft);padding-bottom:0;border-bottom:1px solid var(--line)}
 tbody tr+tr>*{border-top:1px solid var(--line)}
 tbody th{width:7rem;min-width:7rem;padding-right:.75rem;position:sticky;left:0;background:var(--ground);z-index:1}
 tbody th b{font-size:1.1rem;display:block}
-td figure{margin:0 0 .6rem;width:clamp(104px,calc((100vw - 11rem)/var(--columns) - .8rem),300px)}
+td figure{margin:0 0 .6rem;width:clamp(122px,calc((100vw - 11rem)/var(--columns) - .8rem),300px)}
 td figure:last-child{margin-bottom:0}
 .together{display:flex;gap:.7rem}
 .together figure{margin:0}
 td figcaption{font-size:12px;line-height:1.4;margin-top:.25rem}
 figcaption b{font-weight:600}
 figcaption span{color:var(--soft);white-space:nowrap}
-figcaption .row{display:flex;justify-content:space-between;gap:.4rem;flex-wrap:wrap}
+figcaption .row{display:flex;justify-content:space-between;gap:0 .4rem;flex-wrap:wrap;white-space:nowrap}
 .bar{height:4px;margin:1px 0 2px;background:var(--line)}
 .bar i{display:block;height:100%}
 .light{background:var(--light)}.noise{background:var(--noise)}

@@ -10,9 +10,9 @@
 #include <sstream>
 
 #include "common/core/atomic_file.h"
-#include "common/core/digest.h"
 #include "common/film/exr_io.h"
 #include "common/transport/settings.h"
+#include "common/work/asset.h"
 #include "tests/service/process.h"
 
 namespace lightloom {
@@ -236,12 +236,12 @@ TEST_F(Look, MistakesAreExplained) {
     EXPECT_EQ(render({"--pyramid-depth", "3"}).exit_code, 2) << "of what?";
     for (const char* depth : {"0", "-1", "65", "x"})
         EXPECT_EQ(render({"--pyramid", path("p"), "--pyramid-depth", depth}).exit_code, 2);
-    for (const std::vector<std::string> other : {std::vector<std::string>{"-o", path("x.exr")},
-                                                 {"--png", path("x.png")},
-                                                 {"--half"},
-                                                 {"--layers"},
-                                                 {"--json", path("x.json")},
-                                                 {"--workers", "2"}}) {
+    for (const std::vector<std::string>& other : {std::vector<std::string>{"-o", path("x.exr")},
+                                                  {"--png", path("x.png")},
+                                                  {"--half"},
+                                                  {"--layers"},
+                                                  {"--json", path("x.json")},
+                                                  {"--workers", "2"}}) {
         std::vector<std::string> arguments{"--pyramid", path("p")};
         arguments.insert(arguments.end(), other.begin(), other.end());
         EXPECT_EQ(render(arguments).exit_code, 2) << other[0];
