@@ -87,9 +87,11 @@ int show_paths(const ReplayOptions& options, const BuiltJob& job, const Renderer
                         .splats_of_unit = shares_light_paths,
                         .splats_left_out = shares_light_paths && !options.splats};
     const uint32_t pixel = uint32_t(job.scene->frame().crop.index(report.x, report.y));
+    bool shown = false;
     const auto partial = renderer.watch(
         work,
         [&](const SeenContribution& seen) {
+            shown = true;
             if (!seen.found.technique.splats())
                 report.paths.push_back(report_path(*job.scene, seen));
             else if (!shares_light_paths || (options.splats && seen.pixel == pixel))
@@ -100,7 +102,7 @@ int show_paths(const ReplayOptions& options, const BuiltJob& job, const Renderer
     for (size_t i = 0; i < partial->camera.size(); ++i) report.camera[i % 3] += exposure_scale * partial->camera[i];
     report.dropped = partial->dropped_count;
     const bool black = partial->splats.empty() && report.camera == std::array<double, 3>{};
-    if (report.paths.empty() && report.splats.empty() && !report.splats_left_out && !black)
+    if (!shown && !black)
         return report_error(invalid_argument("algorithm '" + report.algorithm +
                                              "' does its own loops and shows no single contributions; leave out --paths"));
     std::fputs((options.json ? to_json(report) : to_text(report)).c_str(), stdout);

@@ -238,7 +238,7 @@ TEST(PyramidFiles, OtherPlacesAreRefused) {
 TEST(PyramidFiles, OneSampleHasNoVariance) {
     PyramidPage page{.samples_per_pixel = 1, .rows = {{.k = 2, .pictures = {{.s = 0, .name = "k2-s0-hit", .noise_share = NAN}}}}};
     EXPECT_TRUE(Json::parse(pyramid_json(page))["pictures"][0]["noise_share"].is_null());
-    EXPECT_EQ(pyramid_html(page).find("nan"), std::string::npos);
+    EXPECT_EQ(pyramid_html(page).find(">nan"), std::string::npos);
 }
 
 }  // namespace
