@@ -12,7 +12,9 @@
 
 #include "client/commands.h"
 #include "client/local_scene.h"
+#include "client/pyramid_render.h"
 #include "client/run_job.h"
+#include "client/table_options.h"
 #include "common/cli/numbers.h"
 #include "common/cli/start.h"
 #include "common/work/identity.h"
@@ -28,6 +30,7 @@ constexpr const char* kFooter = R"(Examples:
   lightloom render room.pbrt -o out.exr --png out.png --algorithm bdpt --spp 64
   lightloom render room.pbrt --time 60                        stop after a minute of rendering
   lightloom render room.pbrt --spp 4 --resolution 320x180     a quick look
+  lightloom render room.pbrt --pyramid room-techniques --resolution 320x180   which technique gives what
 
 The same job submitted to a service (`lightloom submit`) gives a file with the same SHA-256.)";
 
@@ -43,18 +46,6 @@ struct ScratchDirectory {
         if (!path.empty()) std::filesystem::remove_all(path, ignored);
     }
 };
-
-/// Where tables of earlier renders are kept.
-struct TableCacheOptions {
-    std::string directory;
-    uint64_t megabytes = 1024;
-};
-
-std::string default_table_cache() {
-    if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache) return std::string(cache) + "/lightloom/tables";
-    if (const char* home = std::getenv("HOME"); home && *home) return std::string(home) + "/.cache/lightloom/tables";
-    return "off";
-}
 
 int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, const TableCacheOptions& cache) {
     (void)interrupt_token();
@@ -98,8 +89,8 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, c
         answer->build_scene = build_scene;
         return answer;
     };
-    if (cache.directory != "off") coordinator_options.table_cache = cache.directory;
-    coordinator_options.table_cache_bytes = cache.megabytes << 20;
+    coordinator_options.table_cache = cache.path();
+    coordinator_options.table_cache_bytes = cache.bytes();
     // A worker of this process cannot get lost, but its machine may be suspended.
     coordinator_options.lease_seconds = 3600;
     Coordinator coordinator(std::move(coordinator_options));
@@ -135,7 +126,8 @@ void add_render_command(CLI::App& app, int* exit_code) {
     struct Options {
         JobOptions job;
         uint32_t threads = 0, workers = 1;
-        TableCacheOptions cache{.directory = default_table_cache()};
+        TableCacheOptions cache;
+        PyramidOptions pyramid;
     };
     auto options = std::make_shared<Options>();
     CLI::App* command = app.add_subcommand("render", "Render a scene on this machine");
@@ -147,20 +139,13 @@ void add_render_command(CLI::App& app, int* exit_code) {
     command->add_option("--workers", options->workers, "Embedded workers; the bytes do not depend on it")
         ->check(whole_number_between(1, 256))
         ->capture_default_str();
-    command
-        ->add_option("--table-cache", options->cache.directory,
-                     "Directory in which learned tables are kept for the next render, or off; it holds nothing else, no "
-                     "scene files and no images")
-        ->envname("LIGHTLOOM_TABLE_CACHE")
-        ->capture_default_str();
-    command
-        ->add_option("--table-cache-size", options->cache.megabytes, "MB that it may hold; the tables used least recently go first")
-        ->check(whole_number_between(1, uint64_t(1) << 30))
-        ->capture_default_str();
+    add_table_cache_options(*command, options->cache);
+    add_pyramid_options(*command, options->pyramid);
     command->callback([options, exit_code] {
         uint32_t threads = options->threads;
         if (threads == 0) threads = std::max(1u, processor_count() / options->workers);
-        *exit_code = render(options->job, threads, options->workers, options->cache);
+        *exit_code = !options->pyramid.directory.empty() ? render_pyramid(options->job, options->pyramid, threads, options->cache)
+                                                         : render(options->job, threads, options->workers, options->cache);
     });
 }
 

@@ -7,9 +7,11 @@
 
 #include "client/commands.h"
 #include "client/local_scene.h"
+#include "client/path_report.h"
+#include "client/run_job.h"
+#include "client/table_options.h"
 #include "common/cli/numbers.h"
 #include "common/transport/renderer.h"
-#include "common/transport/training.h"
 #include "common/work/job.h"
 
 namespace lightloom::client {
@@ -18,10 +20,14 @@ namespace {
 constexpr const char* kFooter = R"(Examples:
   lightloom replay room.pbrt --algorithm bdpt --iteration 17 --pixel 120,64
   lightloom replay room.pbrt --algorithm bdpt --unit 3,0
+  lightloom replay room.pbrt --algorithm bdpt --iteration 17 --pixel 120,64 --paths
 
 A manifest lists these commands for the samples that were dropped. --algorithm, --set, --seed, --max-depth and --resolution
 must be those of the job. The printed value is the sample's camera part, at the film's exposure, as in the EXR; what its light
-path splats elsewhere is listed behind it.)";
+path splats elsewhere is listed behind it. Tables come from the cache that `lightloom render` keeps, or are made and put there.
+
+--paths shows every contribution to the sample: technique, vertices, densities, labels, throughput, value and weight.
+)";
 
 struct ReplayOptions {
     JobOptions job;
@@ -30,6 +36,8 @@ struct ReplayOptions {
     std::vector<uint32_t> unit;  ///< Group, tile, or empty.
     uint64_t spp = 0;
     uint32_t threads = 0;
+    TableCacheOptions cache;
+    bool paths = false, json = false, splats = false;
 };
 
 /// A job's last group may be cut short, and what a unit traces depends on how long its group is.
@@ -65,21 +73,60 @@ Result<WorkUnit> find_unit(const ReplayOptions& options, const Plan& plan, uint6
     }
 }
 
+/// Prints what the sample is made of: `work`, of which `renderer` shows every contribution.
+int show_paths(const ReplayOptions& options, const BuiltJob& job, const Renderer& renderer, const WorkUnit& unit,
+               const RenderUnit& work, bool shares_light_paths) {
+    const double exposure_scale = double(job.exposure_scale);
+    SampleReport report{.algorithm = job.spec.algorithm.name(),
+                        .iteration = options.iteration,
+                        .x = options.pixel[0],
+                        .y = options.pixel[1],
+                        .group = unit.key.group,
+                        .tile = unit.key.tile,
+                        .exposure_scale = job.exposure_scale,
+                        .splats_of_unit = shares_light_paths,
+                        .splats_left_out = shares_light_paths && !options.splats};
+    const uint32_t pixel = uint32_t(job.scene->frame().crop.index(report.x, report.y));
+    bool shown = false;
+    const auto partial = renderer.watch(
+        work,
+        [&](const SeenContribution& seen) {
+            shown = true;
+            if (!seen.found.technique.splats())
+                report.paths.push_back(report_path(*job.scene, seen));
+            else if (!shares_light_paths || (options.splats && seen.pixel == pixel))
+                report.splats.push_back(report_path(*job.scene, seen));
+        },
+        interrupt_token());
+    if (!partial.ok()) return report_error(partial.status());
+    for (size_t i = 0; i < partial->camera.size(); ++i) report.camera[i % 3] += exposure_scale * partial->camera[i];
+    report.dropped = partial->dropped_count;
+    const bool black = partial->splats.empty() && report.camera == std::array<double, 3>{};
+    if (!shown && !black)
+        return report_error(invalid_argument("algorithm '" + report.algorithm +
+                                             "' does its own loops and shows no single contributions; leave out --paths"));
+    std::fputs((options.json ? to_json(report) : to_text(report)).c_str(), stdout);
+    return partial->dropped_count > 0 && options.job.strict ? kDroppedSamples : kSuccess;
+}
+
 int replay(const ReplayOptions& options) {
+    (void)interrupt_token();
     const auto built = build_job(options.job, options.threads);
     if (!built.ok()) return report_error(built.status());
     const JobSpec& spec = built->spec;
     const std::shared_ptr<const Scene>& scene = built->scene;
     const double exposure_scale = double(built->exposure_scale);
-    const auto renderer = create_with_tables(scene, render_settings(spec), {});
-    if (!renderer.ok()) return report_error(renderer.status());
     const Plan plan(scene->frame(), spec.algorithm);
     // Light sub-paths of a sample's own are replayed with it; those of a cache are the whole unit's.
-    const bool has_cache = spec.algorithm.info().learning != nullptr;
+    const bool shares_light_paths = spec.algorithm.info().learning != nullptr || spec.algorithm.info().frame == FrameShape::kWhole;
 
     const int x = options.pixel.empty() ? 0 : options.pixel[0], y = options.pixel.empty() ? 0 : options.pixel[1];
     const auto unit = find_unit(options, plan, options.iteration, x, y);
     if (!unit.ok()) return report_error(unit.status());
+    const auto tables = cached_tables(*scene, spec, options.cache, false, interrupt_token());
+    if (!tables.ok()) return report_error(tables.status());
+    const auto renderer = Renderer::create(scene, render_settings(spec), *tables);
+    if (!renderer.ok()) return report_error(renderer.status());
     const RenderUnit& whole = unit->render;
     RenderUnit work = whole;
     if (options.unit.empty()) {
@@ -89,21 +136,22 @@ int replay(const ReplayOptions& options) {
         work.first_iteration = options.iteration;
         work.iteration_count = 1;
         work.tile = {x, y, x + 1, y + 1};
-        if (has_cache) {
+        if (shares_light_paths) {
             work.owner_tile = whole.tile;  // the sample looks at the whole unit's cache
         } else {
             work.first_light_path = whole.first_light_path + place;
             work.light_path_count = whole.light_path_count > 0 ? 1 : 0;
         }
     }
-    const auto partial = (*renderer)->render(work, {});
+    if (options.paths) return show_paths(options, *built, **renderer, *unit, work, shares_light_paths);
+    const auto partial = (*renderer)->render(work, interrupt_token());
     if (!partial.ok()) return report_error(partial.status());
     double sum[3] = {};
     for (size_t i = 0; i < partial->camera.size(); ++i) sum[i % 3] += exposure_scale * partial->camera[i];
     std::printf("unit %u,%u  camera %.9g %.9g %.9g\n", unit->key.group, unit->key.tile, sum[0], sum[1], sum[2]);
     const int width = scene->frame().crop.width();
     // With a cache, the splats are the unit's, not this sample's.
-    if (options.unit.empty() && !has_cache) {
+    if (options.unit.empty() && !shares_light_paths) {
         for (const SplatSum& splat : partial->splats) {
             std::printf("splat at %d,%d  %.9g %.9g %.9g\n", scene->frame().crop.x0 + int(splat.pixel) % width,
                         scene->frame().crop.y0 + int(splat.pixel) / width, exposure_scale * splat.rgb[0],
@@ -124,7 +172,7 @@ int replay(const ReplayOptions& options) {
 void add_replay_command(CLI::App& app, int* exit_code) {
     auto options = std::make_shared<ReplayOptions>();
     CLI::App* command = app.add_subcommand("replay", "Render one sample or one unit of a job again and print it");
-    command->footer(kFooter);
+    command->footer(std::string(kFooter) + kPathSchema);
     add_render_settings(*command, options->job);
     auto* iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, from 0")
                           ->check(whole_number_between(0, JobSpec::kMaxSamplesPerPixel - 1));
@@ -140,7 +188,15 @@ void add_replay_command(CLI::App& app, int* exit_code) {
         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     iteration->needs(pixel);
     pixel->excludes(unit);
+    auto* paths =
+        command->add_flag("--paths", options->paths, "Print every contribution to the sample that --pixel names")->needs(pixel);
+    command->add_flag("--json", options->json, "With --paths: one JSON document instead of text")->needs(paths);
+    command
+        ->add_flag("--splats", options->splats,
+                   "With --paths: also what the unit's light paths splat into the pixel, where it is not the sample's own")
+        ->needs(paths);
     add_threads_option(*command, options->threads);
+    add_table_cache_options(*command, options->cache);
     command->add_flag("--strict", options->job.strict, "Exit with 3 if samples were dropped");
     command->callback([options, exit_code] {
         if (options->pixel.empty() && options->unit.empty()) throw CLI::RequiredError("--pixel or --unit");

@@ -34,6 +34,7 @@ struct SeenContribution {
     double weight;       ///< The image gets found.value * weight.
     uint32_t pixel;      ///< Row-major in the crop, where it lands.
     uint64_t iteration;  ///< Of the camera sample; of a light path that no camera sample owns, the unit's first.
+    bool labelled;       ///< Whether the view's subspace labels are filled in.
 };
 
 /// The weights of an algorithm on paths that somebody else has made, for tests: whatever made a path, all of its techniques must

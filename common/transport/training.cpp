@@ -337,6 +337,7 @@ Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, s
     Tables tables;
     if (!learning) return tables;
     const LearningPlan plan = learning->plan(settings.algorithm);
+    *report = {};
     for (size_t round = 0; round < plan.rounds.size(); ++round) {
         const Tables guide = plan.rounds[round].guided ? tables : Tables();
         const Result<TrainingGenerator> generator = TrainingGenerator::create(scene, settings, guide);
@@ -349,9 +350,15 @@ Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, s
             if (!unit.ok()) return unit.status();
             LL_RETURN_IF_ERROR(data.append(*unit));
         }
-        auto learned = learning->learn({data, round, guide, scene.emitters(), settings, {stop, {}}, report});
+        TrainingReport of_round;
+        auto learned = learning->learn({data, round, guide, scene.emitters(), settings, {stop, {}}, &of_round});
         if (!learned.ok()) return learned.status();
         tables = *std::move(learned);
+        // What is said of the tables is the last round's, but every round takes its time.
+        of_round.classifier_seconds += report->classifier_seconds;
+        of_round.energy_seconds += report->energy_seconds;
+        of_round.gamma_seconds += report->gamma_seconds;
+        *report = std::move(of_round);
     }
     return tables;
 }

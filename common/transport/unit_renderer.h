@@ -13,6 +13,14 @@ namespace detail {
 
 using See = std::function<void(const SeenContribution&)>;
 
+/// Whether an algorithm gives the subspace labels of the paths that it finds.
+template <class A>
+consteval bool labels_paths() {
+    if constexpr (requires { std::remove_cvref_t<decltype(std::declval<const A&>().method)>::kDetail; })
+        return std::remove_cvref_t<decltype(std::declval<const A&>().method)>::kDetail == ViewDetail::kSubspace;
+    return false;
+}
+
 /// An algorithm of which every contribution is shown.
 template <class A>
 struct Watched {
@@ -20,6 +28,8 @@ struct Watched {
     const See& see;
 
     static constexpr bool kPerIteration = prepares_per_iteration<A>();
+    /// Views of the other algorithms hold whatever was there before, and so do those of paths of one edge.
+    static constexpr bool kLabels = labels_paths<A>();
 
     template <class Contribute>
     void trace(SampleContext& context, Contribute&& contribute) const requires UnitAlgorithm<A> {
@@ -36,7 +46,7 @@ struct Watched {
         const Rect& crop = scope.scene.frame().crop;
         return inner.prepare(scope, preparation, [&](const PathContribution& c, PathView& view, float w, uint64_t m, auto& chunk) {
             const uint32_t pixel = uint32_t(crop.index(int(c.film.x), int(c.film.y)));
-            see({c, view, double(w), pixel, scope.work.first_iteration});
+            see({c, view, double(w), pixel, scope.work.first_iteration, kLabels && view.k >= 2});
             contribute(c, view, w, m, chunk);
         });
     }
@@ -56,7 +66,7 @@ struct Watched {
     void show(const SampleContext& context, const PathContribution& c, const PathView& view, float weight) const {
         const Rect& crop = context.scene.frame().crop;
         const uint32_t pixel = c.technique.splats() ? uint32_t(crop.index(int(c.film.x), int(c.film.y))) : context.pixel;
-        see({c, view, double(weight), pixel, context.iteration});
+        see({c, view, double(weight), pixel, context.iteration, kLabels && view.k >= 2});
     }
 };
 

@@ -1,0 +1,69 @@
+#include "client/table_options.h"
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+
+#include "common/cli/numbers.h"
+#include "common/transport/training.h"
+#include "common/work/identity.h"
+#include "server/table_cache.h"
+
+namespace lightloom::client {
+
+TableCacheOptions::TableCacheOptions() : directory("off") {
+    if (const char* home = std::getenv("HOME"); home && *home) directory = std::string(home) + "/.cache/lightloom/tables";
+    if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache) directory = std::string(cache) + "/lightloom/tables";
+}
+
+void add_table_cache_options(CLI::App& command, TableCacheOptions& options) {
+    command
+        .add_option("--table-cache", options.directory,
+                    "Directory in which learned tables are kept for the next render, or off; it holds nothing else, no "
+                    "scene files and no images")
+        ->envname("LIGHTLOOM_TABLE_CACHE")
+        ->capture_default_str();
+    command.add_option("--table-cache-size", options.megabytes, "MB that it may hold; the tables used least recently go first")
+        ->check(whole_number_between(1, uint64_t(1) << 30))
+        ->capture_default_str();
+}
+
+Result<Tables> cached_tables(const Scene& scene, const JobSpec& spec, const TableCacheOptions& options, bool quiet,
+                             std::stop_token stop) {
+    const LearningInfo* learning = spec.algorithm.info().learning;
+    if (!learning) return Tables();
+    const TableCache cache(options.path(), options.bytes());
+    Digest key;
+    if (!options.path().empty()) {
+        const auto identity = build_identity();
+        if (!identity.ok()) return identity.status();
+        key = table_key(*identity, spec);
+        if (const auto entry = cache.find(key, learning->parts)) return parse_tables(entry->bytes, learning->parts);
+    }
+    const uint64_t samples = learning->plan(spec.algorithm).samples;
+    if (!quiet)
+        std::fprintf(stderr, "lightloom: makes the tables of '%s' from %llu training samples; none of this job are in %s\n",
+                     spec.algorithm.name().c_str(), static_cast<unsigned long long>(samples),
+                     options.path().empty() ? "a cache (--table-cache off)" : options.directory.c_str());
+    const auto begin = std::chrono::steady_clock::now();
+    TrainingReport report;
+    auto tables = make_tables(scene, render_settings(spec), std::move(stop), &report);
+    if (!tables.ok() || options.path().empty()) return tables;
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    const double learned = report.classifier_seconds + report.energy_seconds + report.gamma_seconds;
+    cache.store(key, serialize(*tables),
+                {.light_subspaces = report.light_subspaces,
+                 .eye_subspaces = report.eye_subspaces,
+                 .training_samples = samples,
+                 .trace_seconds = seconds - learned,
+                 .classifier_seconds = report.classifier_seconds,
+                 .energy_seconds = report.energy_seconds,
+                 .gamma_seconds = report.gamma_seconds,
+                 .uniform_loss = report.gamma.uniform_loss,
+                 .loss = report.gamma.loss,
+                 .prior_strength = report.gamma.prior_strength,
+                 .note = report.note});
+    return tables;
+}
+
+}  // namespace lightloom::client

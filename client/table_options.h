@@ -1,0 +1,31 @@
+#pragma once
+// Where learned tables are kept between runs, for the commands that render in this process: the options, and the tables of a job
+// from there or made anew.
+
+#include <stop_token>
+
+#include "client/job_options.h"
+
+namespace lightloom::client {
+
+struct TableCacheOptions {
+    TableCacheOptions();
+
+    std::string directory;      ///< "off": none. At first that of the user.
+    uint64_t megabytes = 1024;  ///< That it may hold.
+
+    /// Empty for "off", as TableCache and the coordinator want it.
+    std::filesystem::path path() const { return directory == "off" ? std::filesystem::path() : std::filesystem::path(directory); }
+    uint64_t bytes() const { return megabytes << 20; }
+};
+
+/// --table-cache and --table-cache-size.
+void add_table_cache_options(CLI::App& command, TableCacheOptions& options);
+
+/// The tables that a job on `scene` renders with, those that a coordinator would learn for it: from the cache, which is where its
+/// `render` put them, or else made here and put there, which a line on standard error says. Empty for an algorithm without tables.
+/// `spec` has the frame and the depth.
+Result<Tables> cached_tables(const Scene& scene, const JobSpec& spec, const TableCacheOptions& options, bool quiet,
+                             std::stop_token stop);
+
+}  // namespace lightloom::client
