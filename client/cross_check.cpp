@@ -78,6 +78,9 @@ CrossCheck compare_estimates(const std::vector<std::string>& what, const std::ve
     const double doubt = sidak(kDoubtLevel, int(what.size())), differ = sidak(kDifferLevel, int(what.size()));
     for (size_t i = 0; i < what.size(); ++i) {
         CrossCheckRow row{what[i], references[i], checks[i], ratio_interval(checks[i], references[i], doubt)};
+        // A mean of zero comes without variance because no sample was found, which is not knowledge of a zero: whatever the check
+        // has found, the reference cannot contradict it.
+        if (row.reference.mean == 0 && row.check.mean != 0) row.interval.low = 0;
         if (row.interval.excludes(0)) {
             const bool beyond_doubt = ratio_interval(checks[i], references[i], differ).excludes(0);
             row.verdict = beyond_doubt ? Verdict::kDiffer : Verdict::kDoubtful;

@@ -15,7 +15,7 @@ namespace lightloom::client {
 
 enum class Verdict {
     kAgree,     ///< The 95 % interval contains 1.
-    kNoisy,     ///< It does, but it is so wide (more than +-20 %) that it says little.
+    kNoisy,     ///< It does, but it is so wide (more than +-20 %) that it says little; or the reference found no light at all.
     kDoubtful,  ///< It does not, but the 99.9 % interval does: by chance in one cross-check of twenty.
     kDiffer,    ///< Not even that one does.
 };

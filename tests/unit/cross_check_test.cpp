@@ -74,6 +74,19 @@ TEST(CompareEstimates, TellsNoiseFromDifference) {
     EXPECT_EQ(check.json()["outcome"], "differ");
 }
 
+/// A reference without light has found no sample: that its mean does not vary is no evidence against a check that did find some,
+/// however sure the check is of its own mean. A check without light, on the other hand, contradicts a reference that is known.
+/// Mutation: without the special case of a zero reference the first row differs.
+TEST(CompareEstimates, AReferenceThatFoundNothingContradictsNothing) {
+    const Estimate nothing{0, 0, 15}, faint{1e-3, 1e-10, 15}, one{1, 1e-6, 15};
+    const CrossCheck check = compare_estimates({"a", "b", "c"}, {nothing, nothing, one}, {faint, nothing, nothing});
+    EXPECT_EQ(check.rows[0].verdict, Verdict::kNoisy);
+    EXPECT_EQ(check.rows[0].interval.low, 0);
+    EXPECT_FALSE(std::isfinite(check.rows[0].interval.high));
+    EXPECT_EQ(check.rows[1].verdict, Verdict::kAgree);
+    EXPECT_EQ(check.rows[2].verdict, Verdict::kDiffer);
+}
+
 std::shared_ptr<const Scene> small_scene() {
     auto scene = Scene::build(golden_scene());
     EXPECT_TRUE(scene.ok()) << scene.status().message();
