@@ -124,28 +124,29 @@ std::shared_ptr<const Scene> bounded_scene() {
 /// Whose light sub-path a splat is: two units that trace the same one add the very same numbers to the same pixel.
 using SplatIdentity = std::tuple<uint32_t, double, double, double>;
 
-class Streams : public ::testing::TestWithParam<AlgorithmInfo> {
+class Streams : public ::testing::TestWithParam<const AlgorithmInfo*> {
   protected:
     void SetUp() override {
         scene_ = bounded_scene();
         // So few paths in a cache that it holds those that splat and others besides.
         set({{"cache", "200"}});
-        if (!GetParam().needs_tables) return;
+        if (!GetParam()->learning) return;
         // One table for all seeds: the units of a job share it as well, and given the table they are independent.
         TrainingReport report;
         auto made = make_tables(*scene_, settings(1), {}, &report);
         ASSERT_TRUE(made.ok()) << made.status().message();
-        tables_ = std::make_shared<const std::decay_t<decltype(*made)>>(*std::move(made));
+        tables_ = *std::move(made);
     }
     RenderSettings settings(uint64_t seed) const {
-        const std::string name(GetParam().name);
-        return {name, testing::with_small_training(name, parameters_), seed, 3};
+        const std::string name(GetParam()->name);
+        return testing::settings_of(name, testing::with_small_training(name, parameters_), seed, 3);
     }
     /// Sets what the row has of these parameters.
     void set(const std::map<std::string, std::string>& parameters) {
         for (const auto& [name, value] : parameters)
-            if (has_parameter(GetParam(), name)) parameters_[name] = value;
+            if (settings(1).algorithm.has(name)) parameters_[name] = value;
     }
+    bool has_tiles() const { return GetParam()->frame == FrameShape::kTiles; }
     std::vector<Rect> bands() const {
         std::vector<Rect> tiles;
         for (int i = 0; i < kUnits; ++i) tiles.push_back({0, i * kHeight / kUnits, kWidth, (i + 1) * kHeight / kUnits});
@@ -153,15 +154,14 @@ class Streams : public ::testing::TestWithParam<AlgorithmInfo> {
     }
     /// The units of a group of one iteration.
     std::vector<WorkUnit> units(uint64_t first_iteration, const std::vector<Rect>& tiles) const {
-        const auto parameters = parse_parameters(GetParam(), settings(1).parameters);
-        return split_group({0, first_iteration, 1}, tiles, light_paths_per_pixel(GetParam(), *parameters));
+        return split_group({0, first_iteration, 1}, tiles, plan_options(scene_->frame(), settings(1).algorithm));
     }
     std::vector<Partial> render(uint64_t seed, const std::vector<WorkUnit>& units) const {
         const auto renderer = Renderer::create(scene_, settings(seed), tables_);
         if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
         std::vector<Partial> partials;
         for (const WorkUnit& unit : units) {
-            Result<Partial> partial = (*renderer)->render(unit_work(unit), {});
+            Result<Partial> partial = (*renderer)->render(unit.render, {});
             if (!partial.ok()) throw std::runtime_error(partial.status().message());
             partials.push_back(*std::move(partial));
         }
@@ -169,7 +169,7 @@ class Streams : public ::testing::TestWithParam<AlgorithmInfo> {
     }
     /// A unit of training.
     TrainingData train(uint64_t seed, bool guided, uint64_t first_sample) const {
-        const auto generator = TrainingGenerator::create(*scene_, settings(seed), guided ? tables_.get() : nullptr);
+        const auto generator = TrainingGenerator::create(*scene_, settings(seed), guided ? tables_ : Tables());
         if (!generator.ok()) throw std::runtime_error(generator.status().message());
         Result<TrainingData> data = generator->trace({first_sample, kTrainingSamples, kTrainingTotal}, {});
         if (!data.ok()) throw std::runtime_error(data.status().message());
@@ -215,7 +215,7 @@ class Streams : public ::testing::TestWithParam<AlgorithmInfo> {
 
     std::shared_ptr<const Scene> scene_;
     std::map<std::string, std::string> parameters_;
-    std::shared_ptr<const SubspaceTables> tables_;
+    Tables tables_;
 };
 
 /// No light sub-path is traced by two groups or by two tiles: its splats would be found twice, bit for bit.
@@ -227,7 +227,8 @@ TEST_P(Streams, NoLightSubPathIsTracedTwice) {
     for (uint64_t seed = 42; seed < 50; ++seed) {
         std::vector<WorkUnit> work = first_groups();
         for (const WorkUnit& unit : scattered_groups(seed)) work.push_back(unit);
-        for (const WorkUnit& unit : units(kUnits, bands())) work.push_back(unit);
+        if (has_tiles())
+            for (const WorkUnit& unit : units(kUnits, bands())) work.push_back(unit);
         std::set<SplatIdentity> found;
         for (const Partial& partial : render(seed, work))
             for (const SplatSum& s : partial.splats) {
@@ -237,7 +238,7 @@ TEST_P(Streams, NoLightSubPathIsTracedTwice) {
             }
     }
     EXPECT_EQ(twice, 0u) << "of " << splats << " splat sums are those of another unit";
-    if (GetParam().splats) {
+    if (GetParam()->light_paths_per_pixel) {
         EXPECT_GT(splats, 400u);
     }
 }
@@ -245,7 +246,7 @@ TEST_P(Streams, NoLightSubPathIsTracedTwice) {
 /// Nor by two units of training, whichever round they belong to.
 /// Mutation: trace_guided() with first_light_path := 0 and group_first_iteration := 0 fails this.
 TEST_P(Streams, NoLightSubPathIsTrainedOnTwice) {
-    if (!GetParam().needs_tables) return;
+    if (!GetParam()->learning) return;
     std::set<std::tuple<float, float, float>> starts;
     uint64_t kept = 0;
     for (uint64_t unit = 0; unit < 4; ++unit) {
@@ -273,25 +274,27 @@ TEST_P(Streams, FirstGroupsAreNotCorrelated) {
 
 /// Mutation: first_light_path := 0 (light_cache.h, unit_loop.h) fails this for all rows that splat.
 TEST_P(Streams, TilesAreNotCorrelated) {
+    if (!has_tiles()) return;
     check_independence("tiles", true, false,
-                       [&](uint64_t seed) { return units(scattered_groups(seed)[0].first_iteration, bands()); });
+                       [&](uint64_t seed) { return units(scattered_groups(seed)[0].render.first_iteration, bands()); });
 }
 
 /// A cache so small that a unit's error is above all that of the light sub-paths in it, nearly all of them such as only fill it.
 /// Mutations: light_cache.h without the group's first iteration in the key of those paths, or without their tile's first pixel,
 /// fails this for the rows with a cache (neighbouring bands of the frame see the same light vertices).
 TEST_P(Streams, CachesAreIndependent) {
-    if (!has_parameter(GetParam(), "cache")) return;
+    if (!settings(1).algorithm.has("cache")) return;
     set({{"cache", "8"}, {"light-paths", "0.01"}, {"connections", "8"}});
     check_independence("cache_scattered", false, true, [&](uint64_t seed) { return scattered_groups(seed); });
+    if (!has_tiles()) return;
     check_independence("cache_tiles", true, false,
-                       [&](uint64_t seed) { return units(scattered_groups(seed)[0].first_iteration, bands()); });
+                       [&](uint64_t seed) { return units(scattered_groups(seed)[0].render.first_iteration, bands()); });
 }
 
 /// Training looks at the same scene with the job's seed. The brightness of its blocks must not follow that of the first groups.
 /// Mutation: training.cpp with kTrainingSeed := 0 fails this for the rows with tables.
 TEST_P(Streams, TrainingIsIndependentOfRendering) {
-    if (!GetParam().needs_tables) return;
+    if (!GetParam()->learning) return;
     set({{"light-paths", "1"}});
     const std::vector<WorkUnit> group{first_groups().front()};
     for (const bool guided : {false, true}) {
@@ -321,7 +324,7 @@ TEST_P(Streams, TrainingIsIndependentOfRendering) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Catalog, Streams, ::testing::ValuesIn(catalog().begin(), catalog().end()),
-                         [](const ::testing::TestParamInfo<AlgorithmInfo>& row) { return std::string(row.param.name); });
+                         [](const ::testing::TestParamInfo<const AlgorithmInfo*>& row) { return std::string(row.param->name); });
 
 }  // namespace
 }  // namespace lightloom
