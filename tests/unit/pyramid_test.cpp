@@ -9,9 +9,12 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "client/commands.h"
 #include "client/pyramid.h"
+#include "client/pyramid_render.h"
 #include "common/core/atomic_file.h"
 #include "common/film/exr_io.h"
+#include "common/transport/unit_renderer.h"
 #include "common/work/job.h"
 #include "tests/support/small_scenes.h"
 
@@ -239,6 +242,42 @@ TEST(PyramidFiles, OneSampleHasNoVariance) {
     PyramidPage page{.samples_per_pixel = 1, .rows = {{.k = 2, .pictures = {{.s = 0, .name = "k2-s0-hit", .noise_share = NAN}}}}};
     EXPECT_TRUE(Json::parse(pyramid_json(page))["pictures"][0]["noise_share"].is_null());
     EXPECT_EQ(pyramid_html(page).find(">nan"), std::string::npos);
+}
+
+/// Makes light in loops of its own.
+struct OwnLoops {
+    void run(const UnitScope&, UnitSink& sink) const {
+        sink.open(1);
+        sink.camera(0, 0, 0, Rgb(1));
+    }
+};
+
+constexpr ParameterInfo kOwnLoopsParameters[] = {kRouletteStart, kRouletteMin};
+const AlgorithmInfo kOwnLoopsRow{
+    .name = "own-loops",
+    .summary = "a test's",
+    .source = "none",
+    .bias = "everything",
+    .parameters = kOwnLoopsParameters,
+    .make = [](const RendererRequest& r) -> Result<std::unique_ptr<Renderer>> {
+        return make_unit_renderer(r, [](auto&&) { return OwnLoops{}; });
+    },
+};
+
+TEST(PyramidFiles, AnAlgorithmThatShowsNothingIsRefused) {
+    add_to_catalog(kOwnLoopsRow);
+    const Directory directory;
+    JobOptions options;
+    options.scene = std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/cornell.pbrt";
+    options.algorithm = "own-loops";
+    options.resolution = "8x8";
+    options.quiet = true;
+    TableCacheOptions no_cache;
+    no_cache.directory = "off";
+    ::testing::internal::CaptureStderr();
+    EXPECT_EQ(render_pyramid(options, {.directory = directory.path("p")}, 1, no_cache), kUsage);
+    EXPECT_NE(::testing::internal::GetCapturedStderr().find("'own-loops' does its own loops"), std::string::npos);
+    EXPECT_TRUE(fs::is_empty(directory.path("p")));
 }
 
 }  // namespace
