@@ -118,7 +118,7 @@ int replay(const ReplayOptions& options) {
     const double exposure_scale = double(built->exposure_scale);
     const Plan plan(scene->frame(), spec.algorithm);
     // Light sub-paths of a sample's own are replayed with it; those of a cache are the whole unit's.
-    const bool shares_light_paths = spec.algorithm.info().learning != nullptr || spec.algorithm.info().frame == FrameShape::kWhole;
+    const bool shares_light_paths = spec.algorithm.info().shares_light_paths;
 
     const int x = options.pixel.empty() ? 0 : options.pixel[0], y = options.pixel.empty() ? 0 : options.pixel[1];
     const auto unit = find_unit(options, plan, options.iteration, x, y);

@@ -67,6 +67,8 @@ struct AlgorithmInfo {
     bool camera_samples = true;  ///< False: all of its light is in splats.
     /// Light paths per pixel and iteration that land anywhere on the frame; null for an algorithm that traces none.
     double (*light_paths_per_pixel)(const AlgorithmSettings&) = nullptr;
+    /// Light paths belong to a unit and serve all of its samples, instead of one to each camera sample.
+    bool shares_light_paths = false;
     /// Null for an algorithm without tables.
     const LearningInfo* learning = nullptr;
     Result<std::unique_ptr<Renderer>> (*make)(const RendererRequest&);

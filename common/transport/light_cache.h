@@ -170,7 +170,8 @@ LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPr
 }
 
 /// Connects z_{t-1} to the end of a prefix: s = 1 to the point x_0 itself, s >= 2 to y_{s-1}. Unweighted contribution f / p with
-/// the prefix's density as traced, p(y); black when it fails. The view is the path's, whose point x_0 next event might have chosen too.
+/// the prefix's density as traced, p(y); black when it fails. The view is the path's, whose point x_0 next event might have chosen
+/// too.
 template <ViewDetail detail>
 Rgb connect_candidate(const Scene& scene, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view,
                       WalkCounters* counters) {

@@ -63,6 +63,7 @@ const AlgorithmInfo kLvcbptRow{
     .bias = "unbiased; misses what bdpt misses",
     .parameters = kParameters,
     .light_paths_per_pixel = chosen_light_paths,
+    .shares_light_paths = true,
     .learning = &kLearning,
     .make = make,
 };

@@ -48,14 +48,18 @@ inline constexpr ParameterInfo kConnections{
 /// The size of a training set; a time-limited job may make it smaller.
 inline constexpr std::string_view kTrainingPaths = "training-paths";
 
+/// The defaults for an algorithm without these parameters.
 inline RouletteRule roulette_of(const AlgorithmSettings& s) {
     RouletteRule rule;
+    if (!s.has(kRouletteStart.name) || !s.has(kRouletteMin.name)) return rule;
     rule.first_vertex = int(s.value(kRouletteStart.name));
     rule.min_survival = float(s.value(kRouletteMin.name));
     rule.max_survival = std::max(rule.max_survival, rule.min_survival);  // rr-min=1 switches roulette off
     return rule;
 }
-inline Heuristic heuristic_of(const AlgorithmSettings& s) { return Heuristic(int(s.value(kHeuristic.name))); }
+inline Heuristic heuristic_of(const AlgorithmSettings& s) {
+    return s.has(kHeuristic.name) ? Heuristic(int(s.value(kHeuristic.name))) : Heuristic::kBalance;
+}
 
 /// AlgorithmInfo::light_paths_per_pixel of algorithms that trace one light path per camera sample, and of those that let the user
 /// choose.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "common/core/check.h"
 #include "common/path/path_view.h"
 
 namespace lightloom {
@@ -58,7 +59,10 @@ size_t AlgorithmSettings::index(std::string_view parameter) const {
     return i;
 }
 
-double AlgorithmSettings::value(std::string_view parameter) const { return values_.at(index(parameter)); }
+double AlgorithmSettings::value(std::string_view parameter) const {
+    LL_CHECK(has(parameter), "algorithm '" + name() + "' has no parameter '" + std::string(parameter) + "'");
+    return values_[index(parameter)];
+}
 
 bool AlgorithmSettings::chosen(std::string_view parameter) const { return has(parameter) && chosen_[index(parameter)]; }
 
@@ -70,9 +74,10 @@ AlgorithmSettings AlgorithmSettings::completed() const {
 
 AlgorithmSettings AlgorithmSettings::with(std::string_view parameter, double value) const {
     AlgorithmSettings changed = *this;
+    LL_CHECK(has(parameter), "algorithm '" + name() + "' has no parameter '" + std::string(parameter) + "'");
     const size_t i = index(parameter);
-    changed.values_.at(i) = value;
-    changed.chosen_.at(i) = true;
+    changed.values_[i] = value;
+    changed.chosen_[i] = true;
     return changed;
 }
 

@@ -112,6 +112,7 @@ const AlgorithmInfo kSpcbptRow{
     .bias = "unbiased; misses what bdpt misses",
     .parameters = kParameters,
     .light_paths_per_pixel = chosen_light_paths,
+    .shares_light_paths = true,
     .learning = &kLearning,
     .make = make,
 };

@@ -28,7 +28,7 @@
 namespace lightloom {
 
 /// For messages of tests.
-static void PrintTo(const AlgorithmInfo& row, std::ostream* out) { *out << row.name; }
+static void PrintTo(const AlgorithmInfo* row, std::ostream* out) { *out << row->name; }
 
 namespace {
 

@@ -108,11 +108,25 @@ void add_sums(const Scene& scene, const FullPath& path, Technique own, const Pat
     }
 }
 
+/// What turns the density of a camera sub-path, crossing the Dirac vertex x_i of a path, into the measure of a light sub-path that
+/// crosses it the other way. The density of the vertex behind a Dirac event is its probability times the geometry of the edge,
+/// without the spreading of the ray, and refraction spreads by the squared index ratio and the ratio of the cosines. (Weights know
+/// neither: they still sum to one, and are the balance heuristic's up to that factor.)
+double refraction_measure(const FullPath& path, int i) {
+    const PathVertex& v = path.x[size_t(i)];
+    const bool sky = path.infinite && i == 1;
+    const Vec3 to_light = sky ? -path.x[0].ng : normalize(path.x[size_t(i - 1)].p - v.p);
+    const Vec3 to_camera = normalize((i + 1 < path.k() ? path.x[size_t(i + 1)].p : path.lens) - v.p);
+    const double light = dot(v.shading.n, to_light), camera = dot(v.shading.n, to_camera), index = v.bsdf.eta;
+    if (v.bsdf.kind != BsdfKind::kDielectric || light * camera > 0) return 1;
+    return std::fabs(light / camera) * (camera > 0 ? index * index : 1 / (index * index));
+}
+
 class Weights : public ::testing::TestWithParam<testing::NamedScene> {};
 
 /// With Russian roulette where a path was traced, without where it is rebuilt: weights do not know it.
 TEST_P(Weights, SumToOneOverAllTechniques) {
-    const auto scene = GetParam().make();
+    const auto scene = GetParam().make(), stage = GetParam().stage(scene);
     const bool hits = can_be_hit(*scene);
     // A scene without lights that can be hit has far fewer paths to offer.
     const int count = hits ? 4000 : 10000;
@@ -126,7 +140,7 @@ TEST_P(Weights, SumToOneOverAllTechniques) {
                 *scene, count, kEdges, 40 + seed,
                 [&](const FullPath& path, Technique own, const PathView& view, const Rgb&) {
                     ++made[size_t(own.s)];
-                    if (path.k() >= 2) add_sums(*scene, path, own, view, &family);
+                    if (path.k() >= 2) add_sums(*stage, path, own, view, &family);
                 },
                 family.front().weights.get());
             if (all.empty()) {
@@ -147,23 +161,25 @@ TEST_P(Weights, SumToOneOverAllTechniques) {
 }
 
 TEST_P(Weights, EveryTechniqueSeesTheSamePath) {
-    const auto scene = GetParam().make();
+    const auto scene = GetParam().make(), stage = GetParam().stage(scene);
     Tally densities, contributions;
     testing::for_each_path(*scene, 1500, 6, 12, [&](const FullPath& path, Technique own, const PathView&, const Rgb&) {
         const int k = path.k();
         if (k < 2) return;
-        // f = contribution * density of the technique: the same number for all of them.
+        // f = contribution * density of the technique: in one measure, the same number for all of them.
         const auto f_of = [&](const PathView& v, const Rgb& c, Technique t) {
             const bool next_event = t.kind == TechniqueKind::kNextEvent, merge = t.kind == TechniqueKind::kMerge;
             double density = next_event ? v.next_event : merge ? v.fwd[t.s] : 1;
             for (int i = next_event ? 1 : 0; i < k; ++i) density *= i < t.s ? v.fwd[i] : v.rev[i];
+            for (int i = std::max(t.s, 1); i < k; ++i)
+                if (v.delta[i]) density *= refraction_measure(path, i);
             return density * scalar_of(c);
         };
-        const auto mine = testing::rebuild(*scene, path, own);
+        const auto mine = testing::rebuild(*stage, path, own);
         if (!mine) return;
         const double f = f_of(mine->view, mine->contribution, own);
         testing::for_each_technique(k, [&](Technique t) {
-            const auto other = testing::rebuild(*scene, path, t);
+            const auto other = testing::rebuild(*stage, path, t);
             if (!other) return;
             EXPECT_EQ(other->view.k, k);
             for (int i = 0; i < k; ++i) {
