@@ -70,7 +70,7 @@ TEST(BothEnds, AlgorithmsAgreeWhereLightPassesThrough) {
         const auto scene = named.make();
         std::vector<std::pair<std::string, testing::RegionMeans>> all;
         for (const std::string& name : testing::algorithms_of(named.complete))
-            if (!(*find_algorithm(name))->needs_tables)
+            if (!(*find_algorithm(name))->learning)
                 all.emplace_back(name, testing::replicate(testing::catalog_image(scene, name, 3, 4), scene->frame().crop, kSeeds,
                                                           1000 * (all.size() + 1)));
         for (size_t a = 0; a < all.size(); ++a)

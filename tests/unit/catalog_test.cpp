@@ -114,7 +114,7 @@ TEST(Settings, BadValuesAreRefusedByNameAndRange) {
                 const auto settings = AlgorithmSettings(small_settings(*row).algorithm).with(p.name, value);
                 const auto again = AlgorithmSettings::parse(name, settings.text());
                 ASSERT_TRUE(again.ok()) << again.status().message();
-                EXPECT_EQ(*again, settings) << name << " " << p.name;
+                EXPECT_EQ(*again, settings.completed()) << name << " " << p.name;
             }
             for (size_t c = 0; c < p.choices.size(); ++c)
                 EXPECT_EQ(AlgorithmSettings::parse(name, {{std::string(p.name), std::string(p.choices[c])}})->value(p.name),

@@ -20,3 +20,4 @@ add_test(NAME light_math_symbols COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/light_math_
 add_test(NAME light_sources COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/light_sources.sh ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}
          $<TARGET_FILE:lt_transport> $<TARGET_FILE:lt_import> -- ${light_archives} -- ${all_archives})
 add_test(NAME one_definition COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/one_definition.sh ${all_archives})
+add_test(NAME includes COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/includes.sh ${CMAKE_SOURCE_DIR})
