@@ -205,6 +205,70 @@ inline std::shared_ptr<const Scene> spherical_lights() {
     return b.build();
 }
 
+/// The Cornell box without what stands in it.
+inline SceneBuilder empty_box_builder() {
+    SceneBuilder b = cornell_builder();
+    b.description().spheres.clear();
+    b.description().meshes.pop_back();
+    return b;
+}
+
+/// Diffuse surfaces inside smooth glass: a light sub-path is refracted on its way in and can be connected afterwards, so that the
+/// throughput of light prefixes has to know what a Dirac refraction does to it.
+inline std::shared_ptr<const Scene> spheres_in_glass() {
+    SceneBuilder b = empty_box_builder();
+    Material glass;
+    glass.kind = MaterialKind::kDielectric;
+    glass.ior = 1.5f;
+    b.sphere({0.02f, 1, 0.26f}, 0.68f, b.add(glass));
+    b.sphere({-0.2f, 0.95f, 0.2f}, 0.19f, b.diffuse({0.8f, 0.6f, 0.3f}));
+    b.sphere({0.22f, 0.95f, 0.3f}, 0.19f, b.diffuse({0.4f, 0.7f, 0.8f}));
+    b.quad({-0.4f, 0.75f, -0.15f}, {0, 0, 0.8f}, {0.8f, 0, 0}, b.diffuse({0.7f, 0.7f, 0.6f}));
+    return b.build();
+}
+
+/// Mixed materials (of two smooth kinds; of a Dirac and a smooth kind, one mix inside another) and a pane of thin glass.
+inline std::shared_ptr<const Scene> mixes_and_pane() {
+    SceneBuilder b = empty_box_builder();
+    Material metal, mirror, thin;
+    metal.kind = mirror.kind = MaterialKind::kConductor;
+    metal.reflectance = b.constant({0.9f, 0.7f, 0.4f}), mirror.reflectance = b.constant({0.8f, 0.9f, 0.9f});
+    metal.roughness_u = metal.roughness_v = b.constant(Rgb(0.3f));
+    metal.remap_roughness = false;
+    thin.kind = MaterialKind::kThinDielectric;
+    thin.ior = 1.5f;
+    const auto mix = [&](MaterialId first, MaterialId second, float amount) {
+        Material m;
+        m.kind = MaterialKind::kMix;
+        m.mix_a = first, m.mix_b = second, m.mix_amount = b.constant(Rgb(amount));
+        return b.add(m);
+    };
+    const MaterialId worn = mix(b.add(metal), b.diffuse({0.3f, 0.5f, 0.6f}), 0.7f);
+    b.description().meshes[0].attributes.material = worn;
+    b.sphere({0.4f, 0.4f, 0.3f}, 0.4f, mix(b.add(mirror), worn, 0.6f));
+    b.quad({-0.9f, 0.1f, 0.5f}, {0.9f, 0.1f, -0.3f}, {0, 1.2f, 0.1f}, b.add(thin));
+    return b.build();
+}
+
+/// Surfaces of fractional opacity: a veil that is the same everywhere, a sphere, and a screen with a checkered opacity. Every ray
+/// decides anew whether it passes. `veil` is the opacity of all three in units of what the scene has: 0 takes them away.
+inline std::shared_ptr<const Scene> translucent(float veil) {
+    SceneBuilder b = cornell_builder();
+    const auto opacity = [&](float value) { return b.constant(Rgb(value * veil)); };
+    TextureNode checks;
+    checks.kind = TextureKind::kCheckerboard;
+    checks.a = opacity(0.8f), checks.b = opacity(0.3f);
+    checks.su = checks.sv = 4;
+    b.description().textures.push_back(checks);
+    const TextureId checkered = TextureId(b.description().textures.size()) - 1;
+    b.quad({-0.9f, 1.4f, -0.5f}, {1.3f, 0, 0}, {0, 0, 1.2f}, b.diffuse({0.7f, 0.5f, 0.3f})).attributes.alpha = opacity(0.5f);
+    b.quad({-0.8f, 0.1f, -0.2f}, {1.2f, 0, 0.2f}, {0, 1, 0}, b.diffuse({0.4f, 0.7f, 0.5f})).attributes.alpha = checkered;
+    b.sphere({0.5f, 1.2f, 0.2f}, 0.3f, b.diffuse({0.5f, 0.4f, 0.8f})).attributes.alpha = opacity(0.6f);
+    return b.build();
+}
+inline std::shared_ptr<const Scene> fractional_opacity() { return translucent(1); }
+inline std::shared_ptr<const Scene> fractional_opacity_taken_away() { return translucent(0); }
+
 /// A caustic: a point light behind a glass ball and beside a mirror, neither of them seen by the
 /// camera. Next event and hits never find it, light sub-paths do.
 inline std::shared_ptr<const Scene> caustic_of_a_point_light() {
@@ -261,6 +325,14 @@ struct NamedScene {
     /// `path` meets caustics here only by rare, bright hits: the variance that its samples show is
     /// not the one that it has, and only paths too short for caustics (k <= 2) can be tested.
     bool caustics = false;
+    /// The same scene without its surfaces of fractional opacity. Whether a ray passes them is decided anew for every ray and is no
+    /// matter of weights, so that the other techniques of a path that came through are rebuilt where nothing is in their way.
+    std::shared_ptr<const Scene> (*unveiled)() = nullptr;
+
+    /// Where paths of `scene`, which make() made, are rebuilt.
+    std::shared_ptr<const Scene> stage(const std::shared_ptr<const Scene>& scene) const {
+        return unveiled != nullptr ? unveiled() : scene;
+    }
 };
 
 inline constexpr NamedScene kScenes[] = {
@@ -272,8 +344,11 @@ inline constexpr NamedScene kScenes[] = {
     {"spherical_lights", spherical_lights, "path light bdpt"},
     {"environment_lit", environment_lit, "path light bdpt"},
     {"delta_lights", delta_lights, "path light bdpt"},
-    {"glass_and_mirror", glass_and_mirror, "path bdpt"},                   // light: what is seen through glass is missing
-    {"rough_and_coated", rough_and_coated, "path bdpt", true},             // light: and what a smooth coat reflects
+    {"glass_and_mirror", glass_and_mirror, "path bdpt"},        // light: what is seen through glass is missing
+    {"rough_and_coated", rough_and_coated, "path bdpt", true},  // light: and what a smooth coat reflects
+    {"spheres_in_glass", spheres_in_glass, "path bdpt", true},
+    {"mixes_and_pane", mixes_and_pane, "path bdpt"},
+    {"fractional_opacity", fractional_opacity, "path light bdpt", false, fractional_opacity_taken_away},
     {"caustic_of_a_point_light", caustic_of_a_point_light, "light bdpt"},  // path: the caustic is missing
 };
 

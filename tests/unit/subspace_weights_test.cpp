@@ -63,7 +63,7 @@ class SubspaceWeights : public ::testing::TestWithParam<testing::NamedScene> {};
 
 /// As the technique itself filled its view in while it was traced (with Russian roulette), and as all others would.
 TEST_P(SubspaceWeights, SumToOneWhateverTheTablesHold) {
-    const auto scene = GetParam().make();
+    const auto scene = GetParam().make(), stage = GetParam().stage(scene);
     const UniformSelection uniform{double(scene->frame().crop.area()), 0.37, TypicalSurvival(RouletteRule{})};
     Tally lvc, balance, power, aware, correlated, traced;
     std::vector<int> made(kEdges + 1, 0);
@@ -82,7 +82,7 @@ TEST_P(SubspaceWeights, SumToOneWhateverTheTablesHold) {
                 if (k < 2) return;
                 double sums[6] = {};
                 for (int s = 0; s <= k; ++s) {
-                    const auto r = rebuild(*scene, path, s, &labeller);
+                    const auto r = rebuild(*stage, path, s, &labeller);
                     if (!r) continue;
                     const Technique technique{TechniqueKind::kConnect, s};
                     sums[0] += mis_weight(r->view, technique, uniform);
@@ -135,8 +135,10 @@ TEST(CorrelationFactor, LiesBetweenOneOverTheConnectionsAndOne) {
     EXPECT_EQ(correlation_factor(view, 2, 1e9), 1);
 }
 
+/// Mutations: light_step() of random_walk.h without the squared index ratio of a Dirac refraction fails this (and the sums) on
+/// spheres_in_glass; with it for thin panes as well, on mixes_and_pane.
 TEST_P(SubspaceWeights, EveryTechniqueSeesTheSameLabelsAndThroughput) {
-    const auto scene = GetParam().make();
+    const auto scene = GetParam().make(), stage = GetParam().stage(scene);
     testing::RandomTableOptions options;
     options.light_count = options.eye_count = 200, options.source_cells = 60, options.tree_leaves = 300;
     const SubspaceTables tables = random_tables(scene->emitters(), 5, options);
@@ -148,7 +150,7 @@ TEST_P(SubspaceWeights, EveryTechniqueSeesTheSameLabelsAndThroughput) {
             const int k = path.k();
             if (k < 2) return;
             for (int s = 0; s <= k; ++s) {
-                const auto other = rebuild(*scene, path, s, &labeller);
+                const auto other = rebuild(*stage, path, s, &labeller);
                 if (!other) continue;
                 // What a connection of s' light vertices reads, where it is possible and light tracing reaches it.
                 double reached = 1;

@@ -42,10 +42,24 @@ double weight_sum(const Scene& scene, const FullPath& path, const Selection& sel
     return sum;
 }
 
+/// What turns the density of a camera sub-path, crossing the Dirac vertex x_i of a path, into the measure of a light sub-path that
+/// crosses it the other way. The density of the vertex behind a Dirac event is its probability times the geometry of the edge,
+/// without the spreading of the ray, and refraction spreads by the squared index ratio and the ratio of the cosines. (Weights know
+/// neither: they still sum to one, and are the balance heuristic's up to that factor.)
+double refraction_measure(const FullPath& path, int i) {
+    const PathVertex& v = path.x[size_t(i)];
+    const bool sky = path.infinite && i == 1;
+    const Vec3 to_light = sky ? -path.x[0].ng : normalize(path.x[size_t(i - 1)].p - v.p);
+    const Vec3 to_camera = normalize((i + 1 < path.k() ? path.x[size_t(i + 1)].p : path.lens) - v.p);
+    const double light = dot(v.shading.n, to_light), camera = dot(v.shading.n, to_camera), index = v.bsdf.eta;
+    if (v.bsdf.kind != BsdfKind::kDielectric || light * camera > 0) return 1;
+    return std::fabs(light / camera) * (camera > 0 ? index * index : 1 / (index * index));
+}
+
 class Weights : public ::testing::TestWithParam<testing::NamedScene> {};
 
 TEST_P(Weights, SumToOneOverAllTechniques) {
-    const auto scene = GetParam().make();
+    const auto scene = GetParam().make(), stage = GetParam().stage(scene);
     BdptSelection bdpt;
     bdpt.light_paths_per_iteration = double(scene->frame().crop.area());
     const MergeStubSelection merging{bdpt};
@@ -58,12 +72,12 @@ TEST_P(Weights, SumToOneOverAllTechniques) {
     testing::for_each_path(*scene, hits ? 10000 : 30000, 7, 11, [&](const FullPath& path, int s, const PathView&, const Rgb&) {
         ++made[size_t(s)];
         if (path.k() < 2) return;
-        tallies[0].add(weight_sum(*scene, path, bdpt, Heuristic::kBalance) - 1, path);
-        tallies[1].add(weight_sum(*scene, path, bdpt, Heuristic::kPower) - 1, path);
-        tallies[2].add(weight_sum(*scene, path, merging, Heuristic::kBalance) - 1, path);
-        tallies[3].add(weight_sum(*scene, path, pairing, Heuristic::kBalance) - 1, path);
-        if (s <= 1) tallies[4].add(weight_sum(*scene, path, PathSelection{}, Heuristic::kBalance) - 1, path);
-        if (s == path.k()) tallies[5].add(weight_sum(*scene, path, LightSelection{}, Heuristic::kBalance) - 1, path);
+        tallies[0].add(weight_sum(*stage, path, bdpt, Heuristic::kBalance) - 1, path);
+        tallies[1].add(weight_sum(*stage, path, bdpt, Heuristic::kPower) - 1, path);
+        tallies[2].add(weight_sum(*stage, path, merging, Heuristic::kBalance) - 1, path);
+        tallies[3].add(weight_sum(*stage, path, pairing, Heuristic::kBalance) - 1, path);
+        if (s <= 1) tallies[4].add(weight_sum(*stage, path, PathSelection{}, Heuristic::kBalance) - 1, path);
+        if (s == path.k()) tallies[5].add(weight_sum(*stage, path, LightSelection{}, Heuristic::kBalance) - 1, path);
     });
     const char* names[] = {"bdpt balance", "bdpt power", "merge stub", "pairing stub", "path", "light"};
     for (int i = 0; i < 6; ++i) tallies[i].check(names[i]);
@@ -71,23 +85,25 @@ TEST_P(Weights, SumToOneOverAllTechniques) {
 }
 
 TEST_P(Weights, EveryTechniqueSeesTheSamePath) {
-    const auto scene = GetParam().make();
+    const auto scene = GetParam().make(), stage = GetParam().stage(scene);
     Tally densities, contributions;
     testing::for_each_path(*scene, 1500, 6, 12, [&](const FullPath& path, int own, const PathView&, const Rgb&) {
         const int k = path.k();
         if (k < 2) return;
-        // f = contribution * density of the technique: the same number for all of them.
+        // f = contribution * density of the technique: in one measure, the same number for all of them.
         const auto f_of = [&](const PathView& v, const Rgb& c, int s) {
             double density = s == 1 ? v.next_event : 1;
             for (int i = 0; i < k; ++i)
                 if (!(s == 1 && i == 0)) density *= i < s ? v.fwd[i] : v.rev[i];
+            for (int i = std::max(s, 1); i < k; ++i)
+                if (v.delta[i]) density *= refraction_measure(path, i);
             return density * scalar_of(c);
         };
-        const auto mine = testing::rebuild(*scene, path, own);
+        const auto mine = testing::rebuild(*stage, path, own);
         if (!mine) return;
         const double f = f_of(mine->view, mine->contribution, own);
         for (int s = 0; s <= k; ++s) {
-            const auto other = testing::rebuild(*scene, path, s);
+            const auto other = testing::rebuild(*stage, path, s);
             if (!other) continue;
             EXPECT_EQ(other->view.k, k);
             for (int i = 0; i < k; ++i) {
