@@ -83,7 +83,7 @@ int list_jobs(const ServiceOptions& options) {
         if (job.state == JobState::kPreparing) note = phase_text(job) + " ";
         if (job.message.empty() && !is_terminal(job.state) && job.eta_seconds >= 0) note += duration_text(job.eta_seconds);
         std::printf("%-18s %-10s %-8s %14s %8llu  %s\n", job.job_id.c_str(), std::string(to_string(job.state)).c_str(),
-                    job.spec.algorithm.name().c_str(), units.c_str(), static_cast<unsigned long long>(job.samples_per_pixel_done),
+                    job.algorithm.c_str(), units.c_str(), static_cast<unsigned long long>(job.samples_per_pixel_done),
                     note.c_str());
     }
     return kSuccess;

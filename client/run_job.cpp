@@ -38,7 +38,7 @@ std::string random_id() {
 Status write_statistics(const std::string& path, const JobInfo& job, const Digest& digest, const ClientTimes& times) {
     const double seconds = job.render_seconds > 0 ? job.render_seconds : 1e-9;
     Json json = {{"job", job.job_id},
-                 {"algorithm", job.spec.algorithm.name()},
+                 {"algorithm", job.algorithm},
                  {"state", to_string(job.state)},
                  {"sha256", digest.hex()},
                  {"samples_per_pixel", job.samples_per_pixel_done},

@@ -38,9 +38,12 @@ Result<Tables> cached_tables(const Scene& scene, const JobSpec& spec, const Tabl
         const auto identity = build_identity();
         if (!identity.ok()) return identity.status();
         key = table_key(*identity, spec);
-        if (const auto entry = cache.find(key, learning->parts)) return parse_tables(entry->bytes, learning->parts);
+        if (const auto entry = cache.find(key, learning->parts)) {
+            auto tables = parse_tables(entry->bytes, learning->parts);
+            if (tables.ok() && tables->validate(scene.emitters()).ok()) return tables;  // otherwise they are made again
+        }
     }
-    const uint64_t samples = learning->plan(spec.algorithm).samples;
+    const uint64_t samples = learning_plan(spec.algorithm).samples;
     if (!quiet)
         std::fprintf(stderr, "lightloom: makes the tables of '%s' from %llu training samples; none of this job are in %s\n",
                      spec.algorithm.name().c_str(), static_cast<unsigned long long>(samples),

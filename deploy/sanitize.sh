@@ -39,7 +39,7 @@ for preset in "${presets[@]}"; do
     elif [ -n "$quick" ]; then
         names=(core film image_io import import_shapes import_textures import_looks coordinator bookkeeping client worker)
     fi
-    tests=(-LE statistical)
+    tests=(-LE "statistical|nightly")
     targets=(all)
     if [ ${#names[@]} -gt 0 ]; then
         targets=("${names[@]/%/_test}" "${controls[@]}")

@@ -24,7 +24,7 @@ cd build/release
 if [ $# -gt 0 ]; then
     exec ctest --output-on-failure "$@"
 fi
-ctest --output-on-failure -j "$(nproc)" -LE statistical
+ctest --output-on-failure -j "$(nproc)" -LE "statistical|nightly"
 
 cd "$root"
 cmake --preset fuzz >/dev/null

@@ -114,6 +114,7 @@ class Coordinator::Tracing final : public TracingPort {
         if (guide.empty()) {
             const std::lock_guard lock(coordinator_.mutex_);
             if (!alive()) return over();
+            replace_guide({}, nullptr);
             coordinator_.open_training(job_, UnitKind::kTraining, round, work);
             return {};
         }
@@ -122,8 +123,7 @@ class Coordinator::Tracing final : public TracingPort {
         {
             const std::lock_guard lock(coordinator_.mutex_);
             if (!alive()) return over();
-            job_.guide = {digest, bytes->size()};  // before the bytes are there, so that no job that ends takes them away
-            job_.guide_bytes = bytes;
+            replace_guide({digest, bytes->size()}, bytes);  // before they are there, so that no job that ends takes them away
         }
         LL_RETURN_IF_ERROR(coordinator_.store_tables(digest, *bytes));
         const std::lock_guard lock(coordinator_.mutex_);
@@ -136,6 +136,12 @@ class Coordinator::Tracing final : public TracingPort {
     }
 
   private:
+    /// What the units of the round to come read. Under the mutex.
+    void replace_guide(const AssetReference& guide, std::shared_ptr<const std::string> bytes) {
+        const Digest old = std::exchange(job_.guide, guide).digest;
+        job_.guide_bytes = std::move(bytes);
+        if (old != guide.digest) coordinator_.drop_tables(old);
+    }
     /// Under the mutex.
     bool alive() const { return job_.state == JobState::kPreparing && !stop_.stop_requested(); }
 
@@ -183,7 +189,7 @@ Status Coordinator::finish_tables(JobRecord& job, LearnedTables learned) {
 
 void Coordinator::open_first_round(JobRecord& job) {
     const AlgorithmSettings& algorithm = job.spec.algorithm;
-    open_training(job, UnitKind::kTraining, 0, algorithm.info().learning->plan(algorithm).work(0));
+    open_training(job, UnitKind::kTraining, 0, learning_plan(algorithm).work(0));
 }
 
 }  // namespace lightloom

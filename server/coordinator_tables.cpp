@@ -40,8 +40,8 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
     if (job.state != JobState::kPreparing) return {};
     // Who chose the training set knows what it costs; and what a probe has chosen already stays.
     const bool chosen = job.submitted.algorithm.chosen(kTrainingPaths) || job.capped_by_time_limit;
-    const bool open_size = spec.time_limit_seconds > 0 && !chosen;
-    const uint64_t samples = uint64_t(spec.algorithm.value(kTrainingPaths));
+    const bool open_size = spec.time_limit_seconds > 0 && !chosen && spec.algorithm.has(kTrainingPaths);
+    const uint64_t samples = learning_plan(spec.algorithm).samples;
     job.table_key = table_key(options_.identity, spec);
     job.spec = std::move(spec);
     job.facts = std::move(facts);

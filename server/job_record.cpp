@@ -62,6 +62,7 @@ JobInfo JobRecord::info(TimePoint now) const {
     info.job_id = id;
     info.state = state;
     info.spec = spec;
+    info.algorithm = spec.algorithm.name();
     info.message = message;
     info.revision = revision;
     info.unit_total = units ? units->unit_total() : ended_units.total;

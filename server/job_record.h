@@ -85,7 +85,7 @@ const std::shared_ptr<JobRecord>& maker_of_last_resort(const std::shared_ptr<Job
 /// Behind the word "unit", for people.
 inline std::string unit_name(const UnitKey& key) {
     return key.kind == UnitKind::kRender ? std::to_string(key.group) + "/" + std::to_string(key.tile)
-                                         : "of training " + std::to_string(key.group);
+                                         : "of training " + std::to_string(key.round) + "/" + std::to_string(key.group);
 }
 
 /// A unit that failed on this many workers fails its job: it is the unit, not the workers.

@@ -8,16 +8,14 @@
 namespace lightloom {
 namespace {
 
-LearningPlan plan_of(const AlgorithmSettings& algorithm) { return algorithm.info().learning->plan(algorithm); }
-
 Result<AffordableSet> affordable_set(const JobSpec& spec, const TracedRound& probe, const EmitterSet& emitters,
                                      const WorkerRegistry::Crew& crew, const std::function<TimePoint()>& clock,
                                      const std::stop_token& stop) {
     const RenderSettings settings = render_settings(spec);
-    const LearningPlan plan = plan_of(spec.algorithm);
+    const LearningPlan plan = learning_plan(spec.algorithm);
     const TimePoint begin = clock();
     TrainingReport report;
-    const auto tables = spec.algorithm.info().learning->learn({probe.data, 0, {}, emitters, settings, {stop, {}}, &report});
+    const auto tables = learn({probe.data, 0, {}, emitters, settings, {stop, {}}, &report});
     if (!tables.ok()) return tables.status();
     AffordableSet set;
     set.wanted = plan.samples;
@@ -36,7 +34,7 @@ Result<AffordableSet> affordable_set(const JobSpec& spec, const TracedRound& pro
                                            budget, most);
     };
     const auto with_samples = [&](uint64_t n) { return spec.algorithm.with(kTrainingPaths, double(n)); };
-    const auto has_pilot = [&](uint64_t n) { return plan_of(with_samples(n)).rounds.size() > 1; };
+    const auto has_pilot = [&](uint64_t n) { return learning_plan(with_samples(n)).rounds.size() > 1; };
     set.samples = affordable(has_pilot(set.wanted), set.wanted);
     // A set too small for two rounds costs what one round costs.
     if (has_pilot(set.wanted) && !has_pilot(set.samples))
@@ -66,20 +64,20 @@ Result<std::optional<LearnedTables>> learn_tables(JobSpec spec, const EmitterSet
         }
         port.learning_begins();
         TrainingReport report;
-        auto tables = spec.algorithm.info().learning->learn({round->data,
-                                                             round->round,
-                                                             guide,
-                                                             emitters,
-                                                             render_settings(spec),
-                                                             {stop, [&](double share) { port.learning_goes_on(share); }},
-                                                             &report});
+        auto tables = learn({round->data,
+                             round->round,
+                             guide,
+                             emitters,
+                             render_settings(spec),
+                             {stop, [&](double share) { port.learning_goes_on(share); }},
+                             &report});
         if (!tables.ok()) return tables.status();
         info.training_samples += round->data.samples;
         info.trace_seconds += round->seconds;
         info.classifier_seconds += report.classifier_seconds;
         info.energy_seconds += report.energy_seconds;
         info.gamma_seconds += report.gamma_seconds;
-        const LearningPlan plan = plan_of(spec.algorithm);
+        const LearningPlan plan = learning_plan(spec.algorithm);
         const size_t next = round->round + 1;
         if (next == plan.rounds.size()) {
             info.light_subspaces = report.light_subspaces;

@@ -117,7 +117,11 @@ std::optional<TableCache::Entry> TableCache::find(const Digest& key, std::span<c
     const auto parts = split(*bytes);
     Status status = parts.status();
     if (parts.ok() && parts->key_line != key.hex()) status = data_loss("the entry is that of another job");
-    if (status.ok()) status = parse_tables(parts->tables, known).status();
+    if (status.ok()) {
+        const auto tables = parse_tables(parts->tables, known);
+        status = tables.status();
+        if (tables.ok() && !tables->consist_of(known)) status = data_loss("a part of the tables is missing");
+    }
     Result<TablesInfo> info = status.ok() ? info_from(parts->info_line) : status;
     status = info.status();
     std::error_code ignored;

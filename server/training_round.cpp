@@ -47,7 +47,7 @@ Result<TrainingData> join(std::vector<TrainingRound::Part> parts, std::stop_toke
 }
 
 uint64_t energy_paths(const JobSpec& spec, const TrainingWork& work) {
-    const LearningPlan plan = spec.algorithm.info().learning->plan(spec.algorithm);
+    const LearningPlan plan = learning_plan(spec.algorithm);
     return plan.energy_paths_before(work.first_sample + work.sample_count) - plan.energy_paths_before(work.first_sample);
 }
 

@@ -24,7 +24,7 @@ uint64_t UnitTable::prefix(const Digest& digest) {
 }
 
 UnitTable::Entry* UnitTable::entry(const UnitKey& key) {
-    if (key.group < merged_groups_ || key.group >= opened_groups() || key.tile >= tile_count()) return nullptr;
+    if (key.group < merged_groups_ || key.group >= opened_groups() || !is_ours(key)) return nullptr;
     return &open_[key.group - merged_groups_][key.tile];
 }
 
@@ -35,7 +35,7 @@ Group UnitTable::group(uint32_t index) const {
 }
 
 std::optional<WorkUnit> UnitTable::find(const UnitKey& key) const {
-    if (key.group >= opened_groups() || key.tile >= tile_count()) return std::nullopt;
+    if (key.group >= opened_groups() || !is_ours(key)) return std::nullopt;
     if (key.group < merged_groups_) return plan_.units(group(key.group))[key.tile];
     return open_[key.group - merged_groups_][key.tile].unit;
 }
@@ -153,7 +153,7 @@ std::set<uint32_t> UnitTable::lose(const UnitKey& key, uint32_t worker) {
 }
 
 UnitTable::Completion UnitTable::complete(const UnitKey& key, uint32_t worker, const Digest& digest) {
-    if (key.group < merged_groups_ && key.tile < tile_count()) {
+    if (key.group < merged_groups_ && is_ours(key)) {
         const Done& done = done_[size_t(key.group) * tile_count() + key.tile];
         return done.digest_prefix == prefix(digest) ? Completion::kDuplicateSame : Completion::kDuplicateDifferent;
     }

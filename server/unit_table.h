@@ -102,6 +102,8 @@ class UnitTable {
     uint32_t opened_groups() const { return merged_groups_ + uint32_t(open_.size()); }
     /// Group `index` as the job has it: the last one may be cut short.
     Group group(uint32_t index) const;
+    /// Keys come from the network: one of another kind or round must not pass for one of this table's.
+    bool is_ours(const UnitKey& key) const { return key.tile < tile_count() && key == plan_.key(key.group, key.tile); }
     /// The record of a unit of an open group.
     Entry* entry(const UnitKey& key);
     bool open_group();

@@ -32,7 +32,8 @@ constexpr int kSubmitAttempts = 40;
 constexpr uint64_t kWarmUpShare = 8, kWarmUpPerThread = kTrainingChunkSamples;
 
 std::string name_of(const UnitReference& unit) {
-    if (unit.key.kind != UnitKind::kRender) return unit.job_id + " training unit " + std::to_string(unit.key.group);
+    if (unit.key.kind != UnitKind::kRender)
+        return unit.job_id + " training unit " + std::to_string(unit.key.round) + "/" + std::to_string(unit.key.group);
     return unit.job_id + " unit " + std::to_string(unit.key.group) + "/" + std::to_string(unit.key.tile);
 }
 

@@ -43,6 +43,8 @@ Result<PartialBounds> check_partial(const Partial& partial, const FrameLayout& f
     if (camera_bits >= kInfinity) {
         return data_loss("partial: a camera sum is NaN or infinite; the partial is corrupt");
     }
+    if (partial.samples_per_pixel == 0 && camera_bits != 0)
+        return data_loss("partial: camera sums without camera samples; nothing could be divided by their number");
     const uint64_t crop_area = uint64_t(crop.area());
     uint64_t next = 0;
     int64_t splat_bits = 0;

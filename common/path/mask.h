@@ -22,8 +22,8 @@ struct TechniqueMask {
     static TechniqueMask length(int k) { return {.min_k = k, .max_k = k}; }
 
     bool allows(int k, Technique t) const {
-        const int light_vertices = t.kind == TechniqueKind::kMerge ? t.s + 1 : t.s;
-        return on[int(t.kind)] && k >= min_k && k <= max_k && light_vertices <= max_light_vertices && (only_s < 0 || t.s == only_s);
+        return on[int(t.kind)] && k >= min_k && k <= max_k && t.light_vertices() <= max_light_vertices &&
+               (only_s < 0 || t.s == only_s);
     }
 };
 

@@ -33,6 +33,8 @@ struct Technique {
     static constexpr Technique lens(int k) { return {TechniqueKind::kLens, k}; }
     static constexpr Technique merge(int i) { return {TechniqueKind::kMerge, i}; }
 
+    /// Vertices of the light sub-path, the one at which a merge met the camera's included.
+    constexpr int light_vertices() const { return kind == TechniqueKind::kMerge ? s + 1 : s; }
     /// Whether the contribution may land in any pixel, because no camera sub-path decided which.
     constexpr bool splats() const { return kind == TechniqueKind::kLens; }
 

@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::string_view kMagic = "lightloom-tables 2\n";
 static_assert(kMagic.starts_with(kTablesPrefix));
+constexpr std::string_view kAlgorithm = "algorithm";  // no part's name
 
 }  // namespace
 
@@ -22,15 +23,15 @@ void Tables::put(const TablePart* part, std::shared_ptr<const void> value) {
     }
 }
 
-std::shared_ptr<const void> Tables::find(std::string_view name) const {
+std::shared_ptr<const void> Tables::find(const TablePart* part) const {
     for (const Entry& e : parts_)
-        if (e.part->name == name) return e.value;
+        if (e.part == part) return e.value;
     return nullptr;
 }
 
 bool Tables::consist_of(std::span<const TablePart* const> parts) const {
     return parts.size() == parts_.size() &&
-           std::all_of(parts.begin(), parts.end(), [&](const TablePart* p) { return find(p->name) != nullptr; });
+           std::all_of(parts.begin(), parts.end(), [&](const TablePart* p) { return find(p) != nullptr; });
 }
 
 Status Tables::validate(const EmitterSet& emitters) const {
@@ -40,6 +41,7 @@ Status Tables::validate(const EmitterSet& emitters) const {
 
 std::string serialize(const Tables& tables) {
     std::string out(kMagic);
+    put_section(out, kAlgorithm, tables.algorithm_);
     for (const Tables::Entry& e : tables.parts_) put_section(out, e.part->name, e.part->serialize(e.value.get()));
     return out;
 }
@@ -49,6 +51,10 @@ Result<Tables> parse_tables(std::string_view bytes, std::span<const TablePart* c
     if (!sections.ok()) return sections.status();
     Tables tables;
     for (const auto& [name, content] : *sections) {
+        if (name == kAlgorithm) {
+            tables.belong_to(std::string(content));
+            continue;
+        }
         const auto part = std::find_if(known.begin(), known.end(), [&](const TablePart* p) { return p->name == name; });
         if (part == known.end())
             return failed_precondition("the tables have a part '" + name +

@@ -38,9 +38,12 @@ class Tables {
     /// Null when there is no such part.
     template <class T>
     std::shared_ptr<const T> get() const {
-        return std::static_pointer_cast<const T>(find(T::kPart.name));
+        return std::static_pointer_cast<const T>(find(&T::kPart));
     }
     bool empty() const { return parts_.empty(); }
+    /// Whose they are; empty where nobody has said so. Algorithms may have parts of the same kind that mean nothing to one another.
+    const std::string& algorithm() const { return algorithm_; }
+    void belong_to(std::string algorithm) { algorithm_ = std::move(algorithm); }
     /// Whether these are the parts, no more and no fewer.
     bool consist_of(std::span<const TablePart* const> parts) const;
     Status validate(const EmitterSet& emitters) const;
@@ -51,12 +54,13 @@ class Tables {
         std::shared_ptr<const void> value;
     };
     void put(const TablePart* part, std::shared_ptr<const void> value);
-    std::shared_ptr<const void> find(std::string_view name) const;
+    std::shared_ptr<const void> find(const TablePart* part) const;
 
     friend std::string serialize(const Tables& tables);
     friend Result<Tables> parse_tables(std::string_view bytes, std::span<const TablePart* const> known);
 
     std::vector<Entry> parts_;  // by name
+    std::string algorithm_;
 };
 
 /// What serialized tables of every version begin with.

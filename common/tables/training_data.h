@@ -62,7 +62,8 @@ struct TrainingData {
     /// Everything that training relies on. Estimates, squares, densities and sums may leave the range of their type in a scene
     /// of extremes; see in_range().
     Status validate(size_t emitter_count) const;
-    /// Whether all numbers of a path are finite. Training leaves the others out.
+    /// Whether all numbers of a path that tables are learned from are finite (next_event is none of them). Training leaves the
+    /// others out.
     bool in_range(const TrainingPath& path) const;
 };
 

@@ -6,6 +6,7 @@
 //       Selection selection(const UnitScope&) const;   // the densities of one unit's weights (common/path/mis.h), made before its
 //                                                      // first sub-path: what it has to trace itself, it traces from streams of
 //                                                      its own
+//       Selection densities;                           // where all units have the same: weights can be asked about single paths
 //       static constexpr bool kUnitSelection;          // optional; whether they depend on more of the unit than its group
 //       static constexpr bool kNextEvent;              // optional; next event estimation as well, beside s = 1 from the cache
 //       static constexpr ViewDetail kDetail;

@@ -1,8 +1,8 @@
 #pragma once
 // The catalog: every algorithm with what it is, its parameters, what kind of units it needs, how it is made and how its tables are
 // learned. One row per algorithm, written in the algorithm's own file; the command line, the documentation (`lightloom
-// algorithms`), validation, plans, workers, coordinator and the property suites all read it from here, and nothing else names an
-// algorithm.
+// algorithms`), validation, plans, workers, coordinator and the property suites all read it from here. Besides, an algorithm is
+// named where pbrt's integrators are translated (client/default_algorithm.cpp).
 
 #include <cstdint>
 #include <memory>

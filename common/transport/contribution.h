@@ -92,7 +92,7 @@ inline PathContribution from_light_path(const Rgb& value, Technique technique, c
             .normal = y[0].ng,
             .emitter = uint32_t(y[0].emitter),
             .film = film,
-            .survival = y[technique.s - 1].survival * z[t - 1].survival};
+            .survival = y[technique.light_vertices() - 1].survival * z[t - 1].survival};
 }
 
 /// Connects every vertex of a light sub-path y[0 .. n-1] that can be connected to the lens.

@@ -57,6 +57,11 @@ struct LearnRequest {
     TrainingReport* report;
 };
 
+/// Of an algorithm that learns. Its rounds make up its samples, and none is empty.
+LearningPlan learning_plan(const AlgorithmSettings& algorithm);
+/// The tables of one round, marked as those of the algorithm.
+Result<Tables> learn(const LearnRequest& request);
+
 /// One round, or two if a pilot traces `pilot_share` of the samples first to guide the rest. Rounds are whole units, so that both
 /// are planned alike; one round where the set is too small for two.
 std::vector<LearningRound> rounds_with_pilot(uint64_t samples, double pilot_share);

@@ -76,6 +76,8 @@ AlgorithmSettings AlgorithmSettings::with(std::string_view parameter, double val
     AlgorithmSettings changed = *this;
     LL_CHECK(has(parameter), "algorithm '" + name() + "' has no parameter '" + std::string(parameter) + "'");
     const size_t i = index(parameter);
+    LL_CHECK_GE(value, info_->parameters[i].min_value);
+    LL_CHECK_LE(value, info_->parameters[i].max_value);
     changed.values_[i] = value;
     changed.chosen_[i] = true;
     return changed;

@@ -27,7 +27,7 @@ struct UnlearnedAffinity {
 using RenderSelection = Corrected<SubspaceSelection<UnlearnedAffinity>>;
 
 /// What Reservoir::offer() needs to know of the render.
-struct RenderCounts {
+struct RenderToCome {
     const EmitterSet& emitters;
     RenderSelection selection;
 };
@@ -36,7 +36,7 @@ struct RenderCounts {
 class Reservoir {
   public:
     /// `weight`, of the generator's techniques; `scale` of what it found. Returns the estimate.
-    double offer(const PathContribution& c, PathView& view, double weight, double scale, uint32_t block, const RenderCounts& render,
+    double offer(const PathContribution& c, PathView& view, double weight, double scale, uint32_t block, const RenderToCome& render,
                  Rng& rng) {
         const double contribution = double(scalar_of(c.value)) * scale, estimate = weight * contribution;
         if (!(estimate > 0) || !std::isfinite(estimate)) return 0;
@@ -50,12 +50,12 @@ class Reservoir {
         vertices_.resize(size_t(k) + 1);
         vertices_[0] = {c.position, c.normal, 0, c.emitter};
         for (int i = 1; i < k; ++i) {
-            const PathVertex& v = i < c.technique.s ? c.y[i] : c.z[k - i];
+            const PathVertex& v = i < c.technique.light_vertices() ? c.y[i] : c.z[k - i];
             vertices_[size_t(i)] = {v.p, v.ng, 0, 0};
         }
         vertices_[size_t(k)] = {c.z[0].p, {}, 0, 0};
-        view_throughput(c.y, c.technique.s, c.z, &view);
-        view_footprint(render.emitters[c.emitter], c.y, c.technique.s, c.z, c.t, &view);
+        view_throughput(c.y, c.technique.light_vertices(), c.z, &view);
+        view_footprint(render.emitters[c.emitter], c.y, c.technique.light_vertices(), c.z, c.t, &view);
         const double inverse_own = double(c.inverse_density) * scale / double(c.survival);
         path_.next_event = path_.lens = 0;
         const auto on = render.selection.on(view);
@@ -150,7 +150,7 @@ Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const Re
     TrainingGenerator generator(scene);
     generator.roulette_ = roulette_of(algorithm);
     generator.heuristic_ = heuristic_of(algorithm);
-    generator.plan_ = algorithm.info().learning->plan(algorithm);
+    generator.plan_ = learning_plan(algorithm);
     generator.light_paths_per_iteration_ = algorithm.light_paths_per_iteration(scene.frame().crop.area());
     if (!guide.empty()) {
         LL_RETURN_IF_ERROR(guide.validate(scene.emitters()));
@@ -178,7 +178,7 @@ class TrainingGenerator::Unit {
     Rect crop() const { return generator_.scene_->frame().crop; }
     double pixels() const { return double(crop().area()); }
     const Blocks& blocks() const { return blocks_; }
-    RenderCounts render() const {
+    RenderToCome render() const {
         const LearningPlan& plan = generator_.plan_;
         return {generator_.scene_->emitters(),
                 {{{},
@@ -267,7 +267,7 @@ Result<TrainingData> TrainingGenerator::trace(const TrainingWork& work, std::sto
 
 Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
     const BdptSelection generator{unit.pixels()};
-    const RenderCounts render = unit.render();
+    const RenderToCome render = unit.render();
     return unit.trace(unit.empty(), [&](SampleContext& context, uint32_t camera_block, TrainingData& data, Rng& rng) {
         CameraReservoirs from_camera;
         Reservoir from_light;
@@ -296,7 +296,7 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
                                                                 .roulette = roulette_});
     const SpcbptAlgorithm<> generator{{selection, guide_, plan_.connections}, heuristic_, 1};
     const RenderUnit work = unit.light_work();
-    const RenderCounts render = unit.render();
+    const RenderToCome render = unit.render();
     // Light sub-paths are traced in parallel; what they bring is joined in their order.
     struct FromLight {
         Reservoir reservoir;
@@ -333,10 +333,9 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
 }
 
 Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, std::stop_token stop, TrainingReport* report) {
-    const LearningInfo* learning = settings.algorithm.info().learning;
     Tables tables;
-    if (!learning) return tables;
-    const LearningPlan plan = learning->plan(settings.algorithm);
+    if (!settings.algorithm.info().learning) return tables;
+    const LearningPlan plan = learning_plan(settings.algorithm);
     *report = {};
     for (size_t round = 0; round < plan.rounds.size(); ++round) {
         const Tables guide = plan.rounds[round].guided ? tables : Tables();
@@ -351,7 +350,7 @@ Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, s
             LL_RETURN_IF_ERROR(data.append(*unit));
         }
         TrainingReport of_round;
-        auto learned = learning->learn({data, round, guide, scene.emitters(), settings, {stop, {}}, &of_round});
+        auto learned = learn({data, round, guide, scene.emitters(), settings, {stop, {}}, &of_round});
         if (!learned.ok()) return learned.status();
         tables = *std::move(learned);
         // What is said of the tables is the last round's, but every round takes its time.

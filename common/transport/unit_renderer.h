@@ -123,7 +123,15 @@ class UnitRenderer final : public Renderer {
           settings_(request.settings),
           roulette_(roulette_of(request.settings.algorithm)),
           algorithm_(std::move(algorithm)) {
-        LL_CHECK(!has_unit_selection<A>() || settings_.algorithm.info().frame == FrameShape::kWhole);
+        // What a row says of its algorithm, where the algorithm itself can tell.
+        const AlgorithmInfo& info = settings_.algorithm.info();
+        const double light_paths = settings_.algorithm.light_paths_per_pixel();
+        LL_CHECK(info.frame == FrameShape::kWhole || !(has_unit_selection<A>() || prepares_per_iteration<A>()));
+        if constexpr (UnitAlgorithm<A>)
+            LL_CHECK(!info.shares_light_paths && (light_paths == 0 || light_paths == 1),
+                     "an algorithm that is asked sample by sample has one light path for each, or none");
+        else
+            LL_CHECK(info.shares_light_paths == (light_paths > 0), "the light paths of such an algorithm are the unit's");
     }
 
     Result<Partial> render(const RenderUnit& work, std::stop_token stop) const override {

@@ -107,6 +107,8 @@ class Plan {
     /// The units of a group, tile by tile.
     std::vector<WorkUnit> units(const Group& group) const;
     uint32_t tile_count() const { return uint32_t(tiles_.size()); }
+    /// Of a unit of this plan.
+    UnitKey key(uint32_t group, uint32_t tile) const { return {group, tile, kind_, round_}; }
 
   private:
     Plan() = default;

@@ -96,7 +96,8 @@ std::string_view to_string(JobState state);
 struct JobInfo {
     std::string job_id;
     JobState state = JobState::kPreparing;
-    JobSpec spec;
+    JobSpec spec;           ///< A client that does not know the algorithm has the catalog's first one in its place.
+    std::string algorithm;  ///< Its name, whoever knows it.
     std::string message;
     uint64_t revision = 0;
     uint64_t unit_total = 0, unit_done = 0, unit_leased = 0;

@@ -62,6 +62,7 @@ void put_key(const UnitKey& in, v1::UnitKey* out) {
 Result<UnitKey> get_key(const v1::UnitKey& in) {
     if (in.kind() < v1::UNIT_KIND_RENDER || in.kind() > v1::UNIT_KIND_PROBE)
         return invalid_argument("a unit of unknown kind; install the same build on both hosts");
+    if (in.round() != 0 && in.kind() != v1::UNIT_KIND_TRAINING) return invalid_argument("only units of training have rounds");
     return UnitKey{in.group(), in.tile(), UnitKind(int(in.kind()) - 1), in.round()};
 }
 
@@ -154,11 +155,11 @@ void put(const JobSpec& in, v1::JobSpec* out) {
     out->set_first_hit_layers(in.first_hit_layers);
 }
 
-Result<JobSpec> get(const v1::JobSpec& in) {
+namespace {
+
+/// All but the algorithm.
+Result<JobSpec> get_rest(const v1::JobSpec& in) {
     JobSpec spec;
-    auto algorithm = AlgorithmSettings::parse(in.algorithm(), {in.parameters().begin(), in.parameters().end()});
-    if (!algorithm.ok()) return algorithm.status();
-    spec.algorithm = *std::move(algorithm);
     spec.seed = in.seed();
     spec.samples_per_pixel = in.samples_per_pixel();
     spec.time_limit_seconds = in.time_limit_seconds();
@@ -171,6 +172,16 @@ Result<JobSpec> get(const v1::JobSpec& in) {
     spec.scene_root = *root;
     spec.frame = {in.frame().width(), in.frame().height(), get_rect(in.frame().crop())};
     spec.first_hit_layers = in.first_hit_layers();
+    return spec;
+}
+
+}  // namespace
+
+Result<JobSpec> get(const v1::JobSpec& in) {
+    auto algorithm = AlgorithmSettings::parse(in.algorithm(), {in.parameters().begin(), in.parameters().end()});
+    if (!algorithm.ok()) return algorithm.status();
+    auto spec = get_rest(in);
+    if (spec.ok()) spec->algorithm = *std::move(algorithm);
     return spec;
 }
 
@@ -210,9 +221,12 @@ Result<JobInfo> get(const v1::Job& in) {
     if (in.state() < v1::JOB_STATE_PREPARING || in.state() > v1::JOB_STATE_CANCELLED)
         return invalid_argument("job " + in.job_id() + " has an unknown state; is the coordinator newer than this client?");
     info.state = JobState(int(in.state()) - 1);
+    // A coordinator may know algorithms and parameters that this client does not: that is no reason not to show its jobs.
     auto spec = get(in.spec());
+    if (!spec.ok()) spec = get_rest(in.spec());
     if (!spec.ok()) return spec.status();
     info.spec = *std::move(spec);
+    info.algorithm = in.spec().algorithm();
     info.message = in.message();
     info.revision = in.revision();
     info.unit_total = in.unit_total_count();

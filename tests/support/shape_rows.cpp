@@ -134,6 +134,7 @@ const AlgorithmInfo kRows[] = {
      .bias = kBias,
      .parameters = kParameters,
      .light_paths_per_pixel = one_light_path,
+     .shares_light_paths = true,
      .make = make_pairing<OwnedStub>},
     {.name = "stub-splats",
      .summary = "bdpt of which all light is in splats",
@@ -143,6 +144,7 @@ const AlgorithmInfo kRows[] = {
      .frame = FrameShape::kWhole,
      .camera_samples = false,
      .light_paths_per_pixel = one_light_path,
+     .shares_light_paths = true,
      .make = make_pairing<SplatStub>},
     {.name = "stub-anew",
      .summary = "a cache for every iteration",
@@ -151,6 +153,7 @@ const AlgorithmInfo kRows[] = {
      .parameters = kParameters,
      .frame = FrameShape::kWhole,
      .light_paths_per_pixel = one_light_path,
+     .shares_light_paths = true,
      .make = make_anew},
 };
 

@@ -116,6 +116,7 @@ const AlgorithmInfo kMergingRow{
     .parameters = kMergingParameters,
     .frame = FrameShape::kWhole,
     .light_paths_per_pixel = [](const AlgorithmSettings& s) { return s.value(kPhotons.name); },
+    .shares_light_paths = true,
     .make = [](const RendererRequest& r) -> Result<std::unique_ptr<Renderer>> {
         const MergingSelection first{double(r.light_paths_per_iteration()), r.settings.algorithm.value(kRadius.name)};
         return make_unit_renderer(r, [&](auto&& select) {
@@ -215,6 +216,7 @@ const AlgorithmInfo kPairingRow{
     .bias = "unbiased",
     .parameters = kPlainParameters,
     .light_paths_per_pixel = one_light_path,
+    .shares_light_paths = true,
     .make = [](const RendererRequest& r) -> Result<std::unique_ptr<Renderer>> {
         return make_unit_renderer(r, [&](auto&& select) {
             const auto selection = select(BdptSelection{double(r.light_paths_per_iteration())});

@@ -220,7 +220,7 @@ inline std::shared_ptr<const Scene> spheres_in_glass() {
     Material glass;
     glass.kind = MaterialKind::kDielectric;
     glass.ior = 1.5f;
-    b.sphere({0, 1, 0.25f}, 0.68f, b.add(glass));
+    b.sphere({0.02f, 1, 0.26f}, 0.68f, b.add(glass));
     b.sphere({-0.2f, 0.95f, 0.2f}, 0.19f, b.diffuse({0.8f, 0.6f, 0.3f}));
     b.sphere({0.22f, 0.95f, 0.3f}, 0.19f, b.diffuse({0.4f, 0.7f, 0.8f}));
     b.quad({-0.4f, 0.75f, -0.15f}, {0, 0, 0.8f}, {0.8f, 0, 0}, b.diffuse({0.7f, 0.7f, 0.6f}));
