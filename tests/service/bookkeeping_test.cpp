@@ -59,6 +59,26 @@ TEST(UnitTable, MergedGroupsStillAnswerForTheirUnits) {
     EXPECT_FALSE(table.find({0, plan.tile_count()}));
 }
 
+/// Keys come from the network. One that differs from a unit's own in kind or round alone once left the unit leased for ever behind
+/// its merged result, and the table with an entry of nothing.
+TEST(UnitTable, KeysOfOtherKindsAndRoundsAreNobodys) {
+    UnitTable table(Plan(whole(100, 60), PlanOptions{}), 3, 8, std::nullopt);
+    const auto unit = table.lease(0, TimePoint());
+    ASSERT_TRUE(unit);
+    for (UnitKey key :
+         {UnitKey{0, 0, UnitKind::kRender, 1}, UnitKey{0, 0, UnitKind::kTraining, 0}, UnitKey{0, 0, UnitKind::kProbe, 0}}) {
+        EXPECT_FALSE(table.find(key));
+        EXPECT_FALSE(table.renew(key, 0, kNever));
+        EXPECT_EQ(table.fail(key, 0).total, 0);
+        EXPECT_EQ(table.complete(key, 0, sha256("x")), UnitTable::Completion::kUnknown);
+    }
+    EXPECT_EQ(table.leased_count(), 1u);
+    EXPECT_EQ(table.expire(kNever).size(), 1u);
+    EXPECT_EQ(table.complete(unit->key, 0, sha256("x")), UnitTable::Completion::kFirst);
+    table.advance(1);
+    EXPECT_EQ(table.complete({0, 0, UnitKind::kRender, 1}, 0, sha256("x")), UnitTable::Completion::kUnknown);
+}
+
 TEST(UnitTable, AMillionIterationsNeedNoRoomBeforeTheyAreLeased) {
     const auto begin = std::chrono::steady_clock::now();
     UnitTable table(Plan(whole(4000, 4000), {.light_paths_per_iteration = 4000 * 4000}), 1u << 24, 4, std::nullopt);

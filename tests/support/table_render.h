@@ -24,6 +24,7 @@ inline Tables random_tables_for(const AlgorithmInfo& row, const Scene& scene, ui
     }
     if (std::find(parts.begin(), parts.end(), &SubspaceTables::kPart) != parts.end())
         tables.set(std::make_shared<const SubspaceTables>(random_tables(scene.emitters(), seed, options)));
+    tables.belong_to(std::string(row.name));
     return tables;
 }
 

@@ -156,17 +156,18 @@ TEST(TablesOfAlgorithms, AreRefusedByOthers) {
         EXPECT_TRUE(mentions(missing, "needs its tables") && mentions(missing, row->name)) << missing.message();
         EXPECT_TRUE(Renderer::create(scene, settings, testing::random_tables_for(*row, *scene, 1)).ok()) << row->name;
         for (const AlgorithmInfo* other : catalog()) {
-            if (!other->learning || same_parts(*row, *other)) continue;
+            if (!other->learning || other == row) continue;
             ++pairs;
             const Tables tables = testing::random_tables_for(*other, *scene, 1);
             const Status refused = Renderer::create(scene, settings, tables).status();
             EXPECT_EQ(refused.code(), StatusCode::kFailedPrecondition) << row->name << " with tables of " << other->name;
             EXPECT_TRUE(mentions(refused, "not those of") && mentions(refused, row->name)) << refused.message();
+            if (same_parts(*row, *other)) continue;  // they can be read, and say whose they are
             const Status unread = parse_tables(serialize(tables), row->learning->parts).status();
             EXPECT_EQ(unread.code(), StatusCode::kFailedPrecondition) << row->name << " with tables of " << other->name;
         }
     }
-    EXPECT_GE(pairs, 4);
+    EXPECT_GE(pairs, 6);
 }
 
 /// Tables of a scene with other lights.

@@ -100,11 +100,39 @@ TEST(Wire, SpecsWithAlgorithmsOrParametersThatDoNotExistAreRefused) {
     says(unknown, "no algorithm named 'no-such'; choose one of: ");
     for (const AlgorithmInfo* row : catalog()) says(unknown, std::string(row->name));
     says(refusal([](v1::JobSpec& s) { s.set_algorithm(""); }), "no algorithm named ''");
-    says(refusal([](v1::JobSpec& s) { (*s.mutable_parameters())["connections"] = "3"; }),
+    says(refusal([](v1::JobSpec& s) {
+             s.mutable_parameters()->insert({"connections", "3"});
+         }),
          "algorithm 'bdpt' has no parameter 'connections'");
-    says(refusal([](v1::JobSpec& s) { (*s.mutable_parameters())["rr-start"] = "1"; }),
+    says(refusal([](v1::JobSpec& s) {
+             s.mutable_parameters()->insert({"rr-start", "1"});
+         }),
          "parameter rr-start=1 of 'bdpt' must be an integer from 2 to 256");
-    says(refusal([](v1::JobSpec& s) { (*s.mutable_parameters())["heuristic"] = "veach"; }), "(balance, power, maximum)");
+    says(refusal([](v1::JobSpec& s) { s.mutable_parameters()->insert({"heuristic", "veach"}); }), "(balance, power, maximum)");
+}
+
+/// A coordinator may know more algorithms and parameters than a client, which has to list its jobs all the same.
+TEST(Wire, JobsOfUnknownAlgorithmsCanBeShown) {
+    JobInfo job;
+    job.job_id = "job-1";
+    job.algorithm = job.spec.algorithm.name();
+    job.spec.seed = 77;
+    v1::Job message;
+    wire::put(job, &message);
+    message.mutable_spec()->set_algorithm("not-known-here");
+    message.mutable_spec()->mutable_parameters()->insert({"nor-this", "1"});
+    const auto shown = wire::get(message);
+    ASSERT_TRUE(shown.ok()) << shown.status().message();
+    EXPECT_EQ(shown->algorithm, "not-known-here");
+    EXPECT_EQ(shown->spec.seed, 77u);
+    EXPECT_FALSE(wire::get(message.spec()).ok()) << "nobody may render it";
+}
+
+/// Only training has rounds.
+TEST(Wire, UnitsOfTheImageHaveNoRound) {
+    v1::UnitReference message;
+    wire::put(UnitReference{"job-1", {3, 1, UnitKind::kRender, 1}}, &message);
+    EXPECT_EQ(wire::get(message).status().code(), StatusCode::kInvalidArgument);
 }
 
 }  // namespace
