@@ -91,8 +91,9 @@ Result<JobSpec> Coordinator::canonical_spec(const JobSpec& spec) const {
         return invalid_argument("the time limit must lie between 0 and 30 days");
     if (spec.max_depth < -1 || spec.max_depth >= kMaxEdges)
         return invalid_argument("max depth must lie between 0 and " + std::to_string(kMaxEdges - 1));
-    if (spec.width < 0 || spec.height < 0 || spec.width > 65536 || spec.height > 65536 || (spec.width == 0) != (spec.height == 0))
-        return invalid_argument("a resolution needs a width and a height between 1 and 65536");
+    if (spec.width < 0 || spec.height < 0 || spec.width > kMaxFrameSide || spec.height > kMaxFrameSide ||
+        (spec.width == 0) != (spec.height == 0))
+        return invalid_argument("a resolution needs a width and a height between 1 and " + std::to_string(kMaxFrameSide));
     return out;
 }
 
