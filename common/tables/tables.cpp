@@ -50,7 +50,9 @@ Result<Tables> parse_tables(std::string_view bytes, std::span<const TablePart* c
     const auto sections = parse_sections(bytes, kMagic);
     if (!sections.ok()) return sections.status();
     Tables tables;
-    for (const auto& [name, content] : *sections) {
+    for (const auto& section : *sections) {
+        const std::string& name = section.first;
+        const std::string_view content = section.second;
         if (name == kAlgorithm) {
             tables.belong_to(std::string(content));
             continue;
