@@ -87,7 +87,7 @@ Status draw_kappa(const SubspaceTables& tables, const Scene& scene, const std::s
                 const Camera::CameraRay ray =
                     scene.camera().sample_ray({float(crop.x0 + x) + 0.5f, float(crop.y0 + y) + 0.5f}, {0.5f, 0.5f});
                 SurfacePoint point;
-                if (!scene.intersect(ray.origin, ray.direction, &point)) continue;
+                if (!scene.intersect(ray.origin, ray.direction, &point, scene.camera_clearance())) continue;
                 const Vec3 normal = face_forward(point.ng, -ray.direction);
                 set_label(&eye, x, y, tables.eye_label(sub_path_end(point.p, point.ng, -ray.direction)));
                 set_label(&light, x, y, tables.light_label(sub_path_end(point.p, normal, normal)));

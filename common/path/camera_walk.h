@@ -20,6 +20,8 @@ class CameraSampler : public WalkSampler {
         return camera.sample_ray({float(px) + film.x, float(py) + film.y}, lens);
     }
     Vec2 next_event(int t) { return t == 2 ? point(3) : rng().uniform2(); }
+    /// For draws among light sub-paths.
+    Vec2 connection(int t) { return t == 2 ? point(4) : rng().uniform2(); }
 };
 
 /// Walks from the lens along sampler.ray(). `z` has room for max_edges + 2 vertices.
@@ -30,7 +32,11 @@ template <class Visit, class Escape>
 int trace_camera_path(const Scene& scene, CameraSampler& sampler, int px, int py, int max_edges, const RouletteRule& rule,
                       PathVertex* z, WalkCounters* counters, Visit&& visit, Escape&& escape) {
     const Camera::CameraRay lens_ray = sampler.ray(scene.camera(), px, py);
-    WalkRay ray{lens_ray.origin, lens_ray.direction, Rgb(1.0f), lens_ray.pdf_solid_angle, false, true};
+    WalkRay ray{.origin = lens_ray.origin,
+                .direction = lens_ray.direction,
+                .alpha = Rgb(1.0f),
+                .pdf = lens_ray.pdf_solid_angle,
+                .clearance = scene.camera_clearance()};
     z[0].p = ray.origin;
     z[0].alpha = ray.alpha;
     z[0].delta = false;
@@ -38,7 +44,7 @@ int trace_camera_path(const Scene& scene, CameraSampler& sampler, int px, int py
     while (true) {
         SurfacePoint point;
         ++counters->rays;
-        if (!scene.intersect(ray.origin, ray.direction, &point)) {
+        if (!scene.intersect(ray.origin, ray.direction, &point, ray.clearance)) {
             escape(t, ray);
             break;
         }

@@ -72,7 +72,7 @@ Rgb emitter_hit(const Scene& scene, const PathVertex* z, int t, PathView* view) 
     const int k = t - 1;
     view->k = k;
     view_suffix<detail>(z, t, k, view);
-    view->delta[0] = false;
+    view->delta[0] = view->discrete_source = false;
     view->fwd[0] = emitters.pdf_position(e, v.wo);
     if (k >= 2) {
         const float direction_pdf = emitters.pdf_direction(e, v.ng, v.wo);
@@ -94,7 +94,7 @@ Rgb environment_hit(const Scene& scene, const PathVertex* z, int t, const WalkRa
     const int k = t;
     view->k = k;
     view_suffix<detail>(z, t, k, view);
-    view->delta[0] = false;
+    view->delta[0] = view->discrete_source = false;
     view->rev[0] = ray.pdf;
     view->fwd[0] = emitters.pdf_position(e, -ray.direction);
     if (k >= 2) {
@@ -119,12 +119,13 @@ Rgb next_event(const Scene& scene, const PathVertex* z, int t, const NextEventSa
     ++counters->rays;
     ++counters->connections;
     if (e.is_area() ? scene.occluded(v.p, v.ng, v.reach, light.position, light.normal, e.reach)
-                    : scene.occluded(v.p, v.ng, v.reach, light.position))
+                    : scene.occluded(v.p, v.ng, v.reach, light.position, e.clearance))
         return {};
     const int k = t;
     view->k = k;
     view_suffix<detail>(z, t, k, view);
     view->delta[0] = view->delta[1] = false;
+    view->discrete_source = e.is_discrete();
     view->rev[0] = e.is_delta() ? 0.0 : double(s.pdf_fwd) * light.geometry;
     view->fwd[0] = emitters.pdf_position(e, -light.wi);
     view->next_event = light.pdf;
@@ -172,6 +173,7 @@ Rgb connect(const Scene& scene, const PathVertex* y, int s, const PathVertex* z,
     }
     // Next event would have chosen x_0 from x_1; both are on the light sub-path.
     const Emitter& e = scene.emitters()[uint32_t(y[0].emitter)];
+    view->discrete_source = e.is_discrete();
     view->next_event = scene.emitters().pdf_next_event(e, y[1].p, y[0].p, y[0].ng, y[1].wo);
     return contribution;
 }
@@ -194,7 +196,7 @@ inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, con
     if (contribution.is_black()) return {};
     ++counters->rays;
     ++counters->connections;
-    if (scene.occluded(a.p, a.ng, a.reach, lens_point)) return {};
+    if (scene.occluded(a.p, a.ng, a.reach, lens_point, scene.camera_clearance())) return {};
     const int k = s;
     view->k = k;
     view_light_prefix(y, s, view);
@@ -202,6 +204,7 @@ inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, con
     view->rev[s - 1] = double(pdf) * (abs_dot(a.ng, w) / d2);
     view->rev[s - 2] = double(at_light.pdf_rev) * a.to_previous;
     const Emitter& e = scene.emitters()[uint32_t(y[0].emitter)];
+    view->discrete_source = e.is_discrete();
     view->next_event = scene.emitters().pdf_next_event(e, y[1].p, y[0].p, y[0].ng, y[1].wo);
     return contribution;
 }

@@ -41,6 +41,7 @@ inline bool start_light_path(const Scene& scene, LightSampler& sampler, PathVert
     ray->alpha = s.alpha;
     ray->pdf = s.pdf_direction;
     ray->from_infinite = e.is_infinite();
+    ray->clearance = e.clearance;
     ray->previous_hittable = !e.is_delta();
     ray->origin = e.is_area() ? offset_origin(s.position, s.normal, s.direction, e.reach) : s.position;
     return true;
@@ -58,7 +59,7 @@ inline int trace_light_path(const Scene& scene, LightSampler& sampler, int max_v
     while (n < max_vertices) {
         SurfacePoint point;
         ++counters->rays;
-        if (!scene.intersect(ray.origin, ray.direction, &point)) break;
+        if (!scene.intersect(ray.origin, ray.direction, &point, ray.clearance)) break;
         PathVertex& v = path[n];
         arrive<TransportMode::kImportance>(ray, path[n - 1].p, path[n - 1].ng, n > 1 || area, point, &v);
         if (!(v.fwd > 0) || !std::isfinite(v.fwd) || !std::isfinite(v.adjoint)) break;

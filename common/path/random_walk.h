@@ -13,7 +13,7 @@ namespace lightloom {
 
 struct RouletteRule {
     int first_vertex = 4;  ///< Sub-path vertices with a smaller index always go on.
-    float min_survival = 0.5f, max_survival = 0.95f;
+    float min_survival = 0.5f;
 };
 
 /// Uniforms that one scattering event consumes.
@@ -28,8 +28,12 @@ struct WalkRay {
     Rgb alpha;       ///< Throughput carried along the ray.
     double pdf = 0;  ///< Density of the direction, solid angle; for an infinite light: area on its disc.
     bool from_infinite = false;
+    float clearance = 0;            ///< At the origin; see Scene::intersect().
     bool previous_hittable = true;  ///< False leaving a light that cannot be hit: its reverse density is zero.
     float survival = 1;             ///< See PathVertex.
+    /// Product of the squared index ratios that refraction has divided a camera sub-path's radiance by: alpha * index_ratio2 is
+    /// what is left of the light's power, which lossless glass keeps.
+    float index_ratio2 = 1;
 };
 
 struct WalkCounters {
@@ -65,15 +69,19 @@ void arrive(const WalkRay& ray, const Vec3& previous_p, const Vec3& previous_ng,
     v->adjoint = mode == TransportMode::kImportance ? std::fabs(v->wo_local.z) / cosine : 1.0f;
 }
 
+/// Squared ratio of the index on the far side over that on wo's, where `v` refracts into the local direction `wi`; 1 otherwise.
+inline float index_ratio2(const PathVertex& v, const Vec3& wi) {
+    if (v.bsdf.kind != BsdfKind::kDielectric || !(wi.z * v.wo_local.z < 0)) return 1;
+    return v.wo_local.z > 0 ? v.bsdf.eta * v.bsdf.eta : 1 / (v.bsdf.eta * v.bsdf.eta);
+}
+
 /// PathVertex::step of a camera vertex that scattered towards the light by `s`: F gains f |l.ns| / |l.ng| |c.ng| (light side l,
 /// camera side c), C gains the density of c from l. The common factor |cos| / d^2 of F's G and C's area density is left out of
 /// both. A Dirac lobe gives up its squared index ratio, which is the camera's alone [Veach 1997, 5.2].
 inline Rgb light_step(const PathVertex& v, const BsdfSample& s, const Vec3& to_light) {
     float factor = s.pdf_fwd * abs_dot(v.ng, v.wo) / (abs_dot(v.ng, to_light) * s.pdf_rev);
     if (s.delta) {
-        factor *= std::fabs(s.wi.z / v.wo_local.z);
-        if (v.bsdf.kind == BsdfKind::kDielectric && s.wi.z * v.wo_local.z < 0)
-            factor *= v.wo_local.z > 0 ? v.bsdf.eta * v.bsdf.eta : 1 / (v.bsdf.eta * v.bsdf.eta);
+        factor *= std::fabs(s.wi.z / v.wo_local.z) * index_ratio2(v, s.wi);
     }
     // No density from the light: no prefix of light tracing crosses this vertex, and whoever asks finds C = 0 first.
     return std::isfinite(factor) ? s.weight * factor : Rgb{};
@@ -93,6 +101,7 @@ bool leave(PathVertex* v, PathVertex* previous, const ScatterSample& u, WalkRay*
         weight *= v->adjoint * (abs_dot(ray->direction, v->ng) / shading_cosine);  // [Veach 1997, eq. 5.19]
     } else {
         v->step = light_step(*v, s, ray->direction);
+        ray->index_ratio2 *= index_ratio2(*v, s.wi);
     }
     ray->alpha = v->alpha * weight;
     if (ray->alpha.is_black()) return false;
@@ -100,16 +109,19 @@ bool leave(PathVertex* v, PathVertex* previous, const ScatterSample& u, WalkRay*
     previous->rev = double(s.pdf_rev) * v->to_previous;
     ray->pdf = s.pdf_fwd;
     ray->origin = offset_origin(v->p, v->ng, ray->direction, v->reach);
+    ray->clearance = 0;
     ray->from_infinite = false;
     ray->previous_hittable = true;
     return true;
 }
 
-/// False when roulette ends the walk; otherwise the throughput is divided by the survival probability.
-/// `start` is the throughput that the sub-path began with.
+/// False when roulette ends the walk; otherwise the throughput is divided by the survival probability: the share of its power that
+/// the sub-path has kept since it began with the throughput `start`. One that has lost nothing always goes on.
 inline bool survive(const RouletteRule& rule, int vertex_index, float start, float u, WalkRay* ray) {
     if (vertex_index < rule.first_vertex) return true;
-    const float q = clamp(scalar_of(ray->alpha) / start, rule.min_survival, rule.max_survival);
+    const float q = clamp(scalar_of(ray->alpha) * ray->index_ratio2 / start, rule.min_survival, 1.0f);
+    constexpr float kLossless = 1 - 1e-5f;  // what rounding makes of a hundred events that lose nothing
+    if (q > kLossless) return true;
     if (u >= q) return false;
     ray->alpha *= 1 / q;
     ray->survival *= q;

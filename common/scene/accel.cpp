@@ -44,6 +44,21 @@ void commit(RTCScene scene) {
     rtcCommitScene(scene);
 }
 
+RTCScene new_scene() {
+    RTCScene s = rtcNewScene(device());
+    rtcSetSceneBuildQuality(s, RTC_BUILD_QUALITY_HIGH);
+    rtcSetSceneFlags(s, RTC_SCENE_FLAG_ROBUST);
+    return s;
+}
+
+/// Whether what was committed has been built.
+Status built() {
+    if (const RTCError error = rtcGetDeviceError(device()); error != RTC_ERROR_NONE)
+        return internal_error("Embree could not build the acceleration structure (error " + std::to_string(int(error)) +
+                              "); the machine may be out of memory");
+    return {};
+}
+
 struct GeometryUser {
     const void* opacity_user = nullptr;
     Accel::Opacity opacity = nullptr;
@@ -167,7 +182,7 @@ Vec2 sphere_uv(const Sphere& sphere, const Vec3& n) {
 }
 
 struct Accel::Impl {
-    RTCScene world = nullptr;
+    RTCScene world = nullptr, apart = nullptr;
     std::vector<RTCScene> objects;
     std::vector<std::unique_ptr<GeometryUser>> geometry_users;
     std::vector<std::unique_ptr<SphereUser>> sphere_users;
@@ -177,28 +192,52 @@ struct Accel::Impl {
     ~Impl() {
         (void)bounds_asked.load(std::memory_order_acquire);
         if (world != nullptr) rtcReleaseScene(world);
+        if (apart != nullptr) rtcReleaseScene(apart);
         for (RTCScene s : objects) rtcReleaseScene(s);
     }
 
     void add_meshes(RTCScene scene, const std::vector<TriangleMesh>& meshes, int32_t object, Opacity opacity, const void* user) {
-        for (uint32_t i = 0; i < meshes.size(); ++i) {
-            const TriangleMesh& mesh = meshes[i];
-            RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
-            rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.positions.data(), 0, sizeof(Vec3),
-                                       mesh.positions.size() - 1);  // the last one is padding
-            rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices.data(), 0, 3 * sizeof(uint32_t),
-                                       mesh.indices.size() / 3);
-            if (mesh.attributes.alpha != kNone) {
-                geometry_users.push_back(std::make_unique<GeometryUser>(GeometryUser{user, opacity, object, i}));
-                rtcSetGeometryUserData(g, geometry_users.back().get());
-                rtcSetGeometryIntersectFilterFunction(g, alpha_filter);
-                rtcSetGeometryOccludedFilterFunction(g, alpha_filter);
-            }
-            rtcCommitGeometry(g);
-            rtcAttachGeometryByID(scene, g, i);
-            rtcReleaseGeometry(g);
-        }
+        for (uint32_t i = 0; i < meshes.size(); ++i) add_mesh(scene, meshes, i, object, opacity, user);
     }
+
+    void add_mesh(RTCScene scene, const std::vector<TriangleMesh>& meshes, uint32_t i, int32_t object, Opacity opacity,
+                  const void* user) {
+        const TriangleMesh& mesh = meshes[i];
+        RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+        rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.positions.data(), 0, sizeof(Vec3),
+                                   mesh.positions.size() - 1);  // the last one is padding
+        rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices.data(), 0, 3 * sizeof(uint32_t),
+                                   mesh.indices.size() / 3);
+        if (mesh.attributes.alpha != kNone) {
+            geometry_users.push_back(std::make_unique<GeometryUser>(GeometryUser{user, opacity, object, i}));
+            rtcSetGeometryUserData(g, geometry_users.back().get());
+            rtcSetGeometryIntersectFilterFunction(g, alpha_filter);
+            rtcSetGeometryOccludedFilterFunction(g, alpha_filter);
+        }
+        rtcCommitGeometry(g);
+        rtcAttachGeometryByID(scene, g, i);
+        rtcReleaseGeometry(g);
+    }
+
+    bool intersect(RTCScene scene, const Vec3& o, const Vec3& d, float t_min, float t_max, RawHit* hit) const {
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        RTCRayHit r;
+        r.ray = {o.x, o.y, o.z, t_min, d.x, d.y, d.z, 0, t_max, 0xffffffffu, 0, 0};
+        r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+        rtcIntersect1(scene, &context, &r);
+        if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+        hit->t = r.ray.tfar;
+        hit->primitive = r.hit.primID;
+        hit->u = r.hit.u;
+        hit->v = r.hit.v;
+        hit->instance = instance_of(r.hit.instID[0]);
+        hit->geometry = r.hit.geomID;
+        return true;
+    }
+
+    int32_t instance_of(uint32_t id) const { return id != RTC_INVALID_GEOMETRY_ID ? int32_t(id - first_instance_id) : -1; }
 
     void add_spheres(RTCScene scene, const std::vector<Sphere>& spheres, uint32_t id, int32_t object, Opacity opacity,
                      const void* user) {
@@ -229,12 +268,6 @@ Result<std::unique_ptr<Accel>> Accel::build(const SceneDescription& scene, Opaci
     std::unique_ptr<Accel> accel(new Accel);
     Impl& impl = *accel->impl_;
     const int64_t before = g_device_memory.load();
-    const auto new_scene = [] {
-        RTCScene s = rtcNewScene(device());
-        rtcSetSceneBuildQuality(s, RTC_BUILD_QUALITY_HIGH);
-        rtcSetSceneFlags(s, RTC_SCENE_FLAG_ROBUST);
-        return s;
-    };
     for (int32_t o = 0; o < int32_t(scene.objects.size()); ++o) {
         RTCScene s = new_scene();
         impl.objects.push_back(s);
@@ -260,30 +293,45 @@ Result<std::unique_ptr<Accel>> Accel::build(const SceneDescription& scene, Opaci
         rtcReleaseGeometry(g);
     }
     commit(impl.world);
-    if (const RTCError error = rtcGetDeviceError(device()); error != RTC_ERROR_NONE)
-        return internal_error("Embree could not build the acceleration structure (error " + std::to_string(int(error)) +
-                              "); the machine may be out of memory");
+    LL_RETURN_IF_ERROR(built());
     impl.memory = uint64_t(std::max<int64_t>(0, g_device_memory.load() - before));
     return accel;
 }
 
-bool Accel::intersect(const Vec3& o, const Vec3& d, float t_max, RawHit* hit) const {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    RTCRayHit r;
-    r.ray = {o.x, o.y, o.z, 0, d.x, d.y, d.z, 0, t_max, 0xffffffffu, 0, 0};
-    r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(impl_->world, &context, &r);
-    if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-    hit->t = r.ray.tfar;
-    hit->primitive = r.hit.primID;
-    hit->u = r.hit.u;
-    hit->v = r.hit.v;
-    const bool instanced = r.hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
-    hit->instance = instanced ? int32_t(r.hit.instID[0] - impl_->first_instance_id) : -1;
-    hit->geometry = r.hit.geomID;
-    return true;
+Status Accel::keep_apart(const SceneDescription& scene, const std::vector<uint32_t>& meshes, Opacity opacity,
+                         const void* opacity_user) {
+    impl_->apart = new_scene();
+    for (const uint32_t i : meshes) impl_->add_mesh(impl_->apart, scene.meshes, i, -1, opacity, opacity_user);
+    commit(impl_->apart);
+    return built();
+}
+
+bool Accel::intersect(const Vec3& o, const Vec3& d, float t_min, float t_max, RawHit* hit) const {
+    return impl_->intersect(impl_->world, o, d, t_min, t_max, hit);
+}
+
+bool Accel::intersect_apart(const Vec3& o, const Vec3& d, float t_min, float t_max, RawHit* hit) const {
+    return impl_->intersect(impl_->apart, o, d, t_min, t_max, hit);
+}
+
+void Accel::for_each_near(const Vec3& centre, float radius, const std::function<void(const RawHit&)>& visit) const {
+    struct Visitor {
+        const Impl& impl;
+        const std::function<void(const RawHit&)>& visit;
+    } visitor{*impl_, visit};
+    RTCPointQuery query{centre.x, centre.y, centre.z, 0, radius};
+    RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    const auto found = [](RTCPointQueryFunctionArguments* args) {
+        const auto& v = *static_cast<const Visitor*>(args->userPtr);
+        RawHit at;
+        at.geometry = args->geomID;
+        at.primitive = args->primID;
+        at.instance = args->context->instStackSize > 0 ? v.impl.instance_of(args->context->instID[0]) : -1;
+        v.visit(at);
+        return false;  // the radius stays what it is
+    };
+    rtcPointQuery(impl_->world, &query, &context, found, &visitor);
 }
 
 bool Accel::occluded(const Vec3& o, const Vec3& d, float t_max) const {

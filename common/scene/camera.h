@@ -31,6 +31,8 @@ class Camera {
     /// False when the direction falls outside of the frame (but not necessarily outside of the crop).
     bool project(const Vec3& lens_point, const Vec3& direction, Vec2* film, float* pdf_solid_angle) const;
 
+    /// Centre of the lens, world.
+    Vec3 position() const { return position_; }
     /// Unit viewing direction, world.
     Vec3 forward() const { return forward_; }
 

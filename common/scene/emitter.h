@@ -29,10 +29,13 @@ struct Emitter {
     float inv_area = 0;
     float total_height = 0, falloff_height = 0;  ///< kSpot; see SpotLight.
     float reach = 0;                             ///< Area lights: largest coordinate magnitude; see offset_origin().
+    float clearance = 0;                         ///< Point and spot: see Scene::intersect().
     int32_t light = 0;                           ///< Group for reports: the area-light shape or light source it came from.
 
     bool is_area() const { return kind == EmitterKind::kTriangle || kind == EmitterKind::kSphere; }
     bool is_infinite() const { return kind == EmitterKind::kDistant || kind == EmitterKind::kEnvironment; }
+    /// x_0 is the light itself: its native measure counts.
+    bool is_discrete() const { return kind == EmitterKind::kPoint || kind == EmitterKind::kSpot || kind == EmitterKind::kDistant; }
     /// x_0 cannot be hit by chance: no technique with s = 0.
     bool is_delta() const { return !is_area() && kind != EmitterKind::kEnvironment; }
 };

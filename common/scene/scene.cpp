@@ -55,9 +55,33 @@ void Scene::triangle_point(const TriangleMesh& mesh, const RawHit& hit, SurfaceP
     out->material = mesh.attributes.material;
 }
 
-bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out) const {
+/// The hit that counts: an area light wins where it lies in the plane of what was hit.
+bool Scene::find_surface(const Vec3& o, const Vec3& d, float clearance, RawHit* hit) const {
+    if (!accel_->intersect(o, d, clearance, 1e30f, hit)) return false;
+    if (!covered_.any) [[likely]]
+        return true;
+    const float gap = hit->instance >= 0                       ? covered_.instances[size_t(hit->instance)]
+                      : hit->geometry < covered_.meshes.size() ? covered_.meshes[hit->geometry]
+                                                               : 0;
+    if (!(gap > 0)) return true;
+    // Along a grazing ray two planes that are apart by rounding are farther apart.
+    SurfacePoint point;
+    surface_point(o, d, *hit, &point);
+    constexpr float kGrazing = 1e-3f;
+    const float apart = gap / std::max(abs_dot(point.ng, d), kGrazing);
+    RawHit light;
+    if (accel_->intersect_apart(o, d, std::max(clearance, hit->t - apart), hit->t + apart, &light)) *hit = light;
+    return true;
+}
+
+bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out, float clearance) const {
     RawHit hit;
-    if (!accel_->intersect(o, d, 1e30f, &hit)) return false;
+    if (!find_surface(o, d, clearance, &hit)) return false;
+    surface_point(o, d, hit, out);
+    return true;
+}
+
+void Scene::surface_point(const Vec3& o, const Vec3& d, const RawHit& hit, SurfacePoint* out) const {
     const bool instanced = hit.instance >= 0;
     const ObjectDefinition* object =
         instanced ? &description_.objects[size_t(description_.instances[size_t(hit.instance)].object)] : nullptr;
@@ -67,7 +91,11 @@ bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out) const {
         const int32_t first = instanced ? kNone : mesh_first_emitter_[hit.geometry];
         out->emitter = first == kNone ? kNone : first + int32_t(hit.primitive);
         // The emitting side is the triangle's, as light sampling has it, also where interpolated normals cross its plane.
-        if (out->emitter != kNone) out->ng = face_forward(out->ng, emitters_[uint32_t(out->emitter)].normal);
+        if (out->emitter != kNone) {
+            const Emitter& e = emitters_[uint32_t(out->emitter)];
+            out->ng = face_forward(out->ng, e.normal);
+            out->reach = e.reach;
+        }
     } else {
         const Sphere& s = (instanced ? object->spheres : description_.spheres)[hit.primitive];
         Vec3 from = o, along = d;
@@ -99,7 +127,6 @@ bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out) const {
         out->shading = frame_along(n, m.vector(out->shading.s));
     }
     out->reach = std::max(out->reach, least_reach_);
-    return true;
 }
 
 Bsdf Scene::bsdf_at(const SurfacePoint& point) const {
@@ -112,9 +139,11 @@ bool Scene::occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3&
     return accel_->occluded(from, to - from, 0.99999f);
 }
 
-bool Scene::occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3& q) const {
+bool Scene::occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3& q, float clearance) const {
     const Vec3 from = offset_origin(p, ng_p, q - p, reach_p);
-    return accel_->occluded(from, q - from, 0.99999f);
+    const Vec3 d = q - from;
+    const float t_max = clearance > 0 ? 1 - clearance / length(d) : 1;
+    return !(t_max > 0) || accel_->occluded(from, d, t_max);
 }
 
 float Scene::opacity(const void* user, int32_t object, uint32_t geometry, uint32_t primitive, float u, float v) {

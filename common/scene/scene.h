@@ -10,6 +10,7 @@
 #include "common/film/frame.h"
 #include "common/scene/accel.h"
 #include "common/scene/camera.h"
+#include "common/scene/contact.h"
 #include "common/scene/description.h"
 #include "common/scene/emitter.h"
 #include "common/scene/texture.h"
@@ -65,19 +66,31 @@ class Scene {
     const EmitterSet& emitters() const { return emitters_; }
     const FrameLayout& frame() const { return frame_; }
 
-    /// Closest surface along the unit direction `d` from `o`; start from offset_origin() when leaving a surface.
-    bool intersect(const Vec3& o, const Vec3& d, SurfacePoint* out) const;
+    // Ends of rays. Leaving a surface, a ray starts from offset_origin(); leaving a lens or lamp, at that end's clearance, within
+    // which nothing exists for its rays (contact.h). The segment between two ends is open by the same lengths, whichever of them it
+    // is looked at from.
+
+    /// Closest surface along the unit direction `d` from `o`, farther than `clearance`. Where an area light lies in the plane of
+    /// the surface hit, the light is what is there.
+    bool intersect(const Vec3& o, const Vec3& d, SurfacePoint* out, float clearance = 0) const;
     /// The material of a point, textures looked up.
     Bsdf bsdf_at(const SurfacePoint& point) const;
     /// Whether the open segment between two surface points is blocked; both ends are moved off their surfaces.
     bool occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3& q, const Vec3& ng_q, float reach_q) const;
-    /// The same where `q` is not on a surface (a lens, a point light, a point beyond the scene).
-    bool occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3& q) const;
+    /// The same where `q` is not on a surface (a lens, a point light, a point beyond the scene) and has a clearance: what lies
+    /// within that is hidden from it.
+    bool occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3& q, float clearance = 0) const;
+    /// Of the lens.
+    float camera_clearance() const { return camera_clearance_; }
 
   private:
     Scene() = default;
     void collect_emitters(std::vector<Emitter>* emitters);
-    float smallest_reach(const Bounds3& bounds) const;
+    /// Largest coordinate magnitude of everything in the scene.
+    float largest_reach(const Bounds3& bounds) const;
+    Status find_contacts(std::vector<Emitter>* emitters, float largest);
+    bool find_surface(const Vec3& o, const Vec3& d, float clearance, RawHit* hit) const;
+    void surface_point(const Vec3& o, const Vec3& d, const RawHit& hit, SurfacePoint* out) const;
     void summarise();
     void triangle_point(const TriangleMesh& mesh, const RawHit& hit, SurfacePoint* out) const;
     static float opacity(const void* user, int32_t object, uint32_t geometry, uint32_t primitive, float u, float v);
@@ -91,6 +104,8 @@ class Scene {
     std::vector<std::string> light_sources_;  // where each light group came from
     EmitterSet emitters_;
     Camera camera_;
+    float camera_clearance_ = 0;
+    ContactFinder::Covered covered_;  ///< By area lights in their plane.
     /// Largest coordinate magnitude in the whole scene, at most 1/4: in a scene of ordinary size small primitives keep the
     /// offsets that rays from afar need, and only in a scene that is tiny as a whole do the offsets shrink with it.
     float least_reach_ = 0.25f;

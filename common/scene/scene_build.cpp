@@ -114,12 +114,27 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
     }
 }
 
-float Scene::smallest_reach(const Bounds3& bounds) const {
+float Scene::largest_reach(const Bounds3& bounds) const {
     float reach = largest_coordinate(description_.camera.camera_to_world.point({0, 0, 0}));
     if (!bounds.empty()) reach = std::max({reach, largest_coordinate(bounds.lo), largest_coordinate(bounds.hi)});
     for (const PointLight& l : description_.point_lights) reach = std::max(reach, largest_coordinate(l.position));
     for (const SpotLight& l : description_.spot_lights) reach = std::max(reach, largest_coordinate(l.position));
-    return std::min(reach, 0.25f);
+    return reach;
+}
+
+/// What lies at distance zero of the camera, a lamp or an area light.
+Status Scene::find_contacts(std::vector<Emitter>* emitters, float largest) {
+    const ContactFinder contacts(description_, *accel_, instance_inverse_, largest);
+    camera_clearance_ = contacts.clearance(camera_.position());
+    for (Emitter& e : *emitters)
+        if (e.is_delta() && !e.is_infinite()) e.clearance = contacts.clearance(e.position);
+    const auto emits = [&](uint32_t mesh) { return mesh_first_emitter_[mesh] != kNone; };
+    covered_ = contacts.cover(emitters, emits);
+    if (!covered_.any) return {};
+    std::vector<uint32_t> lights;
+    for (uint32_t i = 0; i < description_.meshes.size(); ++i)
+        if (emits(i)) lights.push_back(i);
+    return accel_->keep_apart(description_, lights, &Scene::opacity, this);
 }
 
 Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions& options) {
@@ -176,10 +191,12 @@ Result<std::unique_ptr<Scene>> Scene::build(SceneDescription description, const 
     scene->accel_ = std::move(accel).value();
 
     const Bounds3 bounds = scene->accel_->bounds();
-    scene->least_reach_ = scene->smallest_reach(bounds);
+    const float largest = scene->largest_reach(bounds);
+    scene->least_reach_ = std::min(largest, kSmallScene);
     std::vector<Emitter> emitters;
     scene->collect_emitters(&emitters);
     for (Emitter& e : emitters) e.reach = std::max(e.reach, scene->least_reach_);
+    LL_RETURN_IF_ERROR(scene->find_contacts(&emitters, largest));
     const Vec3 centre = bounds.empty() ? Vec3{} : bounds.centre();
     // A little larger than the bounding sphere, so that rounding never starts a light sub-path inside of the scene.
     const float radius = bounds.empty() ? 1.0f : length(bounds.hi - centre) * 1.0001f + 1e-6f;

@@ -182,7 +182,7 @@ GammaDataset gamma_dataset(const TrainingData& d, const std::vector<double>& bri
         path.node_count = uint32_t(out.nodes.size()) - path.first_node;
         if (path.node_count == 0) continue;
         path.weight = float(double(p.square) / (brightness[p.block] * brightness[p.block]));
-        path.fixed = v[0].density + p.lens;
+        path.fixed = v[0].density + p.next_event + p.lens;
         path.contribution = float(double(p.estimate) / brightness[p.block]);
         if (!std::isfinite(path.weight) || !(path.weight > 0)) continue;
         out.paths.push_back(path);

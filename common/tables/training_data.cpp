@@ -73,7 +73,7 @@ Status TrainingData::validate(size_t emitter_count) const {
 
 bool TrainingData::in_range(const TrainingPath& path) const {
     const TrainingVertex* v = &vertices[path.first_vertex];
-    return std::isfinite(path.estimate) && std::isfinite(path.square) && std::isfinite(v->density + path.lens) &&
+    return std::isfinite(path.estimate) && std::isfinite(path.square) && std::isfinite(v->density + path.next_event + path.lens) &&
            std::all_of(v, v + path.vertex_count, [](const TrainingVertex& x) { return std::isfinite(x.density); });
 }
 

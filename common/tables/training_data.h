@@ -8,7 +8,7 @@
 //     densities: n p of a technique, over p_own, as the weights of the render will count it (typical survival of roulette,
 //                corrections) but without what is to be learned, N Gamma / Q; 0 where impossible. vertices[s].density: of hitting
 //                the emitter (s = 0) and of the connection of x_{s-1} and x_s (1 <= s <= k-1); next_event and lens: of choosing
-//                x_0 afresh from x_1, one sample, and of a light sub-path that reached the lens
+//                x_0 afresh from x_1, as often as the render will, and of a light sub-path that reached the lens
 // A camera sample keeps at most two paths with two camera vertices (the lens counts), two with three, four, and two with more: what
 // it found is dealt to the two in turn. A light sub-path that reached the lens keeps one. Each is chosen in proportion to its
 // estimate; both numbers are divided by the probability of that choice, so that sums over D stay unbiased.
@@ -62,8 +62,7 @@ struct TrainingData {
     /// Everything that training relies on. Estimates, squares, densities and sums may leave the range of their type in a scene
     /// of extremes; see in_range().
     Status validate(size_t emitter_count) const;
-    /// Whether all numbers of a path that tables are learned from are finite (next_event is none of them). Training leaves the
-    /// others out.
+    /// Whether all numbers of a path that tables are learned from are finite. Training leaves the others out.
     bool in_range(const TrainingPath& path) const;
 };
 

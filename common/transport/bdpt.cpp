@@ -8,12 +8,13 @@ extern const AlgorithmInfo kBdptRow;
 
 namespace {
 
-constexpr ParameterInfo kParameters[] = {kRouletteStart, kRouletteMin, kHeuristic};
+constexpr ParameterInfo kParameters[] = {kRouletteStart, kRouletteMin, kHeuristic, kNextEvent};
 
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     return make_unit_renderer(r, [&](auto&& select) {
-        const auto selection = select(BdptSelection{double(r.light_paths_per_iteration())});
-        return BdptAlgorithm<std::remove_cvref_t<decltype(selection)>>{selection, heuristic_of(r.settings.algorithm)};
+        const auto selection = select(BdptSelection{double(r.light_paths_per_iteration()), next_event_of(r.settings.algorithm)});
+        return BdptAlgorithm<std::remove_cvref_t<decltype(selection)>>{selection, heuristic_of(r.settings.algorithm),
+                                                                       next_event_of(r.settings.algorithm)};
     });
 }
 

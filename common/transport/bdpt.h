@@ -3,7 +3,8 @@
 //
 // Every camera sample owns one light sub-path; all their vertices are connected. Effective densities:
 //   s = 0          rho = A(0)
-//   s = 1          rho = next_event A(1)        x_0 chosen afresh from x_1
+//   s = 1          rho = n next_event A(1)      x_0 chosen afresh from x_1, n times at the first hit; for point lights there
+//                                               trusted by its variance (common/path/next_event.h)
 //   2 <= s <= k-1  rho = C(s) A(s)
 //   s = k          rho = N1 |crop| C(k)         N1 = 1 light path per pixel and iteration; |crop| rendered pixels, because
 //                                               A(.) is a density per pixel while a light path may land in any of them
@@ -18,20 +19,24 @@ namespace lightloom {
 
 struct BdptSelection {
     double light_paths_per_iteration = 1;  ///< N1 |crop|
+    NextEventRays rays;
 
     struct OnPath : PlainTechniques {
         double light_paths_per_iteration;
+        NextEventRays rays;
+
+        double next_event() const { return rays.sigma(view); }
 
         double connect(int s) const { return s == 1 ? 0 : 1; }
         double lens() const { return light_paths_per_iteration; }
     };
-    OnPath on(const PathView& view) const { return {{view}, light_paths_per_iteration}; }
+    OnPath on(const PathView& view) const { return {{view}, light_paths_per_iteration, rays}; }
 };
 
 /// Traces one camera sample and one light sub-path and calls contribute(contribution, view) for everything that they give.
 /// light_done(y, n) is called once the light sub-path is complete.
 template <ViewDetail detail, class LightDone, class Contribute>
-void trace_bdpt_sample(SampleContext& context, LightDone&& light_done, Contribute&& contribute) {
+void trace_bdpt_sample(SampleContext& context, NextEventRays rays, LightDone&& light_done, Contribute&& contribute) {
     const Scene& scene = context.scene;
     PathVertex *y = context.light_path_vertices, *z = context.camera_path;
     PathView view;
@@ -44,7 +49,7 @@ void trace_bdpt_sample(SampleContext& context, LightDone&& light_done, Contribut
     const auto visit = [&](int t) {
         contribute_hit<detail>(scene, z, t, &view, contribute);
         if (t > context.max_edges || !z[t - 1].bsdf.has_smooth_lobe()) return;
-        contribute_next_event<detail>(scene, z, t, sampler, &view, &context.counters, contribute);
+        contribute_next_event<detail>(scene, z, t, sampler, rays(t), &view, &context.counters, contribute);
         for (int s = 2; s <= n && s + t - 1 <= context.max_edges; ++s) {
             if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
             if (const Rgb c = connect<detail>(scene, y, s, z, t, &view, &context.counters); !c.is_black())
@@ -62,13 +67,14 @@ template <class Selection = BdptSelection>
 struct BdptAlgorithm {
     Selection selection;
     Heuristic heuristic = Heuristic::kBalance;
+    NextEventRays rays;
 
     float weight(const PathView& view, Technique own) const { return float(mis_weight(view, own, selection.on(view), heuristic)); }
 
     template <class Contribute>
     void trace(SampleContext& context, Contribute&& contribute) const {
         trace_bdpt_sample<ViewDetail::kFull>(
-            context, [](const PathVertex*, int) {}, contribute);
+            context, rays, [](const PathVertex*, int) {}, contribute);
     }
 };
 

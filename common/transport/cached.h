@@ -8,7 +8,6 @@
 //                                                      its own
 //       Selection densities;                           // where all units have the same: weights can be asked about single paths
 //       static constexpr bool kUnitSelection;          // optional; whether they depend on more of the unit than its group
-//       static constexpr bool kNextEvent;              // optional; next event estimation as well, beside s = 1 from the cache
 //       static constexpr ViewDetail kDetail;
 //       struct / using Index;                          // of a unit's cache, frozen before the first camera sample
 //       uint64_t windows() const;                      // light-only repetitions of the cache that the index may reach into
@@ -21,7 +20,7 @@
 //       float inverse_density(const LightPick&) const; // see PathContribution
 //   };
 //
-// Emitter hits and connections of every counted light sub-path to the lens are the same for all of them.
+// Emitter hits, next event estimation, and connections of every counted light sub-path to the lens are the same for all of them.
 
 #include "common/path/mis.h"
 #include "common/transport/contribution.h"
@@ -34,13 +33,10 @@ struct CachedAlgorithm {
     Method method;
     Heuristic heuristic = Heuristic::kBalance;
     uint64_t minimum_paths = 1;  ///< Of a unit's cache.
+    NextEventRays rays;          ///< Next event estimation beside s = 1 from the cache.
 
     static constexpr bool kUnitSelection = [] {
         if constexpr (requires { Method::kUnitSelection; }) return Method::kUnitSelection;
-        return false;
-    }();
-    static constexpr bool kNextEvent = [] {
-        if constexpr (requires { Method::kNextEvent; }) return Method::kNextEvent;
         return false;
     }();
 
@@ -98,9 +94,9 @@ struct CachedAlgorithm {
             });
             if (t > context.max_edges || !v.bsdf.has_smooth_lobe()) return;
             method.label_camera_vertex(scene, &v);
-            if constexpr (kNextEvent) {
+            if (const int shadow_rays = rays(t)) {
                 contribute_next_event<kDetail>(
-                    scene, z, t, sampler, &view, &context.counters, [&](const PathContribution& c, PathView&) {
+                    scene, z, t, sampler, shadow_rays, &view, &context.counters, [&](const PathContribution& c, PathView&) {
                         PathVertex y0;
                         y0.p = c.position, y0.ng = c.normal, y0.emitter = int32_t(c.emitter);
                         method.label_light_path(scene, &y0, 1);
@@ -112,7 +108,7 @@ struct CachedAlgorithm {
             LightPick picks[kMaxConnections];
             // Low-discrepancy at the first vertex, over the iterations of the pixel.
             const int count = method.draw(
-                state.cache, state.index, v, [&] { return sampler.next_event(t); }, sampler.rng(), context.max_edges + 1 - t,
+                state.cache, state.index, v, [&] { return sampler.connection(t); }, sampler.rng(), context.max_edges + 1 - t,
                 picks);
             for (int n = 0; n < count; ++n) {
                 const LightPick& pick = picks[n];

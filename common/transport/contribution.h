@@ -4,6 +4,7 @@
 
 #include "common/path/camera_walk.h"
 #include "common/path/light_walk.h"
+#include "common/path/next_event.h"
 #include "common/path/technique.h"
 
 namespace lightloom {
@@ -58,26 +59,30 @@ void contribute_escape(const Scene& scene, const PathVertex* z, int t, const Wal
                *view);
 }
 
-/// s = 1: next event estimation from z_{t-1}, with numbers of the sampler.
+/// s = 1: next event estimation from z_{t-1} with `rays` >= 1 points, evenly spread from numbers of the sampler.
 template <ViewDetail detail, class Contribute>
-void contribute_next_event(const Scene& scene, const PathVertex* z, int t, CameraSampler& sampler, PathView* view,
+void contribute_next_event(const Scene& scene, const PathVertex* z, int t, CameraSampler& sampler, int rays, PathView* view,
                            WalkCounters* counters, Contribute&& contribute) {
     const PathVertex& v = z[t - 1];
     NextEventSample light;
     const double pick = sampler.rng().uniform_double();
-    if (!scene.emitters().sample_next_event(v.p, pick, sampler.next_event(t), &light)) return;
-    const Rgb value = next_event<detail>(scene, z, t, light, view, counters);
-    if (value.is_black()) return;
-    contribute(PathContribution{.value = value,
-                                .inverse_density = float(view->fwd[0] / view->next_event),
-                                .technique = Technique::next_event(),
-                                .t = t,
-                                .z = z,
-                                .position = light.position,
-                                .normal = light.normal,
-                                .emitter = light.emitter,
-                                .survival = v.survival},
-               *view);
+    const Vec2 point = sampler.next_event(t);
+    const float share = 1 / float(rays);
+    for (int i = 0; i < rays; ++i) {
+        if (!scene.emitters().sample_next_event(v.p, evenly_after(pick, i), evenly_after(point, i), &light)) continue;
+        const Rgb value = next_event<detail>(scene, z, t, light, view, counters);
+        if (value.is_black()) continue;
+        contribute(PathContribution{.value = value * share,
+                                    .inverse_density = float(view->fwd[0] / view->next_event) * share,
+                                    .technique = Technique::next_event(),
+                                    .t = t,
+                                    .z = z,
+                                    .position = light.position,
+                                    .normal = light.normal,
+                                    .emitter = light.emitter,
+                                    .survival = v.survival},
+                   *view);
+    }
 }
 
 /// A light sub-path y[0 .. s-1], s >= 2, that met the camera sub-path z[0 .. t-1] by `technique`.

@@ -22,7 +22,7 @@ std::vector<ImageLayer> first_hit_layers(const Scene& scene, uint64_t seed, int 
                 const CameraSampler sampler(seed, uint64_t(i), pixel);
                 const Camera::CameraRay ray = sampler.ray(scene.camera(), crop.x0 + column, crop.y0 + row);
                 SurfacePoint point;
-                if (!scene.intersect(ray.origin, ray.direction, &point)) continue;
+                if (!scene.intersect(ray.origin, ray.direction, &point, scene.camera_clearance())) continue;
                 albedo += scene.bsdf_at(point).albedo();
                 normal += face_forward(point.shading.n, -ray.direction);
                 depth += length(point.p - ray.origin);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/path/corrected.h"
+#include "common/path/next_event.h"
 #include "common/tables/tables.h"
 #include "common/tables/train.h"
 #include "common/transport/settings.h"
@@ -35,6 +36,7 @@ struct LearningPlan {
     // How the weights of the render will count, where no table decides that.
     int connections = 1;  ///< N
     Correction correction = Correction::kUncorrected;
+    NextEventRays rays{0};
 
     /// Samples of the rounds before this one.
     uint64_t first_sample(size_t round) const {

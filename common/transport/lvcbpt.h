@@ -4,6 +4,7 @@
 //
 // Every camera vertex is connected to N prefixes drawn uniformly from the unit's cache (V prefixes of M paths). Densities:
 //   s = 0          rho = A(0)
+//   s = 1          rho = n next_event A(1)     next event estimation, as in `bdpt`, beside the cache's own
 //   1 <= s <= k-1  rho = N / v  C(s) A(s)       v: expected number of prefixes per light path, a table. The estimator divides by
 //                                               what was really done, V / (M N): the weight must not know the realised V
 //   s = k          rho = N1 |crop| C(k)
@@ -19,12 +20,13 @@ struct UniformSelection {
     double light_paths_per_iteration = 1;  ///< N1 |crop|
     double connection_density = 1;         ///< N / v
     TypicalSurvival survival;
+    NextEventRays rays;
 
     struct OnPath : PlainTechniques {
         const UniformSelection& selection;
 
         double survivors(int s) const { return selection.survival(s) * selection.survival(view.k + 1 - s); }
-        double next_event() const { return 0; }
+        double next_event() const { return selection.rays.sigma(view); }
         double connect(int) const { return selection.connection_density; }
         double lens() const { return selection.light_paths_per_iteration; }
     };

@@ -2,6 +2,7 @@
 // Parameters that several algorithms have, and what they mean: rows of the catalog list them, and read them from here.
 
 #include "common/path/mis.h"
+#include "common/path/next_event.h"
 #include "common/path/random_walk.h"
 #include "common/transport/settings.h"
 
@@ -28,6 +29,20 @@ inline constexpr std::string_view kHeuristicNames[] = {"balance", "power", "maxi
 inline constexpr std::string_view kSwitch[] = {"off", "on"};
 inline constexpr ParameterInfo kHeuristic{
     "heuristic", 0, 0, 2, true, "balance [Veach 1997, eq. 9.8], power with exponent 2, or maximum", kHeuristicNames};
+inline constexpr int kMaxNextEventRays = 64;
+/// Of algorithms that are nothing without next event estimation, and of those that connect to points on lights from a cache as
+/// well.
+inline constexpr ParameterInfo kNextEvent{
+    "next-event",      1,    1,
+    kMaxNextEventRays, true, "shadow rays of next event estimation at the camera's first hit; later ones send one"};
+inline constexpr ParameterInfo kNextEventBesideCache{"next-event",
+                                                     1,
+                                                     0,
+                                                     kMaxNextEventRays,
+                                                     true,
+                                                     "shadow rays of next event estimation, beside the cache's connections to "
+                                                     "lights, at the camera's first hit; later ones send one; 0: "
+                                                     "none at all"};
 inline constexpr ParameterInfo kLightPaths{
     "light-paths",
     0.3,
@@ -54,9 +69,9 @@ inline RouletteRule roulette_of(const AlgorithmSettings& s) {
     if (!s.has(kRouletteStart.name) || !s.has(kRouletteMin.name)) return rule;
     rule.first_vertex = int(s.value(kRouletteStart.name));
     rule.min_survival = float(s.value(kRouletteMin.name));
-    rule.max_survival = std::max(rule.max_survival, rule.min_survival);  // rr-min=1 switches roulette off
     return rule;
 }
+inline NextEventRays next_event_of(const AlgorithmSettings& s) { return {int(s.value(kNextEvent.name))}; }
 inline Heuristic heuristic_of(const AlgorithmSettings& s) {
     return s.has(kHeuristic.name) ? Heuristic(int(s.value(kHeuristic.name))) : Heuristic::kBalance;
 }

@@ -8,12 +8,13 @@ extern const AlgorithmInfo kPathRow;
 
 namespace {
 
-constexpr ParameterInfo kParameters[] = {kRouletteStart, kRouletteMin, kHeuristic};
+constexpr ParameterInfo kParameters[] = {kRouletteStart, kRouletteMin, kHeuristic, kNextEvent};
 
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     return make_unit_renderer(r, [&](auto&& select) {
-        const auto selection = select(PathSelection{});
-        return PathAlgorithm<std::remove_cvref_t<decltype(selection)>>{selection, heuristic_of(r.settings.algorithm)};
+        const auto selection = select(PathSelection{next_event_of(r.settings.algorithm)});
+        return PathAlgorithm<std::remove_cvref_t<decltype(selection)>>{selection, heuristic_of(r.settings.algorithm),
+                                                                       next_event_of(r.settings.algorithm)};
     });
 }
 

@@ -3,7 +3,7 @@
 //
 // Techniques and effective densities (PathView's symbols):
 //   s = 0  rho = A(0)                                         the camera sub-path hits the emitter
-//   s = 1  rho = next_event A(1)                              x_0 chosen from x_1
+//   s = 1  rho = n next_event A(1)                            x_0 chosen from x_1, n times at the first hit
 // Tables: none. Bias: none. Light that reaches the scene only through Dirac vertices from a light that cannot be hit
 // (caustics of point lights) is missing, because no technique here can make such a path.
 
@@ -14,16 +14,22 @@
 namespace lightloom {
 
 struct PathSelection {
+    NextEventRays rays;
+
     struct OnPath : PlainTechniques {
+        NextEventRays rays;
+
         int s_max() const { return 1; }
+        double next_event() const { return rays.sigma(view); }
     };
-    OnPath on(const PathView& view) const { return {{view}}; }
+    OnPath on(const PathView& view) const { return {{view}, rays}; }
 };
 
 template <class Selection = PathSelection>
 struct PathAlgorithm {
     Selection selection;
     Heuristic heuristic = Heuristic::kBalance;
+    NextEventRays rays;
 
     float weight(const PathView& view, Technique own) const { return float(mis_weight(view, own, selection.on(view), heuristic)); }
 
@@ -37,7 +43,7 @@ struct PathAlgorithm {
         const auto visit = [&](int t) {
             contribute_hit<kDetail>(scene, z, t, &view, contribute);
             if (t > context.max_edges || !z[t - 1].bsdf.has_smooth_lobe()) return;
-            contribute_next_event<kDetail>(scene, z, t, sampler, &view, &context.counters, contribute);
+            contribute_next_event<kDetail>(scene, z, t, sampler, rays(t), &view, &context.counters, contribute);
         };
         const auto escape = [&](int t, const WalkRay& ray) {
             if (t <= context.max_edges) contribute_escape<kDetail>(scene, z, t, ray, &view, contribute);

@@ -15,6 +15,7 @@ constexpr ParameterInfo kParameters[] = {
     kRouletteStart,
     kRouletteMin,
     kHeuristic,
+    kNextEventBesideCache,
     kLightPaths,
     kCache,
     kConnections,
@@ -61,7 +62,8 @@ LearningPlan plan(const AlgorithmSettings& s) {
             .energy_paths = s.value("energy-paths"),
             .rounds = rounds_with_pilot(samples, s.value("pilot")),
             .connections = CacheParameters::of(s).connections,
-            .correction = correction_of(s)};
+            .correction = correction_of(s),
+            .rays = next_event_of(s)};
 }
 
 Result<Tables> learn(const LearnRequest& r) {
@@ -95,11 +97,12 @@ Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
                                     .connections = p.connections,
                                     .cache_paths = settings.value("ris-aware") != 0 ? double(p.minimum_paths) : 0,
                                     .correction = correction_of(settings),
-                                    .roulette = roulette_of(settings)});
+                                    .roulette = roulette_of(settings),
+                                    .rays = next_event_of(settings)});
     return make_unit_renderer(r, [&](auto&& select) {
         const auto selection = select(densities);
         return SpcbptAlgorithm<std::remove_cvref_t<decltype(selection)>>{
-            {selection, prepared, p.connections}, heuristic_of(settings), p.minimum_paths};
+            {selection, prepared, p.connections}, heuristic_of(settings), p.minimum_paths, next_event_of(settings)};
     });
 }
 

@@ -7,6 +7,7 @@
 //     (1 / N) w f / (p(Y) p(Z))  /  (M_i Gamma(i, j) P2(Y))                                       [Eq. 10 with its p(Y)]
 // Effective densities, with F the measurement contribution of a prefix and L its scalar:
 //     s = 0          rho = A(0)
+//     s = 1          rho = n next_event A(1)                     next event estimation, as in `bdpt`, beside the cache's own
 //     1 <= s <= k-1  rho = N Gamma(i, j) L(F(s)) / Q(i) A(s)                                      [Eq. 11]: the target, not
 //                    what was really drawn; with ris_aware 1 / rho = 1 / rho + 1 / (M C(s) A(s)): a cache of M paths cannot
 //                    deliver more than that; with correlation_aware N c_s stands for N (common/path/correlation.h)
@@ -63,13 +64,14 @@ struct SubspaceSelection {
     double connections = 3;                ///< N
     double cache_paths = 0;                ///< M of ris_aware; 0 switches that off.
     TypicalSurvival survival;
+    NextEventRays rays;
 
     struct OnPath : PlainTechniques {
         const SubspaceSelection& selection;
 
         /// Draws among prefixes make up for roulette: a survivor has that much more throughput.
         double survivors(int s) const { return s == view.k ? selection.survival(s) : selection.survival(view.k + 1 - s); }
-        double next_event() const { return 0; }
+        double next_event() const { return selection.rays.sigma(view); }
         double connections() const { return selection.connections; }
         double connect(int s) const { return connect(s, 1); }
         double connect(int s, double share) const {
@@ -92,12 +94,13 @@ struct SpcbptCounts {
     double cache_paths = 0;
     Correction correction = Correction::kUncorrected;
     RouletteRule roulette;
+    NextEventRays rays;
 };
 
 inline SpcbptSelection spcbpt_selection(std::shared_ptr<const PreparedTables> prepared, const SpcbptCounts& c) {
     const double connections = double(c.connections);
     return {{LearnedAffinity{std::move(prepared), connections}, c.light_paths_per_iteration, connections, c.cache_paths,
-             TypicalSurvival(c.roulette)},
+             TypicalSurvival(c.roulette), c.rays},
             c.correction};
 }
 

@@ -64,7 +64,7 @@ class Reservoir {
             const double sub_paths = ratio * inverse_own * on.survivors(s);
             if (s == 0) return void(vertices_[0].density = single(sub_paths * on.hit()));
             if (s == k) return void(path_.lens = single(sub_paths * on.lens()));
-            if (s == 1) path_.next_event = single(sub_paths * (view.next_event / view.fwd[0]));
+            if (s == 1) path_.next_event = single(sub_paths * on.next_event());
             vertices_[size_t(s)].density = single(sub_paths * on.connect(s));
         };
         const int own = c.technique.s;
@@ -185,7 +185,8 @@ class TrainingGenerator::Unit {
                   double(generator_.light_paths_per_iteration_),
                   double(plan.connections),
                   0,
-                  TypicalSurvival(generator_.roulette_)},
+                  TypicalSurvival(generator_.roulette_),
+                  plan.rays},
                  plan.correction}};
     }
     TrainingData empty() const {
@@ -272,7 +273,7 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
         CameraReservoirs from_camera;
         Reservoir from_light;
         trace_bdpt_sample<ViewDetail::kSubspace>(
-            context,
+            context, {},
             [&](const PathVertex* y, int count) {
                 if (unit.energy_share(context.light_path) > 0) keep_light_path(y, count, context.max_edges, &data);
             },
@@ -293,8 +294,9 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
     const SpcbptSelection selection = spcbpt_selection(guide_, {.light_paths_per_iteration = unit.pixels(),
                                                                 .connections = plan_.connections,
                                                                 .correction = plan_.correction,
-                                                                .roulette = roulette_});
-    const SpcbptAlgorithm<> generator{{selection, guide_, plan_.connections}, heuristic_, 1};
+                                                                .roulette = roulette_,
+                                                                .rays = plan_.rays});
+    const SpcbptAlgorithm<> generator{{selection, guide_, plan_.connections}, heuristic_, 1, plan_.rays};
     const RenderUnit work = unit.light_work();
     const RenderToCome render = unit.render();
     // Light sub-paths are traced in parallel; what they bring is joined in their order.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "common/transport/lvcbpt.h"
 #include "tests/support/stub_algorithms.h"
 #include "tests/support/test_scenes.h"
 
@@ -52,12 +53,15 @@ TEST(Stubs, NextEventBesideTheCacheHasTheSameMean) {
     const TypicalSurvival survival{RouletteRule{}};
     for (const auto make : {testing::diffuse_box, testing::spherical_lights, testing::environment_lit, testing::delta_lights}) {
         const auto scene = make();
-        const testing::NextEventBesideCacheSelection selection{{double(scene->frame().crop.area()), 3 / 2.5, survival}};
-        const CachedAlgorithm<testing::NextEventBesideCache> algorithm{{{selection, 3}}, Heuristic::kBalance, 1000};
-        EXPECT_TRUE(testing::compare(
-            reference(scene),
-            testing::replicate(testing::algorithm_image(scene, algorithm, kMaxDepth, 8), scene->frame().crop, kSeeds, 3000),
-            "next event beside the cache", &family));
+        const RegionMeans bdpt = reference(scene);
+        for (const int rays : {0, 1, 4}) {
+            const UniformSelection selection{double(scene->frame().crop.area()), 3 / 2.5, survival, {rays}};
+            const LvcbptAlgorithm<> algorithm{{selection, 3}, Heuristic::kBalance, 1000, {rays}};
+            EXPECT_TRUE(testing::compare(
+                bdpt,
+                testing::replicate(testing::algorithm_image(scene, algorithm, kMaxDepth, 8), scene->frame().crop, kSeeds, 3000),
+                std::to_string(rays) + " rays beside the cache", &family));
+        }
     }
     family.check();
 }

@@ -165,6 +165,7 @@ inline Rgb merge(const Scene& scene, const PathVertex* y, int s, const PathVerte
     view->rev[i - 1] = double(e.pdf_fwd) * a.to_previous;
     if (t >= 3) view->fwd[i + 1] = double(e.pdf_rev) * b.to_previous;
     const Emitter& emitter = scene.emitters()[uint32_t(y[0].emitter)];
+    view->discrete_source = emitter.is_discrete();
     view->next_event = scene.emitters().pdf_next_event(emitter, y[1].p, y[0].p, y[0].ng, y[1].wo);
     return contribution;
 }

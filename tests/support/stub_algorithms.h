@@ -1,9 +1,9 @@
 #pragma once
-// Stand-ins for methods to come, made of production pieces only: they show that pairing over the whole frame, merging, and next
-// event estimation beside a cache need no change of the core. Slow on purpose (every photon is looked at); never part of the
+// Stand-ins for methods to come, made of production pieces only: they show that pairing over the whole frame, and merging
+// need no change of the core. Slow on purpose (every photon is looked at); never part of the
 // product.
 
-#include "common/transport/lvcbpt.h"
+#include "common/transport/bdpt.h"
 #include "common/transport/unit_renderer.h"
 #include "tests/support/estimates.h"
 #include "tests/support/path_rebuild.h"
@@ -34,17 +34,6 @@ struct PairingStubSelection {
         double connect(int s) const { return pairs * BdptSelection::OnPath::connect(s); }
     };
     OnPath on(const PathView& view) const { return OnPath{connections.on(view), pairs}; }
-};
-
-/// A cache of which points on lights are connected as well, and next event estimation beside it: two techniques of one split.
-struct NextEventBesideCacheSelection : UniformSelection {
-    struct OnPath : UniformSelection::OnPath {
-        double next_event() const { return PlainTechniques::next_event(); }
-    };
-    OnPath on(const PathView& view) const { return {UniformSelection::on(view)}; }
-};
-struct NextEventBesideCache : UniformConnections<NextEventBesideCacheSelection> {
-    static constexpr bool kNextEvent = true;
 };
 
 /// What a selection without labels says of single paths.
@@ -93,7 +82,7 @@ struct PoolAlgorithm {
         const auto visit = [&](int t) {
             contribute_hit<ViewDetail::kFull>(scene, z, t, &view, contribute);
             if (t > context.max_edges || !z[t - 1].bsdf.has_smooth_lobe()) return;
-            contribute_next_event<ViewDetail::kFull>(scene, z, t, sampler, &view, &context.counters, contribute);
+            contribute_next_event<ViewDetail::kFull>(scene, z, t, sampler, 1, &view, &context.counters, contribute);
             for (int q = 0; q < pairs; ++q) {
                 const std::vector<PathVertex>& y = (*pool)[choice.below(uint32_t(pool->size()))];
                 for (int s = 2; s <= int(y.size()) && s + t - 1 <= context.max_edges; ++s) {

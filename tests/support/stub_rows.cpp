@@ -75,7 +75,7 @@ struct StubMerging {
         const auto visit = [&](int t) {
             contribute_hit<ViewDetail::kFull>(scene, z, t, &view, contribute);
             if (t > context.max_edges || !z[t - 1].bsdf.has_smooth_lobe()) return;
-            contribute_next_event<ViewDetail::kFull>(scene, z, t, sampler, &view, &context.counters, contribute);
+            contribute_next_event<ViewDetail::kFull>(scene, z, t, sampler, 1, &view, &context.counters, contribute);
             merges(context, state, t, contribute);
         };
         const auto escape = [&](int t, const WalkRay& ray) {
@@ -192,7 +192,7 @@ struct StubPairing {
         const auto visit = [&](int t) {
             contribute_hit<ViewDetail::kFull>(scene, z, t, &view, add);
             if (t > scope.max_edges || !z[t - 1].bsdf.has_smooth_lobe()) return;
-            contribute_next_event<ViewDetail::kFull>(scene, z, t, sampler, &view, counters, add);
+            contribute_next_event<ViewDetail::kFull>(scene, z, t, sampler, 1, &view, counters, add);
             for (int s = 2; s <= int(y.size()) && s + t - 1 <= scope.max_edges; ++s) {
                 if (!y[size_t(s - 1)].bsdf.has_smooth_lobe()) continue;
                 const Rgb c = connect(scene, y.data(), s, z, t, &view, counters);

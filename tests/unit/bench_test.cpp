@@ -103,7 +103,7 @@ TEST(AlgorithmChoice, ParsesSettingsAndNamesMistakes) {
     ASSERT_TRUE(choice.ok()) << choice.status().message();
     EXPECT_EQ(choice->settings.name(), "bdpt");
     EXPECT_EQ(choice->settings.text(),
-              (std::map<std::string, std::string>{{"heuristic", "1"}, {"rr-min", "0.5"}, {"rr-start", "6"}}));
+              (std::map<std::string, std::string>{{"heuristic", "1"}, {"next-event", "1"}, {"rr-min", "0.5"}, {"rr-start", "6"}}));
     EXPECT_EQ(choice->label, "bdpt:rr-start=6:heuristic=1");
     EXPECT_TRUE(parse_algorithm("path").ok());
     for (const char* wrong : {"", "no-such", "bdpt:", "bdpt:=1", "bdpt:heuristic", "bdpt:heuristic=9", "bdpt:no-such=1",

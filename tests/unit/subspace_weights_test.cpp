@@ -45,7 +45,7 @@ SpcbptWeights weights_of(const Scene& scene, SubspaceTables tables, int connecti
 }
 
 TEST(TypicalSurvival, CountsTheEventsThatASubPathWentThrough) {
-    const TypicalSurvival none, off(RouletteRule{.min_survival = 1, .max_survival = 1}), late(RouletteRule{.first_vertex = 256});
+    const TypicalSurvival none, off(RouletteRule{.min_survival = 1}), late(RouletteRule{.first_vertex = 256});
     const TypicalSurvival usual(RouletteRule{.first_vertex = 4, .min_survival = 0.5f});
     for (const int n : {0, 1, 4, 256, kMaxEdges + 1}) {
         EXPECT_EQ(none(n), 1);
@@ -157,9 +157,8 @@ TEST(Walk, DoesNotFollowDirectionsOfZeroDensity) {
 template <class Visit>
 void each_weighted(const Scene& scene, const FullPath& path, Technique own, const SpcbptWeights& a, const SpcbptWeights& b,
                    Visit&& visit) {
-    if (own.kind == TechniqueKind::kNextEvent) return;  // the same point as from a light sub-path
     testing::for_each_technique(path.k(), [&](Technique t) {
-        if (t.kind == TechniqueKind::kMerge || t.kind == TechniqueKind::kNextEvent) return;
+        if (t.kind == TechniqueKind::kMerge) return;
         const auto ra = rebuild(scene, path, t, &a), rb = rebuild(scene, path, t, &b);
         ASSERT_EQ(ra.has_value(), rb.has_value());
         if (ra) visit(t, ra->view, rb->view);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "common/transport/bdpt.h"
+#include "common/transport/lvcbpt.h"
 #include "tests/support/path_generator.h"
 #include "tests/support/stub_algorithms.h"
 #include "tests/support/table_render.h"
@@ -76,8 +77,9 @@ Family family_of_stubs(const Scene& scene) {
     family.push_back({"merge stub", testing::weights_of(MergeStubSelection{bdpt})});
     family.push_back({"merge stub, power", testing::weights_of(MergeStubSelection{bdpt}, Heuristic::kPower), Heuristic::kPower});
     family.push_back({"pairing stub", testing::weights_of(testing::PairingStubSelection{bdpt})});
-    family.push_back({"next event beside the cache", testing::weights_of(testing::NextEventBesideCacheSelection{
-                                                         {bdpt.light_paths_per_iteration, 0.37, survival}})});
+    for (const int rays : {0, 1, 5})
+        family.push_back({std::to_string(rays) + " rays beside the cache",
+                          testing::weights_of(UniformSelection{bdpt.light_paths_per_iteration, 0.37, survival, {rays}})});
     return family;
 }
 

@@ -413,15 +413,15 @@ TEST(Golden, EveryPartOfTheCourtyardShowsInItsUnit) {
     changes("lens", [](SceneDescription& d) { d.camera.focal_distance *= 1.01f; });
 }
 
-/// Two ways of rendering it agree.
-TEST(Golden, PathAndBdptAgreeOnTheCourtyard) {
+/// Two ways of rendering it agree. (Not `path`: it misses what point lights send through the pane.)
+TEST(Golden, LvcbptAndBdptAgreeOnTheCourtyard) {
     const std::shared_ptr<const Scene> scene = std::move(Scene::build(golden_courtyard())).value();
     testing::TestFamily family;
     std::vector<testing::RegionMeans> means;
-    for (const char* algorithm : {"path", "bdpt"})
+    for (const char* algorithm : {"lvcbpt", "bdpt"})
         means.push_back(
-            testing::replicate(testing::catalog_image(scene, algorithm, 6, 16), scene->frame().crop, 24, means.size() + 1));
-    testing::compare(means[0], means[1], "path and bdpt", &family);
+            testing::replicate(testing::catalog_image(scene, algorithm, 6, 32), scene->frame().crop, 24, means.size() + 1));
+    testing::compare(means[0], means[1], "lvcbpt and bdpt", &family);
     EXPECT_GT(family.size(), 5);
     family.check();
 }

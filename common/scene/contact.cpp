@@ -1,0 +1,166 @@
+#include "common/scene/contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace lightloom {
+namespace {
+
+constexpr double kZero = 0x1p-21;       // of a plane's rounding scale: eight units in the last place of what it is known by
+constexpr double kClearance = 0x1p-16;  // the same: beyond that even a grazing ray has left the surface
+
+struct Point {
+    double x, y, z;
+
+    Point(const Vec3& p) : x(double(p.x)), y(double(p.y)), z(double(p.z)) {}  // NOLINT(google-explicit-constructor)
+    Point(double px, double py, double pz) : x(px), y(py), z(pz) {}
+    friend Point operator-(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+    friend double dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+    friend Point cross(const Point& a, const Point& b) {
+        return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+    }
+    Point unit() const {
+        const double len = std::sqrt(dot(*this, *this));
+        return {x / len, y / len, z / len};
+    }
+};
+
+/// In double precision: what single precision could not tell apart is told by what is known of the corners, not by how they are
+/// computed with.
+struct Triangle {
+    Vec3 corners[3];
+    Point normal{0, 0, 1};
+
+    void set_normal() { normal = cross(Point(corners[1]) - corners[0], Point(corners[2]) - corners[0]).unit(); }
+    double height(const Vec3& p) const { return dot(Point(p) - corners[0], normal); }
+    /// Unit, in the plane, pointing out of the edge from corner i.
+    Point edge_normal(int i) const { return cross(Point(corners[(i + 1) % 3]) - corners[i], normal).unit(); }
+    /// What the rounding of coordinates is to be multiplied by for that of the plane: of a ground at y = 0 nothing, however wide
+    /// it is, of a tilted one its extent.
+    double scale() const {
+        double sum = 0;
+        for (const Vec3& c : corners)
+            sum = std::max(
+                sum, std::fabs(normal.x * double(c.x)) + std::fabs(normal.y * double(c.y)) + std::fabs(normal.z * double(c.z)));
+        return sum;
+    }
+    double scale_of(const Vec3& p) const {
+        return std::fabs(normal.x * double(p.x)) + std::fabs(normal.y * double(p.y)) + std::fabs(normal.z * double(p.z));
+    }
+};
+
+double distance_to_plane(const Triangle& t, const Triangle& other) {
+    double most = 0;
+    for (const Vec3& p : other.corners) most = std::max(most, std::fabs(t.height(p)));
+    return most;
+}
+
+/// Whether the projections on `axis` overlap by more than `least`.
+bool overlap(const Triangle& a, const Triangle& b, const Point& axis, double least) {
+    const auto range = [&](const Triangle& t) {
+        double low = HUGE_VAL, high = -HUGE_VAL;
+        for (const Vec3& c : t.corners) {
+            const double at = dot(Point(c) - a.corners[0], axis);
+            low = std::min(low, at), high = std::max(high, at);
+        }
+        return std::pair(low, high);
+    };
+    const auto [a_low, a_high] = range(a);
+    const auto [b_low, b_high] = range(b);
+    return std::min(a_high, b_high) - std::max(a_low, b_low) > least;
+}
+
+/// Whether two triangles share a part of one plane.
+bool coincide(const Triangle& a, const Triangle& b, double zero) {
+    // The plane of the larger one is the better known.
+    if (std::min(distance_to_plane(a, b), distance_to_plane(b, a)) > zero) return false;
+    for (int i = 0; i < 3; ++i)
+        if (!overlap(a, b, a.edge_normal(i), zero) || !overlap(a, b, b.edge_normal(i), zero)) return false;
+    return true;
+}
+
+bool touches(const Triangle& t, const Vec3& p, double zero) {
+    if (std::fabs(t.height(p)) > zero) return false;
+    for (int i = 0; i < 3; ++i)
+        if (dot(Point(p) - t.corners[i], t.edge_normal(i)) > zero) return false;
+    return true;
+}
+
+}  // namespace
+
+ContactFinder::ContactFinder(const SceneDescription& scene, const Accel& accel, const std::vector<Mat4>& instance_inverse,
+                             float largest)
+    : scene_(scene),
+      accel_(accel),
+      instance_inverse_(instance_inverse),
+      largest_(largest) {}
+
+namespace {
+
+/// A triangle in world space; nothing for a sphere.
+bool world_triangle(const SceneDescription& scene, const RawHit& at, Triangle* out) {
+    const Instance* instance = at.instance >= 0 ? &scene.instances[size_t(at.instance)] : nullptr;
+    const auto& meshes = instance ? scene.objects[size_t(instance->object)].meshes : scene.meshes;
+    if (at.geometry >= meshes.size()) return false;
+    const TriangleMesh& mesh = meshes[at.geometry];
+    for (size_t i = 0; i < 3; ++i) {
+        out->corners[i] = mesh.positions[mesh.indices[size_t(at.primitive) * 3 + i]];
+        if (instance) out->corners[i] = instance->object_to_world.point(out->corners[i]);
+    }
+    out->set_normal();
+    return true;
+}
+
+}  // namespace
+
+float ContactFinder::clearance(const Vec3& p) const {
+    double clearance = 0;
+    const double own = std::max(double(largest_coordinate(p)), double(std::min(largest_, kSmallScene)));
+    accel_.for_each_near(p, float(kZero * std::max(double(largest_), own) * std::sqrt(3.0)), [&](const RawHit& at) {
+        Triangle t;
+        if (world_triangle(scene_, at, &t)) {
+            const double scale = std::max(t.scale(), t.scale_of(p));
+            if (touches(t, p, kZero * scale)) clearance = std::max(clearance, kClearance * std::max(scale, own));
+            return;
+        }
+        const Instance* instance = at.instance >= 0 ? &scene_.instances[size_t(at.instance)] : nullptr;
+        const Sphere& s = (instance ? scene_.objects[size_t(instance->object)].spheres : scene_.spheres)[at.primitive];
+        const Vec3 inside = instance ? instance_inverse_[size_t(at.instance)].point(p) : p;
+        const Vec3 from_centre = inside - s.centre;
+        const float distance = length(from_centre);
+        if (!(distance > 0)) return;
+        Vec3 nearest = s.centre + from_centre * (s.radius / distance);
+        if (instance) nearest = instance->object_to_world.point(nearest);
+        const double scale = std::max(own, double(largest_coordinate(nearest)) + double(s.radius));
+        if (double(length(nearest - p)) <= kZero * scale) clearance = std::max(clearance, kClearance * scale);
+    });
+    return float(clearance);
+}
+
+ContactFinder::Covered ContactFinder::cover(std::vector<Emitter>* emitters, const std::function<bool(uint32_t)>& emits) const {
+    Covered covered{std::vector<float>(scene_.meshes.size()), std::vector<float>(scene_.instances.size())};
+    for (Emitter& e : *emitters) {
+        if (e.kind != EmitterKind::kTriangle) continue;
+        Triangle own{{e.position, e.position + e.edge1, e.position + e.edge2}};
+        own.set_normal();
+        const Vec3 centre = (own.corners[0] + own.corners[1] + own.corners[2]) / 3;
+        float radius = kZero * largest_;
+        for (const Vec3& c : own.corners) radius = std::max(radius, length(c - centre));
+        float reach = e.reach;
+        accel_.for_each_near(centre, radius * 1.001f, [&](const RawHit& at) {
+            Triangle t;
+            if ((at.instance < 0 && emits(at.geometry)) || !world_triangle(scene_, at, &t)) return;
+            const double scale = std::max(t.scale(), own.scale());
+            if (!coincide(own, t, kZero * scale)) return;
+            reach = std::max(reach, float(scale));
+            float& gap = at.instance < 0 ? covered.meshes[at.geometry] : covered.instances[size_t(at.instance)];
+            gap = std::max(gap, float(4 * kZero) * std::max(float(scale), e.reach));
+            covered.any = true;
+        });
+        e.reach = reach;
+    }
+    return covered;
+}
+
+}  // namespace lightloom

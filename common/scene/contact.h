@@ -1,0 +1,50 @@
+#pragma once
+// Surfaces at distance zero of a camera, a lamp or an area light: what lies there is decided once, when the scene is built, by
+// positions alone, so that a ray sees the same from either of its ends.
+//
+//   A lens or lamp that touches a surface  is on neither side of it: within its clearance nothing is hit, nothing hides it and
+//   nothing
+//                                          is lit by it.
+//   An area light in another surface's     is the surface that is there: rays that hit the other one within rounding of the light
+//   hit plane                                  the light instead, and the light's own rays start clear of both.
+//
+// "Zero" is what single precision cannot tell from zero: a few units in the last place of the coordinates that decide where the
+// plane is. A ground at y = 0 is known exactly, however wide it is; a tilted one to some units of its extent.
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "common/scene/accel.h"
+#include "common/scene/emitter.h"
+
+namespace lightloom {
+
+/// Scenes whose coordinates are all smaller have offsets that shrink with them.
+inline constexpr float kSmallScene = 0.25f;
+
+class ContactFinder {
+  public:
+    /// Both must outlive it. `instance_inverse`: one per instance.
+    ContactFinder(const SceneDescription& scene, const Accel& accel, const std::vector<Mat4>& instance_inverse, float largest);
+
+    /// How far around a lens or lamp at `p` surfaces do not exist for its rays: 0 where none touches it.
+    float clearance(const Vec3& p) const;
+
+    /// Shapes that lie in the plane of an emitter and overlap it.
+    struct Covered {
+        std::vector<float> meshes, instances;  ///< By index: how far apart the two planes may be; 0 where no triangle does.
+        bool any = false;
+    };
+    /// `emits(mesh)` says whether a world mesh emits: those cover nothing. Raises the reach of every emitter in contact to that of
+    /// what it touches.
+    Covered cover(std::vector<Emitter>* emitters, const std::function<bool(uint32_t mesh)>& emits) const;
+
+  private:
+    const SceneDescription& scene_;
+    const Accel& accel_;
+    const std::vector<Mat4>& instance_inverse_;
+    float largest_;  ///< Largest coordinate magnitude of the scene.
+};
+
+}  // namespace lightloom
