@@ -29,7 +29,7 @@ struct WalkRay {
     double pdf = 0;  ///< Density of the direction, solid angle; for an infinite light: area on its disc.
     bool from_infinite = false;
     bool previous_hittable = true;  ///< False leaving a light that cannot be hit: its reverse density is zero.
-    float survival = 1;             ///< See PathVertex.
+    float survival = 1;             ///< See SubPathVertex.
 };
 
 struct WalkCounters {
