@@ -40,8 +40,8 @@ std::string_view name_of(EmitterKind kind) {
 }
 
 /// x_i as the sub-path that traced it knows it.
-ReportedVertex surface_vertex(const PathVertex& v) {
-    return {.kind = name_of(v.bsdf.kind),
+ReportedVertex surface_vertex(const SubPathVertex& v, BsdfKind kind) {
+    return {.kind = name_of(kind),
             .position = v.p,
             .normal = v.ng,
             .emitter = v.emitter == kNone ? -1 : int64_t(v.emitter),
@@ -79,8 +79,8 @@ ReportedPath report_path(const Scene& scene, const SeenContribution& seen) {
             // A light sub-path of its own knows where it began; for all others the contribution does.
             const bool own = found.y && (s >= 2 || merged);
             const bool hit = s == 0 && k == found.t - 1;
-            if (hit) v = surface_vertex(found.z[k]);
-            if (own) v = surface_vertex(found.y[0]);
+            if (hit) v = surface_vertex(found.z[k], found.z[k].bsdf.kind);
+            if (own) v = surface_vertex(found.y[0], found.y.bsdf_kind(0));
             if (!own) v.position = found.position, v.normal = found.normal, v.emitter = int64_t(found.emitter);
             if (!own && !hit) {
                 v.survival = s == 0 ? found.survival : 1;
@@ -89,7 +89,7 @@ ReportedPath report_path(const Scene& scene, const SeenContribution& seen) {
             emitter = &scene.emitters()[uint32_t(v.emitter)];
             v.kind = name_of(emitter->kind);
         } else {
-            v = surface_vertex(i < s ? found.y[i] : found.z[k - i]);
+            v = i < s ? surface_vertex(found.y[i], found.y.bsdf_kind(i)) : surface_vertex(found.z[k - i], found.z[k - i].bsdf.kind);
         }
         if (i < k) {
             // An algorithm that needs no more fills in the view of the vertices beside the connection only. Further out the

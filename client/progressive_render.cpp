@@ -68,8 +68,7 @@ ProgressiveRender::ProgressiveRender(std::unique_ptr<const Renderer> renderer, c
       plan_(plan),
       exposure_scale_(exposure_scale),
       preparation_seconds_(preparation_seconds),
-      total_(frame),
-      last_(frame) {}
+      sums_(frame) {}
 
 Status ProgressiveRender::advance(uint64_t iteration_limit, std::stop_token stop) {
     if (cut_short_ || iterations() >= iteration_limit)
@@ -79,8 +78,7 @@ Status ProgressiveRender::advance(uint64_t iteration_limit, std::stop_token stop
     const bool cut = group.iteration_count > left;
     if (cut) group.iteration_count = uint32_t(left);
 
-    GroupSum sum(frame_);
-    UnitCounters counters = counters_;
+    sums_.drop_current();  // of a call that was stopped
     double seconds = 0, cpu_seconds = 0;
     for (const WorkUnit& unit : plan_.units(group)) {
         const auto begin = Clock::now();
@@ -89,23 +87,22 @@ Status ProgressiveRender::advance(uint64_t iteration_limit, std::stop_token stop
         cpu_seconds += process_seconds() - cpu_begin;
         seconds += seconds_since(begin);
         if (!partial.ok()) return partial.status();
-        LL_RETURN_IF_ERROR(sum.add(*partial));
-        counters += partial->counters;
+        LL_RETURN_IF_ERROR(sums_.add(*partial));
     }
-    LL_RETURN_IF_ERROR(total_.fold(sum, group.iteration_count));
-    last_ = std::move(sum);
+    Result<GroupSum> folded = sums_.fold(group.iteration_count);
+    if (!folded.ok()) return folded.status();
+    last_ = *std::move(folded);
     last_iterations_ = group.iteration_count;
     cut_short_ = cut;
-    counters_ = counters;
     seconds_ += seconds;
     cpu_seconds_ += cpu_seconds;
     return {};
 }
 
 Result<RgbImage> ProgressiveRender::last_group_image() const {
-    if (last_iterations_ == 0) return failed_precondition("no group has been rendered yet");
+    if (!last_) return failed_precondition("no group has been rendered yet");
     Accumulation alone(frame_);
-    LL_RETURN_IF_ERROR(alone.fold(last_, last_iterations_));
+    LL_RETURN_IF_ERROR(alone.fold(*last_, last_iterations_));
     return alone.develop(exposure_scale_);
 }
 

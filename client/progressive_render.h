@@ -7,11 +7,12 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
 
-#include "common/film/accumulation.h"
+#include "common/film/grouped_sum.h"
 #include "common/transport/renderer.h"
 #include "common/work/job.h"
 
@@ -49,16 +50,16 @@ class ProgressiveRender {
     /// group follows one that was cut. kCancelled after a stop request; then the rendering is as it was.
     Status advance(uint64_t iteration_limit = std::numeric_limits<uint64_t>::max(), std::stop_token stop = {});
 
-    RgbImage image() const { return total_.develop(exposure_scale_); }
-    RgbImage variance() const { return total_.variance(exposure_scale_); }
+    RgbImage image() const { return sums_.complete().develop(exposure_scale_); }
+    RgbImage variance() const { return sums_.complete().variance(exposure_scale_); }
     /// The last group alone: with the other groups, independent images of the same mean.
     Result<RgbImage> last_group_image() const;
     uint32_t last_group_iterations() const { return last_iterations_; }
 
-    uint64_t iterations() const { return total_.iterations(); }
-    uint32_t groups() const { return total_.group_count(); }
-    uint64_t dropped() const { return total_.dropped(); }
-    const UnitCounters& counters() const { return counters_; }
+    uint64_t iterations() const { return sums_.complete().iterations(); }
+    uint32_t groups() const { return sums_.complete().group_count(); }
+    uint64_t dropped() const { return sums_.complete().dropped(); }
+    const UnitCounters& counters() const { return sums_.counters(); }
     double seconds() const { return seconds_; }          ///< Wall-clock time of the units.
     double cpu_seconds() const { return cpu_seconds_; }  ///< The same in processor time of all threads of this process.
     double preparation_seconds() const { return preparation_seconds_; }
@@ -69,11 +70,10 @@ class ProgressiveRender {
     Plan plan_;
     float exposure_scale_;
     double preparation_seconds_, seconds_ = 0, cpu_seconds_ = 0;
-    Accumulation total_;
-    GroupSum last_;
+    GroupedSum sums_;
+    std::optional<GroupSum> last_;
     uint32_t last_iterations_ = 0;
     bool cut_short_ = false;
-    UnitCounters counters_;
 };
 
 }  // namespace lightloom::client

@@ -12,6 +12,7 @@
 #include "client/run_job.h"
 #include "common/cli/numbers.h"
 #include "common/core/fork_join.h"
+#include "common/film/grouped_sum.h"
 #include "common/work/identity.h"
 
 namespace lightloom::client {
@@ -63,11 +64,10 @@ class ShownProgress {
 
 /// Both the image and its pyramid.
 Status watch_units(const BuiltJob& job, const Renderer& renderer, uint32_t threads, bool quiet, Pyramid* pyramid,
-                   Accumulation* image) {
+                   GroupedSum* image) {
     const FrameLayout& frame = job.spec.frame;
     const std::vector<PlannedUnit> units = plan_units(Plan(frame, job.spec.algorithm), job.spec.samples_per_pixel);
     const ShownProgress progress(quiet, job.spec.samples_per_pixel);
-    GroupSum group(frame);
     // Units are added in their order, whoever is done first, so that the files do not depend on the number of threads.
     for (size_t begin = 0; begin < units.size(); begin += threads) {
         const size_t end = std::min(units.size(), begin + threads);
@@ -85,18 +85,15 @@ Status watch_units(const BuiltJob& job, const Renderer& renderer, uint32_t threa
             const PlannedUnit& unit = units[i];
             const Watched& result = watched[i - begin];
             if (!result.partial->ok()) return result.partial->status();
-            if (unit.first) {
-                group = GroupSum(frame);
-                pyramid->begin_group(unit.group_iterations, unit.group_light_paths);
-            }
-            LL_RETURN_IF_ERROR(group.add(**result.partial));
+            if (unit.first) pyramid->begin_group(unit.group_iterations, unit.group_light_paths);
+            LL_RETURN_IF_ERROR(image->add(**result.partial));
             LL_RETURN_IF_ERROR(pyramid->add(result.pictures));
             if (!unit.last) continue;
             pyramid->end_group();
-            LL_RETURN_IF_ERROR(image->fold(group, unit.group_iterations));
-            progress.show(image->iterations());
+            LL_RETURN_IF_ERROR(image->fold(unit.group_iterations).status());
+            progress.show(image->complete().iterations());
             const auto dark = [&] {
-                const RgbImage so_far = image->develop();
+                const RgbImage so_far = image->complete().develop();
                 return std::all_of(so_far.pixels.begin(), so_far.pixels.end(), [](float v) { return v == 0; });
             };
             if (pyramid->contributions() == 0 && !dark())
@@ -139,8 +136,9 @@ int render_pyramid(JobOptions options, const PyramidOptions& pyramid_options, ui
 
     const FrameLayout& frame = job->spec.frame;
     Pyramid pyramid(frame, pyramid_options.depth);
-    Accumulation image(frame);
-    if (Status s = watch_units(*job, **renderer, threads, options.quiet, &pyramid, &image); !s.ok()) return report_error(s);
+    GroupedSum sums(frame);
+    if (Status s = watch_units(*job, **renderer, threads, options.quiet, &pyramid, &sums); !s.ok()) return report_error(s);
+    const Accumulation& image = sums.complete();
     PyramidPage page{.scene = std::filesystem::path(options.scene).filename().string(),
                      .algorithm = job->spec.algorithm.name(),
                      .build = kBuildId,

@@ -20,7 +20,7 @@ Result<std::vector<Reducer::Refusal>> Reducer::add(const WorkUnit& unit, Partial
 
 Result<std::vector<Reducer::Refusal>> Reducer::add_locked(const WorkUnit& unit, Partial partial) {
     if (frozen_) return Status(StatusCode::kCancelled, "the image is being finished");
-    if (!sums_) sums_ = std::make_unique<Sums>(Sums{Accumulation(frame_), GroupSum(frame_)});
+    if (!sums_) sums_ = std::make_unique<GroupedSum>(frame_);
     std::vector<Refusal> refused;
     if (unit.key.group < group_count()) {
         refused.push_back({unit.key, internal_error("the unit was merged twice")});
@@ -51,19 +51,13 @@ Result<std::vector<Reducer::Refusal>> Reducer::add_locked(const WorkUnit& unit, 
 }
 
 Status Reducer::add_to_current(const WorkUnit& unit, const Partial& partial, std::vector<Refusal>& refused) {
-    if (const Status added = sums_->current.add(partial); !added.ok()) {
+    if (const Status added = sums_->add(partial); !added.ok()) {
         refused.push_back({unit.key, added});
         return {};
     }
-    current_counters_ += partial.counters;
     for (const DroppedSample& sample : partial.dropped)
         if (dropped_.size() < kMaxDropped) dropped_.push_back({unit.key, sample});
-    if (++current_units_ < tile_count_) return {};
-    LL_RETURN_IF_ERROR(sums_->all.fold(sums_->current, unit.render.iteration_count));
-    counters_ += std::exchange(current_counters_, {});
-    sums_->current = GroupSum(frame_);
-    current_units_ = 0;
-    return {};
+    return sums_->current_units() < tile_count_ ? Status() : sums_->fold(unit.render.iteration_count).status();
 }
 
 void Reducer::freeze() {
@@ -79,17 +73,17 @@ uint32_t Reducer::folded_groups() const {
 
 uint64_t Reducer::iterations() const {
     const std::lock_guard lock(mutex_);
-    return sums_ ? sums_->all.iterations() : 0;
+    return sums_ ? sums_->complete().iterations() : 0;
 }
 
 UnitCounters Reducer::counters() const {
     const std::lock_guard lock(mutex_);
-    return counters_;
+    return sums_ ? sums_->counters() : UnitCounters();
 }
 
 uint64_t Reducer::dropped() const {
     const std::lock_guard lock(mutex_);
-    return sums_ ? sums_->all.dropped() : 0;
+    return sums_ ? sums_->complete().dropped() : 0;
 }
 
 std::vector<Reducer::Dropped> Reducer::first_dropped() const {
@@ -102,12 +96,12 @@ std::vector<Reducer::Dropped> Reducer::first_dropped() const {
 Result<RgbImage> Reducer::image(float scale) const {
     const std::lock_guard lock(mutex_);
     if (group_count() == 0) return failed_precondition("no group of iterations is complete yet; ask again later");
-    return sums_->all.develop(scale);
+    return sums_->complete().develop(scale);
 }
 
 Result<RgbImage> Reducer::variance(float scale) const {
     const std::lock_guard lock(mutex_);
-    return sums_ ? sums_->all.variance(scale) : RgbImage();
+    return sums_ ? sums_->complete().variance(scale) : RgbImage();
 }
 
 }  // namespace lightloom

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/film/accumulation.h"
+#include "common/film/grouped_sum.h"
 #include "common/work/job.h"
 
 namespace lightloom {
@@ -49,21 +49,15 @@ class Reducer {
     Result<RgbImage> variance(float scale) const;
 
   private:
-    struct Sums {
-        Accumulation all;
-        GroupSum current;
-    };
     Result<std::vector<Refusal>> add_locked(const WorkUnit& unit, Partial partial);
     Status add_to_current(const WorkUnit& unit, const Partial& partial, std::vector<Refusal>& refused);
-    uint32_t group_count() const { return sums_ ? sums_->all.group_count() : 0; }
+    uint32_t group_count() const { return sums_ ? sums_->complete().group_count() : 0; }
 
     const FrameLayout frame_;
     const uint32_t tile_count_;
     mutable std::mutex mutex_;
-    std::unique_ptr<Sums> sums_;
-    uint32_t current_units_ = 0;
-    UnitCounters counters_, current_counters_;  ///< Of all complete groups; of the one that is being summed.
-    std::vector<Dropped> dropped_;              ///< Of both; those of the latter are the last ones.
+    std::unique_ptr<GroupedSum> sums_;
+    std::vector<Dropped> dropped_;  ///< Also of the group that is being summed: those are the last ones.
     bool frozen_ = false;
     /// Partials of later groups wait as they are: a group's sums take four times their room.
     std::map<uint32_t, std::vector<std::pair<WorkUnit, Partial>>> waiting_;

@@ -3,16 +3,17 @@
 // tested here, the weight is not computed here. All functions return a black contribution when the technique fails.
 //
 // Camera sub-path z[0..t-1] (z_0 on the lens), light sub-path y[0..s-1]; the full path has k = s + t - 1 edges,
-// x_i = y_i for i < s and x_{k-j} = z_j for j < t.
+// x_i = y_i for i < s and x_{k-j} = z_j for j < t. The light vertices are PathVertex'es, or LightVertex'es of a cache.
 
+#include "common/path/light_vertex.h"
 #include "common/path/path_view.h"
 #include "common/path/random_walk.h"
-#include "common/path/vertex.h"
 
 namespace lightloom {
 
 /// Copies what a light prefix of s vertices knows of itself: all of fwd, and rev up to x_{s-3}.
-inline void view_light_prefix(const PathVertex* y, int s, PathView* view) {
+template <class Vertex>
+void view_light_prefix(const Vertex* y, int s, PathView* view) {
     for (int i = 0; i < s; ++i) {
         view->fwd[i] = y[i].fwd;
         view->rev[i] = y[i].rev;
@@ -142,9 +143,10 @@ Rgb next_event(const Scene& scene, const PathVertex* z, int t, const NextEventSa
 }
 
 /// 2 <= s, 2 <= t: connects y_{s-1} and z_{t-1}.
-template <ViewDetail detail = ViewDetail::kFull>
-Rgb connect(const Scene& scene, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view, WalkCounters* counters) {
-    const PathVertex &a = y[s - 1], &b = z[t - 1];
+template <ViewDetail detail = ViewDetail::kFull, class Vertex>
+Rgb connect(const Scene& scene, const Vertex* y, int s, const PathVertex* z, int t, PathView* view, WalkCounters* counters) {
+    const Vertex& a = y[s - 1];
+    const PathVertex& b = z[t - 1];
     const Vec3 d = a.p - b.p;
     const float d2 = length_squared(d);
     if (!(d2 > 0)) return {};

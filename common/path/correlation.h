@@ -5,16 +5,16 @@
 
 #include <algorithm>
 
+#include "common/path/light_vertex.h"
 #include "common/path/path_view.h"
-#include "common/path/vertex.h"
 #include "common/scene/emitter.h"
 
 namespace lightloom {
 
 /// What correlation_factor() reads of a path that starts on `e` and was made from light prefix y[0 .. s-1] and camera suffix
 /// z[0 .. t-1].
-inline void view_footprint(const Emitter& e, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view) {
-    view->primary_distance2 = double(length_squared((t >= 2 ? z[1] : y[s - 1]).p - z[0].p));
+inline void view_footprint(const Emitter& e, const LightSubPath& y, int s, const PathVertex* z, int t, PathView* view) {
+    view->primary_distance2 = double(length_squared((t >= 2 ? z[1].p : y[s - 1].p) - z[0].p));
     view->source = e.is_delta()      ? PathView::Source::kDiscrete
                    : e.is_infinite() ? PathView::Source::kDirection
                                      : PathView::Source::kArea;

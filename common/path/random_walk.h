@@ -30,7 +30,7 @@ struct WalkRay {
     bool from_infinite = false;
     float clearance = 0;            ///< At the origin; see Scene::intersect().
     bool previous_hittable = true;  ///< False leaving a light that cannot be hit: its reverse density is zero.
-    float survival = 1;             ///< See PathVertex.
+    float survival = 1;             ///< See SubPathVertex.
     /// Product of the squared index ratios that refraction has divided a camera sub-path's radiance by: alpha * index_ratio2 is
     /// what is left of the light's power, which lossless glass keeps.
     float index_ratio2 = 1;

@@ -137,10 +137,15 @@ inline bool Bsdf::has_delta_lobe() const {
     return false;
 }
 
+/// Bsdf::eval() of the Lambertian kind, which reads of both directions only where they stand against the normal.
+inline BsdfEval eval_diffuse(const Rgb& reflectance, float wo_z, float wi_z) {
+    if (!(wo_z * wi_z > 0)) return {};
+    return {reflectance * kInvPi, std::fabs(wi_z) * kInvPi, std::fabs(wo_z) * kInvPi};
+}
+
 inline BsdfEval Bsdf::eval(const Vec3& wo, const Vec3& wi, TransportMode mode) const {
     if (kind != BsdfKind::kDiffuse) return eval_other(wo, wi, mode);
-    if (!(wo.z * wi.z > 0)) return {};
-    return {reflectance * kInvPi, std::fabs(wi.z) * kInvPi, std::fabs(wo.z) * kInvPi};
+    return eval_diffuse(reflectance, wo.z, wi.z);
 }
 
 inline bool Bsdf::sample(const Vec3& wo, float lobe, Vec2 u, TransportMode mode, BsdfSample* out) const {

@@ -14,7 +14,7 @@
 //       Index index(const LightCache&, uint64_t paths) const;                              // paths: of one window
 //       void label_light_path(const Scene&, PathVertex* y, int n) const;
 //       void label_camera_vertex(const Scene&, PathVertex* v) const;
-//       void complete(const Scene&, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView*) const;
+//       void complete(const Scene&, const LightSubPath& y, int s, PathVertex* z, int t, const Vec3& towards, PathView*) const;
 //       int draw(const LightCache&, const Index&, const PathVertex& v, Stratified&& u, Rng&, int longest_prefix,
 //                LightPick*) const;                    // u(): a point of the vertex that is stratified where that helps
 //       float inverse_density(const LightPick&) const; // see PathContribution
@@ -89,7 +89,7 @@ struct CachedAlgorithm {
         const auto visit = [&](int t) {
             PathVertex& v = z[t - 1];
             contribute_hit<kDetail>(scene, z, t, &view, [&](const PathContribution& c, PathView&) {
-                if (view.k >= 2) method.complete(scene, nullptr, 0, z, t, {}, &view);
+                if (view.k >= 2) method.complete(scene, {}, 0, z, t, {}, &view);
                 contribute(c, view);
             });
             if (t > context.max_edges || !v.bsdf.has_smooth_lobe()) return;
@@ -110,12 +110,13 @@ struct CachedAlgorithm {
             const int count = method.draw(
                 state.cache, state.index, v, [&] { return sampler.connection(t); }, sampler.rng(), context.max_edges + 1 - t,
                 picks);
+            for (int n = 0; n < count; ++n) picks[n].y[picks[n].s - 1].prefetch_surface();
             for (int n = 0; n < count; ++n) {
                 const LightPick& pick = picks[n];
                 const int s = pick.s;
                 const Rgb c = connect_candidate<kDetail>(scene, pick.y, s, z, t, &view, &context.counters);
                 if (c.is_black()) continue;
-                const PathVertex &start = pick.y[0], &end = pick.y[s - 1];
+                const LightVertex &start = pick.y[0], &end = pick.y[s - 1];
                 const bool direction = s == 1 && scene.emitters()[uint32_t(end.emitter)].is_infinite();
                 method.complete(scene, pick.y, s, z, t, direction ? -end.ng : normalize(end.p - v.p), &view);
                 const float scale = method.inverse_density(pick);
@@ -137,7 +138,7 @@ struct CachedAlgorithm {
         const auto escape = [&](int t, const WalkRay& ray) {
             if (t > context.max_edges) return;
             contribute_escape<kDetail>(scene, z, t, ray, &view, [&](const PathContribution& c, PathView&) {
-                if (view.k >= 2) method.complete(scene, nullptr, 0, z, t, ray.direction, &view);
+                if (view.k >= 2) method.complete(scene, {}, 0, z, t, ray.direction, &view);
                 contribute(c, view);
             });
         };

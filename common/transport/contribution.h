@@ -16,7 +16,8 @@ struct PathContribution {
     float inverse_density = 1;  ///< The same density but for roulette, as C(s) A(s) over it; splats: of one light path.
     Technique technique;
     int t = 0;
-    const PathVertex *y = nullptr, *z = nullptr;
+    LightSubPath y;
+    const PathVertex* z = nullptr;
     Vec3 position, normal;  ///< Of x_0; for an infinite light a point outside of the scene and the direction of travel.
     uint32_t emitter = 0;
     Vec2 film;           ///< Connections to the lens only.
@@ -86,8 +87,9 @@ void contribute_next_event(const Scene& scene, const PathVertex* z, int t, Camer
 }
 
 /// A light sub-path y[0 .. s-1], s >= 2, that met the camera sub-path z[0 .. t-1] by `technique`.
-inline PathContribution from_light_path(const Rgb& value, Technique technique, const PathVertex* y, const PathVertex* z, int t,
-                                        Vec2 film = {}) {
+template <class Vertex>
+PathContribution from_light_path(const Rgb& value, Technique technique, const Vertex* y, const PathVertex* z, int t,
+                                 Vec2 film = {}) {
     return {.value = value,
             .technique = technique,
             .t = t,

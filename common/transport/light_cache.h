@@ -7,12 +7,10 @@
 // window, are candidates only. The bytes do not depend on the number of threads: chunks are fixed and joined in order.
 
 #include <memory>
-#include <mutex>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
-#include "common/core/huge_pages.h"
+#include "common/core/page_store.h"
 #include "common/path/camera_walk.h"
 #include "common/path/throughput.h"
 #include "common/transport/unit_loop.h"
@@ -32,6 +30,9 @@ struct LightPrefix {
 /// The sub-paths of a unit. Where a vertex lies depends on the threads that traced it; everything else is in the order of the
 /// paths, and nothing that is computed may depend on anything but that order.
 class LightCache {
+    using Vertices = PageStore<LightVertex, kMaxEdges + 2>;
+    using Surfaces = PageStore<LightSurface, 1>;
+
   public:
     struct Path {
         uint32_t first_vertex = 0, length = 0;
@@ -41,73 +42,42 @@ class LightCache {
 
     uint64_t path_count() const { return paths.size(); }
     /// y_0 of the path or prefix with this `first_vertex`; the others follow it.
-    const PathVertex* at(uint32_t first_vertex) const { return page(first_vertex >> kPageBits) + (first_vertex & kInPage); }
+    const LightVertex* at(uint32_t first_vertex) const { return vertices_.at(first_vertex); }
     template <class Visit>
     void for_each_prefix(Visit&& visit) const {
         for (const auto& chunk : prefixes)
             for (const LightPrefix& p : chunk) visit(p);
     }
 
-    /// Where one thread puts its paths, one after the other. Several may write at a time; what is left of a page is given back.
+    /// Where one thread puts its paths, one after the other. Several may write at a time.
     class Writer {
       public:
-        explicit Writer(LightCache& cache) : cache_(cache) {}
-        ~Writer() { cache_.give_back(next_); }
-        Writer(const Writer&) = delete;
-        Writer& operator=(const Writer&) = delete;
+        explicit Writer(LightCache& cache) : vertices_(cache.vertices_), surfaces_(cache.surfaces_) {}
         Path append(const PathVertex* y, int n) {
-            if (next_.end - next_.begin < uint32_t(n)) next_ = cache_.take();
-            std::uninitialized_copy(y, y + n, next_.data);
-            next_.data += n;
-            return {std::exchange(next_.begin, next_.begin + uint32_t(n)), uint32_t(n)};
+            const auto run = vertices_.append(uint32_t(n));
+            for (int i = 0; i < n; ++i) {
+                const LightSurface* surface = nullptr;
+                if (LightVertex::needs_surface(y[i])) surface = std::construct_at(surfaces_.append(1).data, y[i]);
+                std::construct_at(run.data + i, y[i], surface);
+            }
+            return {run.first, uint32_t(n)};
         }
 
       private:
-        friend class LightCache;
-        struct Place {
-            PathVertex* data = nullptr;
-            uint32_t begin = 0, end = 0;
-        };
-        LightCache& cache_;
-        Place next_;
+        Vertices::Writer vertices_;
+        Surfaces::Writer surfaces_;
     };
 
   private:
-    static constexpr uint32_t kPageBits = 13, kInPage = (1u << kPageBits) - 1;
-    static constexpr uint32_t kCapacity = HugePage::kBytes / sizeof(PathVertex);
-    static_assert(kCapacity <= kInPage + 1 && kCapacity > kMaxEdges + 2 && std::is_trivially_copyable_v<PathVertex>);
-
-    PathVertex* page(size_t i) const { return reinterpret_cast<PathVertex*>(pages_[i].data()); }
-    /// A place with room for any path.
-    Writer::Place take() {
-        const std::lock_guard lock(*mutex_);
-        if (!open_.empty()) {
-            const Writer::Place place = open_.back();
-            open_.pop_back();
-            return place;
-        }
-        if (pages_.size() >> (32 - kPageBits)) throw std::bad_alloc();  // a terabyte: the numbers end
-        const uint32_t begin = uint32_t(pages_.size()) << kPageBits;
-        pages_.emplace_back();
-        open_.reserve(pages_.capacity());  // giving back happens in destructors and must not fail
-        return {page(pages_.size() - 1), begin, begin + kCapacity};
-    }
-    void give_back(const Writer::Place& place) noexcept {
-        if (place.end - place.begin < kMaxEdges + 2) return;
-        const std::lock_guard lock(*mutex_);
-        open_.push_back(place);
-    }
-
-    std::vector<HugePage> pages_;
-    std::vector<Writer::Place> open_;
-    std::unique_ptr<std::mutex> mutex_ = std::make_unique<std::mutex>();  ///< Guards the two while paths are traced.
+    Vertices vertices_;
+    Surfaces surfaces_;
 };
 
 inline constexpr int kMaxConnections = 64;
 
 /// A draw from the cache, made before the connections of a vertex so that their memory is on its way.
 struct LightPick {
-    const PathVertex* y = nullptr;
+    const LightVertex* y = nullptr;
     int s = 0;
     float scale = 0;  ///< Of the contribution: one over what was really drawn.
 };
@@ -172,8 +142,8 @@ LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPr
 /// Connects z_{t-1} to the end of a prefix: s = 1 to the point x_0 itself, s >= 2 to y_{s-1}. Unweighted contribution f / p with
 /// the prefix's density as traced, p(y); black when it fails. The view is the path's, whose point x_0 next event might have chosen
 /// too.
-template <ViewDetail detail>
-Rgb connect_candidate(const Scene& scene, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view,
+template <ViewDetail detail, class Vertex>
+Rgb connect_candidate(const Scene& scene, const Vertex* y, int s, const PathVertex* z, int t, PathView* view,
                       WalkCounters* counters) {
     if (s >= 2) return connect<detail>(scene, y, s, z, t, view, counters);
     NextEventSample light;

@@ -48,7 +48,7 @@ struct UniformConnections {
     uint64_t windows() const { return 1; }
     void label_light_path(const Scene&, PathVertex*, int) const {}
     void label_camera_vertex(const Scene&, PathVertex*) const {}
-    void complete(const Scene&, const PathVertex*, int, PathVertex*, int, const Vec3&, PathView*) const {}
+    void complete(const Scene&, const LightSubPath&, int, PathVertex*, int, const Vec3&, PathView*) const {}
     float inverse_density(const LightPick& pick) const { return pick.scale; }
 
     Index index(const LightCache& cache, uint64_t paths) const {
@@ -66,7 +66,7 @@ struct UniformConnections {
         for (int n = 0; n < connections && count > 0; ++n) {
             const LightCandidate& prefix = index.candidates[rng.below(count)];
             if (int(prefix.s) > longest_prefix) continue;
-            const PathVertex* y = cache.at(prefix.first_vertex);
+            const LightVertex* y = cache.at(prefix.first_vertex);
             prefetch(&y[prefix.s - 1]);
             picks[found++] = {y, int(prefix.s), index.inverse_density};
         }

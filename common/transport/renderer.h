@@ -45,7 +45,7 @@ class PathWeights {
     /// Labels and whatever else the algorithm adds to sub-paths and to the view of a complete path; see cached.h.
     virtual void label_light_path(const Scene& scene, PathVertex* y, int n) const = 0;
     virtual void label_camera_vertex(const Scene& scene, PathVertex* v) const = 0;
-    virtual void complete(const Scene& scene, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards,
+    virtual void complete(const Scene& scene, const LightSubPath& y, int s, PathVertex* z, int t, const Vec3& towards,
                           PathView* view) const = 0;
     /// sigma and weight of a technique that can make the path; sigma 0: the algorithm has no such technique.
     virtual double sigma(const PathView& view, Technique t) const = 0;

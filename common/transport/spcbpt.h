@@ -136,7 +136,8 @@ struct SubspaceConnections {
     SubspaceLabeller labeller(const Scene& scene) const { return {prepared->tables, scene.emitters()}; }
     void label_light_path(const Scene& scene, PathVertex* y, int n) const { labeller(scene).label_light_path(y, n); }
     void label_camera_vertex(const Scene& scene, PathVertex* v) const { labeller(scene).label_camera_vertex(v); }
-    void complete(const Scene& scene, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
+    void complete(const Scene& scene, const LightSubPath& y, int s, PathVertex* z, int t, const Vec3& towards,
+                  PathView* view) const {
         labeller(scene).complete(y, s, z, t, towards, view);
     }
     float inverse_density(const LightPick& pick) const { return pick.scale / scalar_of(pick.y[pick.s - 1].alpha); }
@@ -217,7 +218,7 @@ struct SubspaceConnections {
             const bool own = d.second * double(d.count) - double(d.part) < double(part.keep);
             const LightCandidate& prefix = (own ? part : d.candidates[part.alias]).prefix;
             if (int(prefix.s) > longest_prefix) continue;
-            const PathVertex* y = cache.at(prefix.first_vertex);
+            const LightVertex* y = cache.at(prefix.first_vertex);
             prefetch(&y[prefix.s - 1]);
             picks[count++] = {y, int(prefix.s), d.scale};
         }

@@ -13,13 +13,13 @@ struct SubspaceLabeller {
     const EmitterSet& emitters;
 
     /// Labels the sub-path that ends at `v` as traced, and finds where the other kind's labels begin to depend on the direction.
-    static void label(const SubspaceTree& own, const SubspaceTree& other, PathVertex* v) {
+    static void label(const SubspaceTree& own, const SubspaceTree& other, SubPathVertex* v) {
         const auto settled = own.label_and_settle(sub_path_end(v->p, v->ng, v->wo), other);
         v->label = uint16_t(settled.label);
         v->reverse_branch = settled.other_branch;
     }
     /// The label of the other kind, of a sub-path that reaches `v` from `to_predecessor`.
-    static uint16_t reverse_label(const SubspaceTree& tree, const PathVertex& v, const Vec3& to_predecessor) {
+    static uint16_t reverse_label(const SubspaceTree& tree, const SubPathVertex& v, const Vec3& to_predecessor) {
         const bool same_side = (dot(v.ng, to_predecessor) < 0) == (dot(v.ng, v.wo) < 0);
         return uint16_t(tree.label(sub_path_end(v.p, v.ng, to_predecessor), same_side ? v.reverse_branch : 0));
     }
@@ -44,7 +44,7 @@ struct SubspaceLabeller {
     /// Labels, throughput and footprint of a path made with ViewDetail::kSubspace. `towards`: unit, from z_{t-1} to x_{s-1} (to the
     /// emitter of an escaped ray); not read for s = 0 on a surface, where z_{t-1} is x_0. Vertices of z get their reverse
     /// labels on demand.
-    void complete(const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
+    void complete(const LightSubPath& y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
         view_throughput(y, s, z, view);
         const int k = view->k;
         const bool hit = s == 0 && k == t - 1;

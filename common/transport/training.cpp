@@ -50,7 +50,7 @@ class Reservoir {
         vertices_.resize(size_t(k) + 1);
         vertices_[0] = {c.position, c.normal, 0, c.emitter};
         for (int i = 1; i < k; ++i) {
-            const PathVertex& v = i < c.technique.light_vertices() ? c.y[i] : c.z[k - i];
+            const SubPathVertex& v = i < c.technique.light_vertices() ? c.y[i] : c.z[k - i];
             vertices_[size_t(i)] = {v.p, v.ng, 0, 0};
         }
         vertices_[size_t(k)] = {c.z[0].p, {}, 0, 0};
@@ -115,13 +115,13 @@ class CameraReservoirs {
     Length lengths_[kTrainingLengths];
 };
 
-void keep_light_path(const PathVertex* y, int n, int max_edges, TrainingData* data) {
+void keep_light_path(const LightSubPath& y, int n, int max_edges, TrainingData* data) {
     if (n == 0) return;
     TrainingPath path;
     path.first_vertex = uint32_t(data->vertices.size());
     path.vertex_count = uint32_t(n);
     for (int i = 0; i < n; ++i) {
-        const bool candidate = (i == 0 || y[i].bsdf.has_smooth_lobe()) && i + 1 < max_edges;
+        const bool candidate = (i == 0 || y.has_smooth_lobe(i)) && i + 1 < max_edges;
         data->vertices.push_back({y[i].p, y[i].ng, candidate ? scalar_of(y[i].alpha) : 0, i == 0 ? uint32_t(y[0].emitter) : 0});
     }
     data->light_paths.push_back(path);

@@ -54,7 +54,8 @@ struct TimedConnections : SubspaceConnections<> {
     void label_camera_vertex(const Scene& scene, PathVertex* v) const {
         timed(kCameraLabels, [&] { Base::label_camera_vertex(scene, v); });
     }
-    void complete(const Scene& scene, const PathVertex* y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
+    void complete(const Scene& scene, const LightSubPath& y, int s, PathVertex* z, int t, const Vec3& towards,
+                  PathView* view) const {
         timed(kWeightLabels, [&] { Base::complete(scene, y, s, z, t, towards, view); });
     }
     Index index(const LightCache& cache, uint64_t paths) const {

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdio>
 
+#include "common/film/grouped_sum.h"
 #include "common/import/import.h"
 #include "common/transport/training.h"
 #include "tests/statistical/reference_equivalence.h"
@@ -22,7 +23,7 @@ Result<Rendering> render_groups(const Scene& scene, const RenderGroup& render, d
     constexpr uint32_t kIterations = 2, kLeastGroups = 16;
     const FrameLayout frame = scene.frame();
     const float exposure = scene.description().film.exposure_scale;
-    Accumulation total(frame);
+    GroupedSum total(frame);
     Rendering result;
     const auto start = std::chrono::steady_clock::now();
     for (uint32_t group = 0;; ++group) {
@@ -30,19 +31,19 @@ Result<Rendering> render_groups(const Scene& scene, const RenderGroup& render, d
             uint64_t(group) * kIterations, kIterations, group, frame.crop, 0, uint64_t(kIterations) * uint64_t(frame.crop.area())};
         auto partial = render(work);
         if (!partial.ok()) return partial.status();
-        GroupSum sum(frame);
+        LL_RETURN_IF_ERROR(total.add(*partial));
+        const Result<GroupSum> sum = total.fold(kIterations);
+        if (!sum.ok()) return sum.status();
         Accumulation alone(frame);
-        LL_RETURN_IF_ERROR(sum.add(*partial));
-        LL_RETURN_IF_ERROR(alone.fold(sum, kIterations));
-        LL_RETURN_IF_ERROR(total.fold(sum, kIterations));
+        LL_RETURN_IF_ERROR(alone.fold(*sum, kIterations));
         const PartMeans means = part_means(alone.develop(exposure));
         for (size_t part = 0; part < means.size(); ++part) result.parts[part].add(means[part], kIterations);
         result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         if (group + 1 >= kLeastGroups && (result.seconds >= seconds || settled(result))) break;
     }
-    result.iterations = total.iterations();
-    result.dropped = total.dropped();
-    result.picture = total.develop(exposure);
+    result.iterations = total.complete().iterations();
+    result.dropped = total.complete().dropped();
+    result.picture = total.complete().develop(exposure);
     return result;
 }
 

@@ -148,8 +148,10 @@ inline std::optional<std::vector<PathVertex>> rebuild_camera(const Scene& scene,
 }
 
 /// The merge of y_{s-1} with z_{t-1}: the unweighted contribution divided by the kernel 1 / (pi r^2), and the path's view.
-inline Rgb merge(const Scene& scene, const PathVertex* y, int s, const PathVertex* z, int t, PathView* view) {
-    const PathVertex &a = y[s - 1], &b = z[t - 1];
+template <class Vertex>
+Rgb merge(const Scene& scene, const Vertex* y, int s, const PathVertex* z, int t, PathView* view) {
+    const Vertex& a = y[s - 1];
+    const PathVertex& b = z[t - 1];
     const Vec3 wi = b.shading.to_local(a.wo);
     const BsdfEval e = b.bsdf.eval(b.wo_local, wi, TransportMode::kRadiance);
     // The light sub-path arrived with the geometric cosine; the camera's scattering has the shading one.

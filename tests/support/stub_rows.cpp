@@ -93,9 +93,9 @@ struct StubMerging {
         const float radius2 = float(state.radius * state.radius);
         const float scale = float(1 / (first.light_paths_per_iteration * kPiD * state.radius * state.radius));
         for (const LightCache::Path& path : state.photons.paths) {
-            const PathVertex* y = path.length > 0 ? state.photons.at(path.first_vertex) : nullptr;
+            const LightVertex* y = path.length > 0 ? state.photons.at(path.first_vertex) : nullptr;
             for (int s = 2; s <= int(path.length) && s + t - 2 <= context.max_edges; ++s) {
-                const PathVertex& photon = y[s - 1];
+                const LightVertex& photon = y[s - 1];
                 if (length_squared(photon.p - v.p) > radius2 || dot(photon.ng, v.ng) < 0.7f) continue;
                 const Rgb c = merge(context.scene, y, s, z, t, &view);
                 if (c.is_black()) continue;

@@ -49,13 +49,13 @@ TEST(Draws, AreScaledByTheirProbability) {
             struct Sums {
                 double sum = 0, square = 0;
             };
-            std::map<const PathVertex*, std::map<int, Sums>> found;
+            std::map<const LightVertex*, std::map<int, Sums>> found;
             for (int d = 0; d < kDraws; ++d) {
                 LightPick picks[kMaxConnections];
                 const int count = algorithm.method.draw(
                     state.cache, state.index, v, [&] { return rng.uniform2(); }, rng, 6, picks);
                 ASSERT_LE(count, connections);
-                std::map<std::pair<const PathVertex*, int>, double> once;  // draws of one vertex are not independent
+                std::map<std::pair<const LightVertex*, int>, double> once;  // draws of one vertex are not independent
                 for (int n = 0; n < count; ++n)
                     once[{picks[n].y, picks[n].s}] += double(algorithm.method.inverse_density(picks[n]));
                 for (const auto& [prefix, value] : once) {
@@ -66,7 +66,7 @@ TEST(Draws, AreScaledByTheirProbability) {
             size_t tested = 0;
             double worst = 0;
             for (const auto& [place, i] : subspace_of) {
-                const PathVertex* y = state.cache.at(place.first);
+                const LightVertex* y = state.cache.at(place.first);
                 const double paths = double(kPaths) * tables.window[i];
                 const double r = double(scalar_of(y[place.second - 1].alpha));
                 const double all = double(state.index.subspaces[i].scale) * paths * connections;     // R_i

@@ -18,6 +18,7 @@
 #include "common/film/accumulation.h"
 #include "common/film/exr_io.h"
 #include "common/film/exr_memory.h"
+#include "common/film/grouped_sum.h"
 #include "common/film/partial_exr.h"
 
 namespace lightloom {
@@ -193,6 +194,105 @@ TEST(Accumulation, FoldsOnlyCompleteGroups) {
     EXPECT_EQ(total.fold(group, 5).code(), StatusCode::kFailedPrecondition);
     EXPECT_TRUE(total.fold(group, 4).ok());
     EXPECT_EQ(total.dropped(), 80u);
+}
+
+/// Partials of a whole group of kFrame; `seed` tells groups apart.
+std::vector<Partial> group_of(uint64_t seed) {
+    std::vector<Partial> partials;
+    for (const Rect& tile : four_tiles(kFrame.crop))
+        partials.push_back(random_partial(kFrame, tile, 10 * seed + partials.size(), 50));
+    return partials;
+}
+
+/// Mutation: GroupedSum::add() that counts before it adds fails this.
+TEST(GroupedSum, ARefusedUnitLeavesTheSumsAsTheyWere) {
+    for (const double bad : {kNan, 1e26}) {
+        GroupedSum plain(kFrame), tried(kFrame);
+        for (const Partial& partial : group_of(1)) {
+            Partial broken = partial;
+            broken.camera.back() = bad;
+            EXPECT_EQ(tried.add(broken).code(), StatusCode::kDataLoss);
+            broken = partial;
+            broken.splats.back().rgb[0] = bad;
+            EXPECT_EQ(tried.add(broken).code(), StatusCode::kDataLoss);
+            EXPECT_EQ(tried.current_units(), plain.current_units());
+            ASSERT_TRUE(plain.add(partial).ok());
+            ASSERT_TRUE(tried.add(partial).ok());
+        }
+        ASSERT_TRUE(plain.fold(4).ok());
+        ASSERT_TRUE(tried.fold(4).ok());
+        EXPECT_EQ(tried.complete().develop().pixels, plain.complete().develop().pixels);
+        EXPECT_EQ(tried.complete().dropped(), plain.complete().dropped());
+        EXPECT_EQ(tried.counters().rays, plain.counters().rays);
+    }
+}
+
+TEST(GroupedSum, OnlyCompleteGroupsAreSeen) {
+    GroupedSum sums(kFrame);
+    EXPECT_EQ(sums.fold(4).status().code(), StatusCode::kFailedPrecondition) << "no unit yet";
+    Accumulation all(kFrame);
+    uint64_t rays = 0;
+    for (uint32_t g = 0; g < 3; ++g) {
+        GroupSum alone(kFrame);
+        for (const Partial& partial : group_of(g)) {
+            ASSERT_TRUE(sums.add(partial).ok());
+            ASSERT_TRUE(alone.add(partial).ok());
+            EXPECT_EQ(sums.complete().develop().pixels, all.develop().pixels) << "a unit of a group that is not complete";
+            EXPECT_EQ(sums.complete().dropped(), 80u * g);
+            EXPECT_EQ(sums.counters().rays, rays);
+        }
+        EXPECT_EQ(sums.current_units(), 4u);
+        for (const Partial& partial : group_of(g)) rays += partial.counters.rays;
+        const Result<GroupSum> folded = sums.fold(4);
+        ASSERT_TRUE(folded.ok());
+        ASSERT_TRUE(all.fold(alone, 4).ok());
+        EXPECT_EQ(sums.current_units(), 0u);
+        EXPECT_EQ(sums.counters().rays, rays);
+        EXPECT_EQ(sums.complete().group_count(), g + 1);
+        EXPECT_EQ(sums.complete().develop().pixels, all.develop().pixels);
+        // What is given back are this group's own sums.
+        Accumulation one(kFrame), other(kFrame);
+        ASSERT_TRUE(one.fold(*folded, 4).ok());
+        ASSERT_TRUE(other.fold(alone, 4).ok());
+        EXPECT_EQ(one.develop().pixels, other.develop().pixels);
+    }
+    EXPECT_EQ(sums.complete().variance().pixels, all.variance().pixels);
+}
+
+/// A group that lacks a unit, has one twice, or leaves the range only together with the others.
+TEST(GroupedSum, AGroupThatDoesNotFitIsNoPartOfTheImage) {
+    GroupedSum sums(kFrame);
+    const std::vector<Partial> units = group_of(1);
+    for (const Partial& partial : units) ASSERT_TRUE(sums.add(partial).ok());
+    ASSERT_TRUE(sums.fold(4).ok());
+    const RgbImage before = sums.complete().develop();
+    const uint64_t rays = sums.counters().rays;
+    const auto unchanged = [&] {
+        EXPECT_EQ(sums.complete().group_count(), 1u);
+        EXPECT_EQ(sums.complete().develop().pixels, before.pixels);
+        EXPECT_EQ(sums.counters().rays, rays);
+    };
+    ASSERT_TRUE(sums.add(units[0]).ok());
+    EXPECT_EQ(sums.fold(4).status().code(), StatusCode::kFailedPrecondition);
+    unchanged();
+    sums.drop_current();
+    EXPECT_EQ(sums.current_units(), 0u);
+    for (const Partial& partial : units) ASSERT_TRUE(sums.add(partial).ok());
+    ASSERT_TRUE(sums.add(units[0]).ok()) << "exactly-once is the caller's duty";
+    EXPECT_EQ(sums.fold(4).status().code(), StatusCode::kFailedPrecondition);
+    unchanged();
+
+    const FrameLayout frame{1, 1, {0, 0, 1, 1}};
+    GroupedSum bright(frame);
+    Partial p;
+    p.tile = frame.crop;
+    p.samples_per_pixel = 1;
+    p.camera = {9e24, 0, 0};
+    ASSERT_TRUE(bright.add(p).ok());
+    ASSERT_TRUE(bright.fold(1).ok());
+    ASSERT_TRUE(bright.add(p).ok());
+    EXPECT_EQ(bright.fold(1).status().code(), StatusCode::kDataLoss);
+    EXPECT_EQ(bright.complete().iterations(), 1u);
 }
 
 TEST(FixedSums, EqualPlain128BitSums) {

@@ -14,6 +14,7 @@
 #include "client/pyramid_render.h"
 #include "common/core/atomic_file.h"
 #include "common/film/exr_io.h"
+#include "common/film/grouped_sum.h"
 #include "common/transport/unit_renderer.h"
 #include "common/work/job.h"
 #include "tests/support/small_scenes.h"
@@ -142,31 +143,30 @@ TEST(Pyramid, MemoryIsBounded) {
 
 /// A pyramid of real light, its image, and the frame.
 struct Rendered {
-    Rendered() : scene(testing::cornell_builder(20).build()), pyramid(scene->frame(), 4), image(scene->frame()) {
+    Rendered() : scene(testing::cornell_builder(20).build()), pyramid(scene->frame(), 4), sums(scene->frame()) {
         const RenderSettings settings{.algorithm = *AlgorithmSettings::parse("bdpt", {}), .seed = 1, .max_depth = 6};
         const auto renderer = Renderer::create(scene, settings);
         const Plan plan(scene->frame(), settings.algorithm);
         for (const Group& group : plan.groups_for(5)) {
-            GroupSum sum(scene->frame());
             for (const WorkUnit& unit : plan.units(group)) {
                 pyramid.begin_group(group.iteration_count, unit.render.light_path_count);
                 UnitPictures pictures(scene->frame().crop, unit.render.tile, 4);
                 const auto partial = (*renderer)->watch(unit.render, [&](const SeenContribution& seen) { pictures.add(seen); }, {});
-                EXPECT_TRUE(sum.add(*partial).ok());
+                EXPECT_TRUE(sums.add(*partial).ok());
                 EXPECT_TRUE(pyramid.add(pictures).ok());
             }
-            EXPECT_TRUE(image.fold(sum, group.iteration_count).ok());
+            EXPECT_TRUE(sums.fold(group.iteration_count).ok());
             pyramid.end_group();
         }
     }
     std::shared_ptr<const Scene> scene;
     Pyramid pyramid;
-    Accumulation image;
+    GroupedSum sums;
 };
 
 TEST(Pyramid, WeightedPicturesSumToTheImage) {
     const Rendered rendered;
-    const RgbImage image = rendered.image.develop(1.5f);
+    const RgbImage image = rendered.sums.complete().develop(1.5f);
     std::vector<double> sum(image.pixels.size());
     int longer = 0;
     for (const PyramidKey& key : rendered.pyramid.keys()) {
@@ -189,7 +189,7 @@ TEST(PyramidFiles, ADirectoryOfItsOwnIsReplaced) {
     ASSERT_TRUE(open_pyramid_directory(place).ok());
     EXPECT_TRUE(fs::is_empty(place));
     const Rendered rendered;
-    const RgbImage image = rendered.image.develop();
+    const RgbImage image = rendered.sums.complete().develop();
     const PyramidPage page{.scene = "<room> & \"b\".pbrt", .algorithm = "bdpt", .samples_per_pixel = 5};
     ASSERT_TRUE(write_pyramid(place, rendered.pyramid, rendered.scene->frame(), image, 1, page).ok());
     const auto html = *read_file(place + "/index.html");
