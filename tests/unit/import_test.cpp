@@ -279,7 +279,7 @@ TEST(ImportOptions, LimitsAreThoseOfTheRenderer) {
         EXPECT_TRUE(scene.ok()) << scene.status().message();
     };
     accepted("Integrator \"path\" \"integer maxdepth\" 255");
-    accepted("Film \"rgb\" \"integer xresolution\" 10000 \"integer yresolution\" 7669");
+    accepted("Film \"rgb\" \"integer xresolution\" 16384 \"integer yresolution\" 16384");
     // A crop is what must fit.
     accepted("Film \"rgb\" \"integer xresolution\" 60000 \"integer yresolution\" 60000 \"float cropwindow\" [0 .1 0 .1]");
 }
@@ -357,8 +357,8 @@ TEST(ImportOptions, UnsupportedOnesAreNamed) {
     refused("Camera \"spherical\"", "perspective");
     refused("Camera \"perspective\" \"float fov\" 180", "fov");
     refused("Film \"gbuffer\"", "rgb");
-    refused("\nFilm \"rgb\" \"integer xresolution\" 10000 \"integer yresolution\" 7670", "scene.pbrt:2");
-    refused("Film \"rgb\" \"integer xresolution\" 10000 \"integer yresolution\" 7670", "76695843");
+    refused("\nFilm \"rgb\" \"integer xresolution\" 16384 \"integer yresolution\" 16385", "scene.pbrt:2");
+    refused("Film \"rgb\" \"integer xresolution\" 16384 \"integer yresolution\" 16385", "268451840 pixels, which take 69 GB");
     refused("\nIntegrator \"path\" \"integer maxdepth\" -1", "scene.pbrt:2");
     refused("Integrator \"path\" \"integer maxdepth\" -1", "negative");
     warned("Integrator \"path\" \"integer maxdepth\" 1000", "255");
