@@ -179,7 +179,8 @@ Status Coordinator::write_results(JobRecord& job) {
         manifest.rejected_results = job.rejected;
     }
     if (const auto text = assets_.read(spec.scene_root); text.ok()) {
-        if (const auto list = AssetManifest::parse(*text); list.ok()) manifest.scene_main = list->main;
+        if (const auto list = AssetManifest::parse(*text); list.ok())
+            manifest.scene_main = list->main, manifest.without = list->without;
     }
     std::error_code error;
     std::filesystem::create_directories(job.directory, error);
