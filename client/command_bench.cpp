@@ -215,6 +215,7 @@ void add_bench_command(CLI::App& app, int* exit_code) {
     CLI::App* command = app.add_subcommand("bench", "Measure how soon algorithms come near a reference image");
     command->footer(kFooter);
     command->add_option("SCENE", options->scene.scene, "pbrt-v4 scene file")->required();
+    add_scene_options(*command, options->scene.reading);
     command->add_option("--reference", options->reference, "EXR that the runs are compared with")->required();
     command
         ->add_option("--algorithms", options->algorithms,

@@ -24,7 +24,8 @@ namespace {
 
 struct Options {
     std::string scene, json, tables, draw;
-    bool strict = false, quiet = false;
+    SceneOptions reading;
+    bool strict = false, quiet = false, why = false;
 };
 
 const char* name_of(MaterialKind kind) {
@@ -54,7 +55,7 @@ std::map<std::string, size_t> count_kinds(const Items& items) {
 }
 
 nlohmann::json describe(const SceneDescription& d, const SceneSummary& s, const std::vector<std::string>& files,
-                        double import_seconds) {
+                        const std::vector<LeftOutFeature>& left_out, double import_seconds) {
     nlohmann::json out;
     out["triangles"] = s.triangle_count;
     out["triangles_instanced"] = s.instanced_triangle_count;
@@ -82,6 +83,8 @@ nlohmann::json describe(const SceneDescription& d, const SceneSummary& s, const 
     out["algorithm"] = default_algorithm(d.integrator).name;
     out["replaced"] = {{"film_filename", d.film.file_name}};
     out["ignored"] = d.warnings;
+    out["left_out"] = nlohmann::json::array();
+    for (const LeftOutFeature& f : left_out) out["left_out"].push_back({{"name", f.name}, {"count", f.count}, {"first", f.first}});
     return out;
 }
 
@@ -114,15 +117,42 @@ void print(const SceneDescription& d, const SceneSummary& s, const std::string& 
     for (const std::string& warning : d.warnings) std::printf("    %s\n", warning.c_str());
 }
 
+/// A scene's names may be anything, JSON's strings only UTF-8.
+Status write_json(const std::string& path, const nlohmann::json& json) {
+    return write_file_atomically(path, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+}
+
+/// Everything that stops the file; kSuccess if nothing does.
+int show_why(const Options& options, const ImportOptions& import_options) {
+    const std::vector<std::string> faults = import_faults(options.scene, import_options);
+    if (faults.empty()) {
+        if (!options.quiet) std::printf("nothing stops %s\n", options.scene.c_str());
+        return kSuccess;
+    }
+    for (const std::string& fault : faults) std::printf("%s\n", fault.c_str());
+    if (!options.json.empty()) {
+        const std::vector<std::filesystem::path> inputs{options.scene};
+        if (const Status s = check_output_files(inputs, std::vector{options.json}); !s.ok()) return report_error(s);
+        if (const Status s = write_json(options.json, {{"stops", faults}}); !s.ok()) return report_error(s);
+    }
+    std::fprintf(stderr, "lightloom: %zu thing%s stop%s %s\n", faults.size(), faults.size() == 1 ? "" : "s",
+                 faults.size() == 1 ? "s" : "", options.scene.c_str());
+    return kUsage;
+}
+
 int run(const Options& options) {
+    const ImportOptions import_options{.strict = options.strict, .root = options.reading.root, .without = options.reading.without};
+    if (options.why)
+        if (const int code = show_why(options, import_options); code != kSuccess) return code;
     const auto begin = std::chrono::steady_clock::now();
-    Result<ImportedScene> imported = import_pbrt(options.scene, {.strict = options.strict});
+    Result<ImportedScene> imported = import_pbrt(options.scene, import_options);
     if (!imported.ok()) {
         std::fprintf(stderr, "%s\n", imported.status().message().c_str());
         return kUsage;
     }
     std::vector<std::filesystem::path> inputs{options.tables};
-    for (const std::string& file : imported->files) inputs.push_back(std::filesystem::path(options.scene).parent_path() / file);
+    for (const std::string& file : imported->files) inputs.push_back(std::filesystem::path(imported->directory) / file);
+    if (!options.quiet) report_left_out(options.reading, *imported);
     std::vector<std::string> outputs{options.json};
     if (!options.draw.empty())
         for (const char* picture : kTablePictures) outputs.push_back(options.draw + picture);
@@ -146,11 +176,9 @@ int run(const Options& options) {
             if (const Status s = draw(*tables, **scene, options.draw); !s.ok()) return report_error(s);
     }
     if (!options.json.empty()) {
-        nlohmann::json out = describe(description, summary, imported->files, seconds);
+        nlohmann::json out = describe(description, summary, imported->files, imported->left_out, seconds);
         if (tables) out["tables"] = describe(*tables);
-        // A scene's names may be anything, JSON's strings only UTF-8.
-        const std::string text = out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
-        if (const Status s = write_file_atomically(options.json, text + "\n"); !s.ok()) return report_error(s);
+        if (const Status s = write_json(options.json, out); !s.ok()) return report_error(s);
     }
     return kSuccess;
 }
@@ -163,6 +191,9 @@ void add_inspect_command(CLI::App& app, int* exit_code) {
                                            "Show what a scene holds: geometry, lights with their power, materials, textures, "
                                            "memory, and everything in the file that is ignored");
     command->add_option("scene", options->scene, "The .pbrt file")->required();
+    command->add_flag("--why", options->why,
+                      "List everything that stops the file, not only the first fault, and exit with 2 if anything does");
+    add_scene_options(*command, options->reading);
     command->add_option("--json", options->json, "Write the same as JSON to this file");
     auto* tables = command->add_option("--tables", options->tables,
                                        "Also show the learned tables in this file: KEY.tables of a table cache, KEY being "

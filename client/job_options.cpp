@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <set>
 
 #include "client/commands.h"
 #include "client/default_algorithm.h"
 #include "common/cli/numbers.h"
+#include "common/import/features.h"
 #include "common/path/path_view.h"
 #include "common/scene/scene.h"
 
@@ -19,9 +21,38 @@ double seconds_since(Clock::time_point begin) { return std::chrono::duration<dou
 
 }  // namespace
 
+void add_scene_options(CLI::App& command, SceneOptions& options) {
+    command.add_option("--root", options.root,
+                       "Directory that holds the scene file and everything that it refers to (default: one up to three levels "
+                       "above the scene file's, or the current one if the scene file lies farther below it)");
+    command
+        .add_option("--without", options.without,
+                    "Leave out what is not supported: names of " + scene_feature_names() + ", with commas between them")
+        ->delimiter(',')
+        ->take_all()
+        ->allow_extra_args(false)
+        ->check([](const std::string& name) { return check_scene_features({name}).message(); });
+}
+
+void report_left_out(const SceneOptions& options, const ImportedScene& scene) {
+    if (options.without.empty()) return;
+    std::string text;
+    for (const std::string& name : std::set<std::string>(options.without.begin(), options.without.end())) {
+        const auto found =
+            std::find_if(scene.left_out.begin(), scene.left_out.end(), [&](const LeftOutFeature& f) { return f.name == name; });
+        text += (text.empty() ? "" : ", ") + name;
+        text += found == scene.left_out.end() ? " (the scene has none)"
+                                              : " (" + std::to_string(found->count) + ", first at " + found->first + ")";
+    }
+    std::fprintf(stderr, "lightloom: left out: %s\n", text.c_str());
+}
+
 void add_render_settings(CLI::App& command, JobOptions& options) {
-    command.add_option("SCENE", options.scene, "pbrt-v4 scene file; everything that it refers to lies beside or below it")
+    command
+        .add_option("SCENE", options.scene,
+                    "pbrt-v4 scene file; everything that it refers to lies beside or below it, or see --root")
         ->required();
+    add_scene_options(command, options.reading);
     command
         .add_option("-a,--algorithm", options.algorithm,
                     "Name from `lightloom algorithms` (default: what the scene's Integrator asks for)")
@@ -66,19 +97,24 @@ void add_output_settings(CLI::App& command, JobOptions& options) {
 Result<LocalScene> load_scene(const JobOptions& options) {
     LocalScene scene;
     auto begin = Clock::now();
-    auto imported = import_pbrt(options.scene, {.strict = options.strict});
+    auto imported =
+        import_pbrt(options.scene, {.strict = options.strict, .root = options.reading.root, .without = options.reading.without});
     if (!imported.ok()) return imported.status();
     scene.imported = *std::move(imported);
     scene.import_seconds = seconds_since(begin);
     if (!options.quiet) {
+        report_left_out(options.reading, scene.imported);
         for (const std::string& warning : scene.imported.description.warnings)
             std::fprintf(stderr, "lightloom: warning: %s\n", warning.c_str());
         if (options.algorithm.empty())
             std::fprintf(stderr, "lightloom: %s\n", default_algorithm(scene.imported.description.integrator).reason.c_str());
     }
     begin = Clock::now();
-    scene.directory = std::filesystem::path(options.scene).parent_path();
-    auto manifest = AssetManifest::of_files(scene.directory, scene.imported.files);
+    scene.directory = scene.imported.directory;
+    // Of what is to be left out, that which is there: a scene that has none of it is the same with the option as without.
+    std::vector<std::string> without;
+    for (const LeftOutFeature& feature : scene.imported.left_out) without.push_back(feature.name);
+    auto manifest = AssetManifest::of_files(scene.directory, scene.imported.files, without);
     if (!manifest.ok()) return manifest.status();
     scene.manifest = *std::move(manifest);
     scene.digest_seconds = seconds_since(begin);

@@ -11,8 +11,19 @@
 
 namespace lightloom::client {
 
+/// How a scene file is read, for every command that reads one.
+struct SceneOptions {
+    std::string root;                  ///< ImportOptions::root.
+    std::vector<std::string> without;  ///< ImportOptions::without.
+};
+/// --root and --without.
+void add_scene_options(CLI::App& command, SceneOptions& options);
+/// "lightloom: left out: ..." on standard error, if something was to be.
+void report_left_out(const SceneOptions& options, const ImportedScene& scene);
+
 struct JobOptions {
     std::string scene;
+    SceneOptions reading;
     std::string output;              ///< Empty: the scene's name with .exr, in the current directory.
     std::string png;                 ///< Empty: none.
     double exposure = 0;             ///< Of the PNG, in stops.

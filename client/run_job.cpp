@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <set>
@@ -136,8 +137,10 @@ Status check_outputs(const JobOptions& options, const std::vector<const char*>& 
 Status upload_scene(JobPort& port, const LocalScene& scene) {
     const std::string text = scene.manifest.canonical_text();
     const Digest root = sha256(text);
+    std::map<Digest, const AssetEntry*> entries;  // of files with the same bytes, one
+    for (const AssetEntry& entry : scene.manifest.entries) entries.emplace(entry.digest, &entry);
     std::vector<Digest> digests{root};
-    for (const AssetEntry& entry : scene.manifest.entries) digests.push_back(entry.digest);
+    for (const auto& [digest, entry] : entries) digests.push_back(digest);
     const auto missing = port.find_missing(digests);
     if (!missing.ok()) return missing.status();
     for (const Digest& digest : *missing) {
@@ -146,11 +149,8 @@ Status upload_scene(JobPort& port, const LocalScene& scene) {
             LL_RETURN_IF_ERROR(port.upload_bytes(root, text));
             continue;
         }
-        for (const AssetEntry& entry : scene.manifest.entries) {
-            if (entry.digest != digest) continue;
-            LL_RETURN_IF_ERROR(port.upload(digest, scene.directory / entry.path));
-            break;
-        }
+        const auto entry = entries.find(digest);
+        if (entry != entries.end()) LL_RETURN_IF_ERROR(port.upload(digest, scene.directory / entry->second->path));
     }
     return {};
 }

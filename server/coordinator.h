@@ -34,6 +34,8 @@ struct CoordinatorOptions {
     std::optional<uint64_t> shuffle_seed;  ///< Lease units in a random order (tests).
     /// Called by any thread at any time.
     std::function<TimePoint()> clock = [] { return std::chrono::steady_clock::now(); };
+    /// Memory of the host, which a frame's sums must fit. 0: what the system says.
+    int64_t memory_bytes = 0;
     uint64_t waiting_bytes = uint64_t(512) << 20;  ///< Room for partials that wait for earlier groups.
     std::filesystem::path table_cache;             ///< Tables of earlier jobs; empty: none are kept.
     uint64_t table_cache_bytes = uint64_t(4) << 30;

@@ -1,6 +1,7 @@
 // The life of a job between acceptance and end: reading the scene, planning, finishing.
 
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -64,6 +65,13 @@ Status Coordinator::prepare(JobRecord& job, std::stop_token stop) {
     const Rect& crop = facts->frame.crop;
     if (crop.empty() || crop.area() > kMaxPartialPixels)
         return invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) + " pixels");
+    // Before hours of rendering: the system may hand out memory that it does not have, and kill who uses it.
+    const int64_t memory =
+        options_.memory_bytes > 0 ? options_.memory_bytes : int64_t(::sysconf(_SC_PHYS_PAGES)) * ::sysconf(_SC_PAGESIZE);
+    if (memory > 0 && crop.area() > memory / kFrameBytesPerPixel)
+        return Status(StatusCode::kResourceExhausted, "the frame has " + pixels_and_memory(crop.area()) +
+                                                          "; the coordinator's host has " + std::to_string(memory / 1000000000) +
+                                                          " GB, so lower the resolution or give a crop window");
     spec.frame = facts->frame;
     if (spec.max_depth < 0) spec.max_depth = facts->max_depth;
     if (spec.algorithm.info().learning) return prepare_tables(job, std::move(spec), *std::move(facts), true);
@@ -171,7 +179,8 @@ Status Coordinator::write_results(JobRecord& job) {
         manifest.rejected_results = job.rejected;
     }
     if (const auto text = assets_.read(spec.scene_root); text.ok()) {
-        if (const auto list = AssetManifest::parse(*text); list.ok()) manifest.scene_main = list->main;
+        if (const auto list = AssetManifest::parse(*text); list.ok())
+            manifest.scene_main = list->main, manifest.without = list->without;
     }
     std::error_code error;
     std::filesystem::create_directories(job.directory, error);

@@ -103,12 +103,14 @@ std::string utc_now() {
     return text;
 }
 
-std::string replay_command(const JobSpec& spec, const std::string& scene, const Reducer::Dropped& dropped) {
+std::string replay_command(const JobSpec& spec, const std::string& scene, const Reducer::Dropped& dropped,
+                           const std::vector<std::string>& without) {
     const DroppedSample& sample = dropped.sample;
     const int width = spec.frame.crop.width();
     const int x = spec.frame.crop.x0 + int(sample.pixel) % width, y = spec.frame.crop.y0 + int(sample.pixel) / width;
     std::string command = "lightloom replay " + shell_word(scene) + " --algorithm " + shell_word(spec.algorithm.name());
     for (const auto& [key, value] : spec.algorithm.text()) command += " --set " + shell_word(key + "=" + value);
+    for (size_t i = 0; i < without.size(); ++i) command += (i == 0 ? " --without " : ",") + without[i];
     command += " --seed " + std::to_string(spec.seed) + " --max-depth " + std::to_string(spec.max_depth);
     if (spec.width > 0) command += " --resolution " + std::to_string(spec.width) + "x" + std::to_string(spec.height);
     if (spec.samples_per_pixel > 0) command += " --spp " + std::to_string(spec.samples_per_pixel);
@@ -128,6 +130,7 @@ std::string to_json(const Manifest& m) {
                      {"groups", m.groups},
                      {"spec_digest", spec.spec_digest().hex()}};
     json["spec"] = spec_json(spec, m.scene_main);
+    if (!m.without.empty()) json["spec"]["without"] = m.without;
     json["build"] = {{"build_id", m.identity.build_id},
                      {"math_profile", m.identity.math_profile},
                      {"golden_digest", m.identity.golden_digest.hex()}};
@@ -150,7 +153,7 @@ std::string to_json(const Manifest& m) {
                            {"iteration", d.sample.iteration},
                            {"pixel", d.sample.pixel},
                            {"splat", d.sample.splat},
-                           {"replay", replay_command(spec, m.scene_main, d)}});
+                           {"replay", replay_command(spec, m.scene_main, d, m.without)}});
     }
     json["dropped"] = {{"count", m.job.dropped_samples}, {"first", std::move(dropped)}};
     Json workers = Json::array();

@@ -25,6 +25,7 @@ struct Manifest {
     JobInfo job;
     BuildIdentity identity;
     std::string scene_main;               ///< Path of the scene file in its list.
+    std::vector<std::string> without;     ///< What is left out of the scene.
     std::string created_at, finished_at;  ///< UTC.
     uint32_t groups = 0;
     uint64_t iterations = 0;
@@ -38,7 +39,8 @@ struct Manifest {
 std::string utc_now();
 /// Command line for a shell that renders one dropped sample again; its unit for a splat, which is known only by where it
 /// would have landed.
-std::string replay_command(const JobSpec& spec, const std::string& scene, const Reducer::Dropped& dropped);
+std::string replay_command(const JobSpec& spec, const std::string& scene, const Reducer::Dropped& dropped,
+                           const std::vector<std::string>& without = {});
 /// What light transport was asked for, as manifests and reports of references show it.
 nlohmann::ordered_json settings_json(const JobSpec& spec);
 /// Tables as manifests and statistics show them.

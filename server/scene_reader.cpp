@@ -46,8 +46,10 @@ Result<ImportedScene> read_scene(const AssetStore& assets, const Digest& root, c
     std::filesystem::create_directories(scratch, error);
     if (!::mkdtemp(directory.data())) return internal_error(directory + ": cannot be made");
     const Status status = assets.materialise(*manifest, directory);
-    auto scene =
-        status.ok() ? import_pbrt((std::filesystem::path(directory) / manifest->main).string()) : Result<ImportedScene>(status);
+    // Never beyond the directory, whatever the files say.
+    auto scene = status.ok() ? import_pbrt((std::filesystem::path(directory) / manifest->main).string(),
+                                           {.root = directory, .without = manifest->without})
+                             : Result<ImportedScene>(status);
     std::filesystem::remove_all(directory, error);
     return scene;
 }

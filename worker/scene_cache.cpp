@@ -100,7 +100,8 @@ Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, st
 
     const std::filesystem::path directory = scratch_ / root.hex();
     LL_RETURN_IF_ERROR(store_.materialise(*manifest, directory));
-    auto imported = import_pbrt((directory / manifest->main).string());
+    // Never beyond the directory, whatever the files say.
+    auto imported = import_pbrt((directory / manifest->main).string(), {.root = directory.string(), .without = manifest->without});
     std::error_code ignored;
     std::filesystem::remove_all(directory, ignored);
     if (!imported.ok()) return imported.status();

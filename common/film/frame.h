@@ -2,6 +2,7 @@
 // Geometry of the film: the full frame, the rendered (crop) rectangle and the tiles of it.
 
 #include <cstdint>
+#include <string>
 
 namespace lightloom {
 
@@ -19,8 +20,18 @@ struct Rect {
     friend bool operator==(const Rect&, const Rect&) = default;
 };
 
-/// Largest crop window: a pixel's 28 bytes of a partial must fit EXR's 31-bit chunk size.
-inline constexpr int64_t kMaxPartialPixels = (int64_t(1) << 31) / 28 - 1;
+/// Largest crop window: so many pixels are numbered in 32 bits, and what a pixel has of values, too.
+inline constexpr int64_t kMaxPartialPixels = int64_t(1) << 28;
+
+/// Memory that a job's sums take while it is rendered: of all groups and of the one that is not complete yet.
+inline constexpr int64_t kFrameBytesPerPixel = 256;
+
+/// "P pixels, which take G GB of memory while they are rendered (256 bytes each)"
+inline std::string pixels_and_memory(int64_t pixels) {
+    return std::to_string(pixels) + " pixels, which take " +
+           std::to_string((pixels * kFrameBytesPerPixel + 999999999) / 1000000000) + " GB of memory while they are rendered (" +
+           std::to_string(kFrameBytesPerPixel) + " bytes each)";
+}
 
 /// Longest side of the full frame.
 inline constexpr int kMaxFrameSide = 65536;

@@ -19,7 +19,8 @@ SplatLayout splat_layout(const FrameLayout& frame, uint64_t splat_count) {
     if (splat_count == 0) return SplatLayout::kNone;
     const uint64_t dense = uint64_t(frame.crop.area()) * kPlanes * 4;
     const uint64_t sparse = splat_count * (kPlanes + 1) * 4;
-    return sparse < dense ? SplatLayout::kSparse : SplatLayout::kDense;
+    // A sparse part is a single line, and so a single chunk, whose size EXR stores in 31 bits.
+    return sparse < dense && sparse <= uint64_t(INT32_MAX) ? SplatLayout::kSparse : SplatLayout::kDense;
 }
 
 /// One part of the file: its header values and how its scanlines are laid out.

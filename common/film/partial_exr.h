@@ -6,7 +6,8 @@
 //                  double sums of camera samples.
 //   part "splat":  absent without splats; otherwise whichever is smaller of
 //                  dense  - data window = the crop, the same six channels, zero where nothing was splatted, or
-//                  sparse - N x 1 pixels, the same six channels and `pixel` (row-major in the crop, ascending).
+//                  sparse - N x 1 pixels, the same six channels and `pixel` (row-major in the crop, ascending); not beyond
+//                           2^31 - 1 bytes, EXR's limit for a line.
 // Any EXR tool opens it. The receiver does not use one: it knows the unit it leased, makes for itself every byte that is
 // not pixel data, compares those, the size and the digest, and only then reads the sums at their known offsets. It never
 // interprets a header that it would not have written itself.

@@ -123,7 +123,7 @@ void set_film(Context* context, const std::string& kind, const ParameterList& p)
     const int64_t pixels =
         cropped ? int64_t(film.crop[1] - film.crop[0]) * (film.crop[3] - film.crop[2]) : int64_t(film.width) * film.height;
     if (pixels > kMaxPartialPixels)
-        fail(p.where(), p.what() + ": the picture has " + std::to_string(pixels) + " pixels; the limit is " +
+        fail(p.where(), p.what() + ": the picture has " + pixels_and_memory(pixels) + "; the limit is " +
                             std::to_string(kMaxPartialPixels) + ", so lower the resolution or give a cropwindow");
     p.ignore(&context->diagnostics, "maxcomponentvalue", "samples are not clamped, because that changes the mean");
     context->iso = p.one_float("iso", 100);

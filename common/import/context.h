@@ -4,8 +4,10 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -76,17 +78,21 @@ struct TextureRange {
 enum class TextureUse { kFloat, kReflectance, kUnbounded };
 
 struct Context {
-    Context(FileSource* source, const ImportOptions& import_options)
+    /// `collects_faults`: see Diagnostics.
+    Context(FileSource* source, const ImportOptions& import_options, bool collects_faults = false)
         : files(source),
           options(import_options),
-          diagnostics(import_options.strict) {}
+          diagnostics(import_options.strict, collects_faults) {}
 
     FileSource* files;
     ImportOptions options;
     Diagnostics diagnostics;
     SceneDescription scene;
 
-    std::vector<std::unique_ptr<std::string>> file_names;  ///< Storage of Location::file.
+    std::set<std::string> file_names;  ///< Storage of Location::file.
+    std::map<std::string, LeftOutFeature> left_out;
+    std::optional<ImportFailure> old_syntax;  ///< The first directive that only pbrt before version 4 knows.
+
     std::vector<PendingShape> shapes;
     std::map<std::string, Definition> float_textures, spectrum_textures, named_materials;
     std::vector<Definition> anonymous_materials;
@@ -107,6 +113,14 @@ struct Context {
     float exposure_time = 1, iso = 100;
     bool has_pixel_filter = false;
 
+    /// Says that the scene has an unsupported feature: it is left out if the options say so, and a fault otherwise.
+    void unsupported(const Location& where, const std::string& feature, const std::string& what);
+    /// Whether the options leave the feature out; counts it.
+    bool leaves_out(const Location& where, std::string_view feature);
+    /// A fault in `resolve` gives the placeholder where faults are collected, so that each definition is judged once.
+    template <typename Id>
+    Id resolve_or(const std::function<Id()>& placeholder, const std::function<Id()>& resolve);
+
     /// Reads a file that a parameter names. Fails at `where`.
     std::string read_file(const Location& where, const std::string& reference, std::string* normalised = nullptr);
     /// Index of the decoded image in the scene; every file is decoded once per way of using it.
@@ -114,6 +128,16 @@ struct Context {
     /// The Location::file for a normalised name.
     const std::string* intern_file_name(const std::string& name);
 };
+
+template <typename Id>
+Id Context::resolve_or(const std::function<Id()>& placeholder, const std::function<Id()>& resolve) {
+    const int textures = texture_depth, materials = material_depth;
+    Id id{};
+    if (diagnostics.guard([&] { id = resolve(); })) return id;
+    texture_depth = textures;
+    material_depth = materials;
+    return placeholder();
+}
 
 // textures.cpp
 TextureId add_node(Context* context, const TextureNode& node);

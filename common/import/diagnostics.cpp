@@ -9,7 +9,7 @@ std::string Location::text() const {
     return line > 0 ? name + ":" + std::to_string(line) : name;
 }
 
-void fail(const Location& where, const std::string& what) { throw ImportFailure{invalid_argument(where.text() + ": " + what)}; }
+void fail(const Location& where, const std::string& what) { throw ImportFailure{where, what, {}}; }
 
 std::string quoted(const std::string& text) {
     constexpr size_t kLongest = 80;
@@ -31,14 +31,13 @@ std::string quoted(const std::string& text) {
     return out + "\"";
 }
 
-void Diagnostics::warn(const Location& where, const std::string& what) {
-    if (strict_) fail(where, what + " (an error because of --strict)");
-    const auto [it, inserted] = index_.try_emplace(what, entries_.size());
+void MessageList::add(const Location& where, const std::string& what, const std::string& key) {
+    const auto [it, inserted] = index_.try_emplace(key, entries_.size());
     if (inserted) entries_.push_back({where.text(), what, 0});
     ++entries_[it->second].count;
 }
 
-std::vector<std::string> Diagnostics::messages() const {
+std::vector<std::string> MessageList::text() const {
     std::vector<std::string> out;
     for (const Entry& e : entries_) {
         std::string line = e.where + ": " + e.what;
@@ -46,6 +45,18 @@ std::vector<std::string> Diagnostics::messages() const {
         out.push_back(std::move(line));
     }
     return out;
+}
+
+void Diagnostics::warn(const Location& where, const std::string& what) {
+    if (strict_)
+        fault({where, what + " (an error because of --strict)", {}});
+    else
+        warnings_.add(where, what, what);
+}
+
+void Diagnostics::fault(const ImportFailure& failure) {
+    if (!collects_faults_) throw failure;
+    faults_.add(failure.where, failure.what, failure.feature.empty() ? failure.what : "--without " + failure.feature);
 }
 
 }  // namespace lightloom::import

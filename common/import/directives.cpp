@@ -56,7 +56,7 @@ void Parser::option(Tokenizer* tokens, const Location& where) {
     if (std::find(kHarmless.begin(), kHarmless.end(), name) != kHarmless.end()) {
         context_->diagnostics.warn(where, shown + " is ignored: it does not change what the picture converges to");
     } else if (name == "disablepixeljitter" || name == "forcediffuse" || name == "pixelstats") {
-        if (value != "false") fail(where, shown + " is not supported; remove it");
+        if (value != "false") context_->unsupported(where, "options", shown);
     } else {
         fail(where, "unknown " + shown + "; remove it or correct its name");
     }
@@ -66,12 +66,13 @@ bool Parser::global_option(Tokenizer* tokens, const std::string& word, const Loc
     constexpr std::array<std::string_view, 6> kWords{"Camera", "Film", "PixelFilter", "Sampler", "Integrator", "Accelerator"};
     if (std::find(kWords.begin(), kWords.end(), word) == kWords.end()) return false;
     require_world(where, word, false);
-    const std::string kind = read_name(tokens, where, word);
-    const ParameterList list = parameters(tokens, where, word, kind, "");
+    std::string kind = read_name(tokens, where, word);
+    ParameterList list = parameters(tokens, where, word, kind, "");
+    if (leave_out(word, &kind, &list)) return true;
     if (word == "Camera") {
         const Mat4 camera_to_world = *inverse(static_transform(where, "the camera"));
         set_camera(context_, kind, list, camera_to_world);
-        coordinate_systems_["camera"] = {camera_to_world, camera_to_world};
+        coordinate_systems_["camera"] = {{camera_to_world, camera_to_world}, {}};
     } else if (word == "Film") {
         set_film(context_, kind, list);
     } else if (word == "PixelFilter") {
@@ -94,27 +95,33 @@ bool Parser::world_item(Tokenizer* tokens, const std::string& word, const Locati
     } else if (word == "Texture") {
         texture(tokens, where);
     } else if (word == "Material") {
-        const std::string kind = read_name(tokens, where, word);
-        context_->anonymous_materials.push_back({kind, parameters(tokens, where, word, kind, "material")});
+        std::string kind = read_name(tokens, where, word);
+        ParameterList list = parameters(tokens, where, word, kind, "material");
+        leave_out(word, &kind, &list);
+        context_->anonymous_materials.push_back({kind, std::move(list)});
         state_.material = {false, "", int(context_->anonymous_materials.size()) - 1, where};
     } else if (word == "MakeNamedMaterial") {
         const std::string name = read_name(tokens, where, word);
         ParameterList list = parameters(tokens, where, word, name, "material");
-        const std::string kind = list.one_string("type", "");
+        std::string kind = list.one_string("type", "");
         if (kind.empty()) fail(where, list.what() + " has no \"string type\"");
+        note_old_syntax(where, "Material", kind, list);
+        leave_out("Material", &kind, &list);
         if (!context_->named_materials.try_emplace(name, Definition{kind, std::move(list)}).second)
             fail(where, "the material " + quoted(name) + " is defined twice; rename one of the two");
     } else if (word == "NamedMaterial") {
         state_.material = {true, read_name(tokens, where, word), 0, where};
     } else if (word == "LightSource") {
         require_world(where, word, true);
-        const std::string kind = read_name(tokens, where, word);
-        const ParameterList list = parameters(tokens, where, word, kind, "light");
+        std::string kind = read_name(tokens, where, word);
+        ParameterList list = parameters(tokens, where, word, kind, "light");
+        if (leave_out(word, &kind, &list)) return true;
         add_light(context_, kind, list, static_transform(where, "the light"));
         list.finish();
     } else if (word == "AreaLightSource") {
         require_world(where, word, true);
         const std::string kind = read_name(tokens, where, word);
+        note_old_syntax(where, word, kind, {});
         if (kind != "diffuse") fail(where, "AreaLightSource " + quoted(kind) + " is not supported; the only kind is \"diffuse\"");
         ParameterList list = parameters(tokens, where, word, kind, "light");
         // Now, not when a shape emits: none might.
@@ -140,17 +147,28 @@ void Parser::medium_interface(Tokenizer* tokens, const Location& where) {
     std::string outside = inside;
     if (tokens->peek().kind == TokenKind::kString) outside = read_name(tokens, where, "MediumInterface");
     if (!inside.empty() || !outside.empty())
-        fail(where, "MediumInterface " + quoted(inside) + " " + quoted(outside) +
-                        ": participating media are not supported; remove it to render without");
+        context_->unsupported(where, "media",
+                              "MediumInterface " + quoted(inside) + " " + quoted(outside) + " (participating media)");
 }
 
 void Parser::texture(Tokenizer* tokens, const Location& where) {
     const std::string name = read_name(tokens, where, "Texture");
     const std::string type = read_name(tokens, where, "Texture");
-    const std::string kind = read_name(tokens, where, "Texture");
+    std::string kind = read_name(tokens, where, "Texture");
+    note_old_syntax(where, "Texture", type, {});
     if (type != "float" && type != "spectrum")
         fail(where, "Texture " + quoted(name) + " has the type " + quoted(type) + "; it must be float or spectrum");
-    ParameterList list = ParameterList::parse(tokens, where, "Texture " + quoted(name) + " of kind " + quoted(kind));
+    ParameterList list(where, "Texture " + quoted(name) + " of kind " + quoted(kind));
+    const bool good = context_->diagnostics.guard([&] { list = ParameterList::parse(tokens, where, list.what()); });
+    if (!good) {  // It exists all the same for those who refer to it.
+        skip_to_directive(tokens);
+        kind = "constant";
+    }
+    list.report_to(&context_->diagnostics);
+    const bool was_ptex = kind == "ptex";
+    leave_out("Texture", &kind, &list);
+    if (was_ptex && type == "float") list.add_default("float", "value", {0.5});
+    if (was_ptex && type == "spectrum") list.add_default("rgb", "value", {0.5, 0.5, 0.5});
     if (const auto it = state_.attributes.find("texture"); it != state_.attributes.end()) list.add_defaults(it->second);
     auto& table = type == "float" ? context_->float_textures : context_->spectrum_textures;
     if (!table.try_emplace(name, Definition{kind, std::move(list)}).second)
@@ -159,8 +177,9 @@ void Parser::texture(Tokenizer* tokens, const Location& where) {
 
 void Parser::shape(Tokenizer* tokens, const Location& where) {
     require_world(where, "Shape", true);
-    const std::string kind = read_name(tokens, where, "Shape");
-    const ParameterList list = parameters(tokens, where, "Shape", kind, "shape");
+    std::string kind = read_name(tokens, where, "Shape");
+    ParameterList list = parameters(tokens, where, "Shape", kind, "shape");
+    if (leave_out("Shape", &kind, &list)) return;
     PendingShape pending;
     pending.where = where;
     pending.material = state_.material;
@@ -177,12 +196,16 @@ void Parser::shape(Tokenizer* tokens, const Location& where) {
         pending.alpha = list.one_float("alpha", 1);
         if (pending.alpha < 0 || pending.alpha > 1) fail(where, list.what() + ": alpha must be between 0 and 1");
     }
-    pending.geometry = make_shape(context_, kind, list,
-                                  {static_transform(where, list.what()), state_.reverse_orientation, pending.area_light != nullptr},
-                                  &pending.faces);
+    // Where faults are collected, those of its light and material shall be found, too, though they shine and lie on nothing.
+    const bool good = context_->diagnostics.guard([&] {
+        pending.geometry = make_shape(
+            context_, kind, list, {static_transform(where, list.what()), state_.reverse_orientation, pending.area_light != nullptr},
+            &pending.faces);
+        list.finish();
+    });
+    if (!good) pending.geometry = Sphere{}, pending.faces = {};
     if (!pending.area_light) pending.faces = {};
     pending.is_scaled_quadric = (kind == "sphere" || kind == "disk") && has_scale(state_.ctm[0]);
-    list.finish();
     context_->shapes.push_back(std::move(pending));
 }
 
@@ -207,12 +230,13 @@ void Parser::object_instance(Tokenizer* tokens, const Location& where) {
 }
 
 void Parser::place_instances() {
-    for (const PendingInstance& i : instances_) {
-        const auto it = objects_.find(i.object);
-        if (it == objects_.end())
-            fail(i.where, "ObjectInstance: no object is named " + quoted(i.object) + "; define it with ObjectBegin");
-        context_->scene.instances.push_back({it->second, i.object_to_world, i.where.text()});
-    }
+    for (const PendingInstance& i : instances_)
+        context_->diagnostics.guard([&] {
+            const auto it = objects_.find(i.object);
+            if (it == objects_.end())
+                fail(i.where, "ObjectInstance: no object is named " + quoted(i.object) + "; define it with ObjectBegin");
+            context_->scene.instances.push_back({it->second, i.object_to_world, i.where.text()});
+        });
 }
 
 }  // namespace lightloom::import

@@ -50,13 +50,12 @@ Rgb luminance_weights(ExrPrimaries primaries) {
     return {0.2126f, 0.7152f, 0.0722f};
 }
 
-Status check_image_size(uint64_t width, uint64_t height, uint64_t channels, uint64_t file_bytes) {
-    constexpr uint64_t kMaxSide = 16384, kMaxExpansion = 4096;
+Status check_image_size(uint64_t width, uint64_t height, uint64_t channels, uint64_t file_bytes, uint64_t values_per_byte) {
+    constexpr uint64_t kMaxSide = 16384;
     const std::string claim = std::to_string(width) + " x " + std::to_string(height);
     if (width == 0 || height == 0 || width > kMaxSide || height > kMaxSide)
         return invalid_argument("the image claims " + claim + " pixels; sides from 1 to 16384 are supported");
-    // No supported compression shrinks data further than this.
-    if (width * height * channels > file_bytes * kMaxExpansion)
+    if (width * height * channels > file_bytes * values_per_byte)
         return data_loss("the image claims " + claim + " pixels, which its " + std::to_string(file_bytes) + " bytes cannot hold");
     return {};
 }
@@ -82,7 +81,7 @@ Result<ExrPixels> read_exr(const std::string& bytes, ExrChannels channels) try {
         if (list[name.c_str()].xSampling != 1 || list[name.c_str()].ySampling != 1)
             return invalid_argument("the EXR image has sub-sampled channels, which are not supported");
     LL_RETURN_IF_ERROR(check_image_size(uint64_t(std::max<int64_t>(width, 0)), uint64_t(std::max<int64_t>(height, 0)), names.size(),
-                                        bytes.size()));
+                                        bytes.size(), kExrValuesPerByte));
     if (channels == ExrChannels::kFirstThree && names.size() >= 3) {
         auto channel = list.begin();
         for (std::string& name : names) name = (channel++).name();

@@ -30,7 +30,16 @@ enum class ExrChannels {
 /// Decodes a scan-line or tiled EXR, of a multi-part file the first part. Primaries that ExrPrimaries does not list are an error.
 Result<ExrPixels> read_exr(const std::string& bytes, ExrChannels channels = ExrChannels::kColour);
 
+/// Values that a byte of a file can stand for at most. Deflate makes up to 1032 bytes of one. In a PNG such a byte may hold eight
+/// codes of a palette that become four channels each.
+inline constexpr uint64_t kPngValuesPerByte = 1032 * 8 * 4;
+/// DWA deflates what a discrete cosine transformation leaves of blocks of 64 values; nothing else in OpenEXR packs more.
+inline constexpr uint64_t kExrValuesPerByte = 1032 * 64;
+/// JPEG needs a bit for a block of at most 64 pixels and repeats its colours at half the resolution; TGA and HDR pack far less.
+inline constexpr uint64_t kOtherValuesPerByte = 4096;
+
 /// Refuses dimensions that are unreasonable or that so few bytes cannot hold, before memory of that size is asked for.
-Status check_image_size(uint64_t width, uint64_t height, uint64_t channels, uint64_t file_bytes);
+Status check_image_size(uint64_t width, uint64_t height, uint64_t channels, uint64_t file_bytes,
+                        uint64_t values_per_byte = kOtherValuesPerByte);
 
 }  // namespace lightloom::import

@@ -11,14 +11,75 @@
 
 namespace lightloom::import {
 
+Result<std::string> FileSource::normalise(std::string_view reference, size_t level, size_t* highest) const {
+    const std::string shown = quoted(std::string(reference));
+    if (reference.empty()) return invalid_argument("the file name is empty");
+    if (reference.front() == '/')
+        return invalid_argument("the file name " + shown + " is absolute; use a path relative to the scene file's directory");
+    if (reference.find('\0') != std::string_view::npos) return invalid_argument("the file name " + shown + " contains a zero byte");
+    std::vector<std::string_view> parts;
+    size_t up = *highest = level;
+    for (size_t begin = 0; begin <= reference.size();) {
+        const size_t end = std::min(reference.find('/', begin), reference.size());
+        const std::string_view part = reference.substr(begin, end - begin);
+        if (part == "..") {
+            if (!parts.empty())
+                parts.pop_back();
+            else if (up < above_.size())
+                *highest = std::max(*highest, ++up);
+            else
+                return invalid_argument(
+                    "the file name " + shown +
+                    " leaves the scene's root directory, so a worker could not get it; move the file, or name a "
+                    "directory that holds everything with --root");
+        } else if (parts.empty() && up > 0 && part == above_[up - 1]) {
+            --up;  // Back down towards the main file.
+        } else if (!part.empty() && part != ".") {
+            parts.push_back(part);
+        }
+        begin = end + 1;
+    }
+    if (parts.empty()) return invalid_argument("the file name " + shown + " names a directory");
+    std::string out;
+    for (size_t i = 0; i < up; ++i) out += "../";
+    out += parts[0];
+    for (size_t i = 1; i < parts.size(); ++i) out.append("/").append(parts[i]);
+    return out;
+}
+
+Result<std::string> FileSource::resolve(std::string_view reference) {
+    size_t highest = 0;
+    const Result<std::string> first = normalise(reference, 0, &highest);
+    for (size_t level = 0; level <= above_.size(); ++level) {
+        const Result<std::string> name = level == 0 ? first : normalise(reference, level, &highest);
+        if (!name.ok()) break;
+        if (!exists(*name)) continue;
+        levels_ = std::max(levels_, highest);
+        return name;
+    }
+    return first;
+}
+
 Result<std::string> FileSource::read(const std::string& name) {
     Result<std::string> bytes = read_bytes(name);
-    if (bytes.ok() && std::find(files_.begin(), files_.end(), name) == files_.end()) files_.push_back(name);
+    if (bytes.ok() && known_.insert(name).second) files_.push_back(name);
     return bytes;
 }
 
+std::vector<std::string> FileSource::files() const {
+    std::vector<std::string> out;
+    for (const std::string& name : files_) {
+        size_t up = 0;
+        while (name.compare(3 * up, 3, "../") == 0) ++up;
+        std::string path;
+        for (size_t level = levels_; level > up; --level) path += above_[level - 1] + "/";
+        out.push_back(path + name.substr(3 * up));
+    }
+    return out;
+}
+
 Result<std::string> DirectorySource::read_bytes(const std::string& name) {
-    const std::string path = root_.empty() ? name : root_ + "/" + name;
+    const std::string path = path_of(name);
     struct stat info {};
     if (stat(path.c_str(), &info) != 0)
         return not_found("cannot open " + quoted(name) + ": no such file below the scene's directory");
@@ -35,37 +96,15 @@ Result<std::string> DirectorySource::read_bytes(const std::string& name) {
     return bytes;
 }
 
+bool DirectorySource::exists(const std::string& name) const {
+    struct stat info {};
+    return stat(path_of(name).c_str(), &info) == 0;
+}
+
 Result<std::string> MemorySource::read_bytes(const std::string& name) {
     const auto it = contents_.find(name);
     if (it == contents_.end()) return not_found("cannot open " + quoted(name) + ": no such file below the scene's directory");
     return it->second;
-}
-
-Result<std::string> normalise_reference(std::string_view reference) {
-    const std::string shown = quoted(std::string(reference));
-    if (reference.empty()) return invalid_argument("the file name is empty");
-    if (reference.front() == '/')
-        return invalid_argument("the file name " + shown + " is absolute; use a path below the scene file's directory");
-    if (reference.find('\0') != std::string_view::npos) return invalid_argument("the file name " + shown + " contains a zero byte");
-    std::vector<std::string_view> parts;
-    size_t begin = 0;
-    while (begin <= reference.size()) {
-        const size_t end = std::min(reference.find('/', begin), reference.size());
-        const std::string_view part = reference.substr(begin, end - begin);
-        if (part == "..") {
-            if (parts.empty())
-                return invalid_argument("the file name " + shown +
-                                        " leaves the scene file's directory; move the file below it, or a worker could not get it");
-            parts.pop_back();
-        } else if (!part.empty() && part != ".") {
-            parts.push_back(part);
-        }
-        begin = end + 1;
-    }
-    if (parts.empty()) return invalid_argument("the file name " + shown + " names a directory");
-    std::string out(parts[0]);
-    for (size_t i = 1; i < parts.size(); ++i) out.append("/").append(parts[i]);
-    return out;
 }
 
 bool has_suffix(std::string_view text, std::string_view suffix) {

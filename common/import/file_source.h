@@ -1,11 +1,14 @@
 #pragma once
-// Where the importer's bytes come from. A scene names its files relative to the directory of its main file and may not
-// leave that directory: what a worker receives is exactly that directory's content.
+// Where the importer's bytes come from. A scene names its files relative to the directory of its main file, or to one above it,
+// as far up as the scene's root, which it may not leave: what a worker receives is exactly that directory's content. pbrt-v4
+// looks below the main file's directory and then below the current one, which is above it where scenes rely on that; going up
+// finds the same files wherever the command is given.
 
 #include <cstdint>
 #include <map>
 #include <string>
 #include <string_view>
+#include <unordered_set>
 #include <vector>
 
 #include "common/core/result.h"
@@ -14,43 +17,66 @@ namespace lightloom::import {
 
 class FileSource {
   public:
+    /// `above`: the names of the main file's directory, of the one above it, and so on, up to below the scene's root. Empty: the
+    /// main file lies directly in the root.
+    explicit FileSource(std::vector<std::string> above = {}) : above_(std::move(above)) {}
     virtual ~FileSource() = default;
 
-    /// Bytes of the file `name`, a normalised relative path. The message of an error names the file.
+    /// The file that a reference in the scene ("textures/./wood.png") means, as a normalised path relative to the main file's
+    /// directory, which may begin with "..". It is the nearest one, see above; one that does not exist may be named, too. Fails
+    /// for an empty or absolute path and for one that leaves the scene's root.
+    Result<std::string> resolve(std::string_view reference);
+    /// Bytes of the file `name`, which resolve() has given. The message of an error names the file.
     Result<std::string> read(const std::string& name);
-    /// Every file read so far, in order of first use.
-    const std::vector<std::string>& files() const { return files_; }
+
+    /// How many directories above the main file's references have gone: the root of all that was read.
+    size_t levels() const { return levels_; }
+    /// Every file read so far, in order of first use, as paths relative to the directory that is levels() above the main file's.
+    std::vector<std::string> files() const;
 
   private:
     virtual Result<std::string> read_bytes(const std::string& name) = 0;
+    virtual bool exists(const std::string& name) const = 0;
+    /// As from the directory `level` above the main file's; `*highest` is how far up the way led.
+    Result<std::string> normalise(std::string_view reference, size_t level, size_t* highest) const;
+
+    std::vector<std::string> above_;
+    size_t levels_ = 0;
     std::vector<std::string> files_;
+    std::unordered_set<std::string> known_;
 };
 
 /// Files below a directory on disk.
 class DirectorySource : public FileSource {
   public:
-    /// `root` is empty for the current directory. Files larger than `max_bytes` are refused before they are read.
-    DirectorySource(std::string root, uint64_t max_bytes) : root_(std::move(root)), max_bytes_(max_bytes) {}
+    /// `directory`, the main file's, is empty for the current one. Files larger than `max_bytes` are refused before they are read.
+    DirectorySource(std::string directory, std::vector<std::string> above, uint64_t max_bytes)
+        : FileSource(std::move(above)),
+          directory_(std::move(directory)),
+          max_bytes_(max_bytes) {}
 
   private:
     Result<std::string> read_bytes(const std::string& name) override;
-    std::string root_;
+    bool exists(const std::string& name) const override;
+    std::string path_of(const std::string& name) const { return directory_.empty() ? name : directory_ + "/" + name; }
+
+    std::string directory_;
     uint64_t max_bytes_;
 };
 
 /// Files held in memory; for tests and fuzzing.
 class MemorySource : public FileSource {
   public:
-    explicit MemorySource(std::map<std::string, std::string> contents) : contents_(std::move(contents)) {}
+    /// The names are those that resolve() gives.
+    explicit MemorySource(std::map<std::string, std::string> contents, std::vector<std::string> above = {})
+        : FileSource(std::move(above)),
+          contents_(std::move(contents)) {}
 
   private:
     Result<std::string> read_bytes(const std::string& name) override;
+    bool exists(const std::string& name) const override { return contents_.contains(name); }
     std::map<std::string, std::string> contents_;
 };
-
-/// A reference as written in a scene file ("textures/./wood.png") as a normalised relative path. Fails for an empty or
-/// absolute path and for one that leaves the directory.
-Result<std::string> normalise_reference(std::string_view reference);
 
 bool has_suffix(std::string_view text, std::string_view suffix);
 /// The file name's extension in lower case without the dot; empty if there is none.

@@ -134,7 +134,9 @@ Result<Image> read_with_stb(const std::string& bytes, const ImageRequest& reques
     int channels = 0;
     if (!stbi_info_from_memory(data, size, &image.width, &image.height, &channels))
         return invalid_argument(std::string("the image cannot be decoded: ") + stbi_failure_reason());
-    LL_RETURN_IF_ERROR(check_image_size(uint64_t(image.width), uint64_t(image.height), uint64_t(channels), bytes.size()));
+    const bool png = bytes.compare(0, 4, "\x89PNG") == 0;
+    LL_RETURN_IF_ERROR(check_image_size(uint64_t(image.width), uint64_t(image.height), uint64_t(channels), bytes.size(),
+                                        png ? kPngValuesPerByte : kOtherValuesPerByte));
     const auto failed = [] { return data_loss(std::string("the image is damaged: ") + stbi_failure_reason()); };
     if (stbi_is_hdr_from_memory(data, size)) {
         const std::unique_ptr<float, void (*)(void*)> raw(

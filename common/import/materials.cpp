@@ -129,7 +129,7 @@ void read_layers(Context* context, const ParameterList& p, Material* m) {
                        !std::all_of(medium->numbers.begin(), medium->numbers.end(), is_zero)))
             fail(medium->where, p.what() + ": " + quoted(medium->type + " " + medium->name) +
                                     " is not supported, the medium between the layers is not modelled; set it to 0 or "
-                                    "remove it");
+                                    "remove it, or render with --without media");
     }
 }
 
@@ -224,13 +224,25 @@ MaterialId make_material(Context* context, const std::string& name, const Defini
     return id;
 }
 
+/// Where faults are collected, one that cannot be made is replaced by a diffuse one.
+MaterialId make_or_stand_in(Context* context, const std::string& name, const Definition& definition) {
+    const auto stand_in = [&] {
+        Material m;
+        m.kind = MaterialKind::kDiffuse;
+        m.reflectance = constant_texture(context, Rgb(0.5f));
+        context->scene.materials.push_back(std::move(m));
+        return MaterialId(context->scene.materials.size() - 1);
+    };
+    return context->resolve_or<MaterialId>(stand_in, [&] { return make_material(context, name, definition); });
+}
+
 }  // namespace
 
 MaterialId resolve_material_reference(Context* context, const MaterialReference& reference) {
     constexpr MaterialId kInProgress = -3;
     if (!reference.named) {
         const auto [it, inserted] = context->resolved_anonymous_materials.try_emplace(reference.anonymous, kNone);
-        if (inserted) it->second = make_material(context, "", context->anonymous_materials[size_t(reference.anonymous)]);
+        if (inserted) it->second = make_or_stand_in(context, "", context->anonymous_materials[size_t(reference.anonymous)]);
         return it->second;
     }
     const std::string& name = reference.name;
@@ -242,7 +254,7 @@ MaterialId resolve_material_reference(Context* context, const MaterialReference&
     if (it == context->named_materials.end())
         fail(reference.where, "no material is named " + quoted(name) + "; define it with MakeNamedMaterial");
     context->resolved_named_materials[name] = kInProgress;
-    const MaterialId id = make_material(context, name, it->second);
+    const MaterialId id = make_or_stand_in(context, name, it->second);
     context->resolved_named_materials[name] = id;
     return id;
 }

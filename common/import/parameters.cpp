@@ -200,31 +200,60 @@ void ParameterList::ignore_all(Diagnostics* diagnostics, const std::string& reas
 }
 
 void ParameterList::refuse(std::string_view name, const std::string& reason) const {
-    if (const Parameter* p = find_any(name)) fail(p->where, what_ + ": " + title(*p) + " is not supported: " + reason);
+    if (const Parameter* p = find_any(name)) report(p->where, what_ + ": " + title(*p) + " is not supported: " + reason);
+}
+
+void ParameterList::report(const Location& where, const std::string& what) const {
+    if (!diagnostics_) fail(where, what);
+    diagnostics_->fault({where, what, {}});
+}
+
+const Parameter* ParameterList::peek(std::string_view name) const {
+    const auto it = std::find_if(parameters_.begin(), parameters_.end(), [&](const Parameter& p) { return p.name == name; });
+    return it == parameters_.end() ? nullptr : &*it;
+}
+
+void ParameterList::remove(std::string_view name) {
+    std::erase_if(parameters_, [&](const Parameter& p) { return p.name == name; });
+}
+
+void ParameterList::keep_only(std::string_view names) {
+    const std::string padded = " " + std::string(names) + " ";
+    std::erase_if(parameters_, [&](const Parameter& p) { return padded.find(" " + p.name + " ") == std::string::npos; });
+}
+
+void ParameterList::add_default(std::string_view type, std::string_view name, std::vector<double> numbers) {
+    if (peek(name)) return;
+    Parameter p;
+    p.type = type;
+    p.name = name;
+    p.where = where_;
+    p.numbers = std::move(numbers);
+    parameters_.push_back(std::move(p));
 }
 
 void ParameterList::finish() const {
     for (const Parameter& p : parameters_)
-        if (!p.used && !p.from_attribute) fail_unknown(p, {asked_.begin(), asked_.end()});
+        if (!p.used && !p.from_attribute) report_unknown(p, {asked_.begin(), asked_.end()});
 }
 
 void ParameterList::check(std::span<const std::string_view> known) const {
     for (const Parameter& p : parameters_)
         if (!p.from_attribute && std::find(known.begin(), known.end(), p.type + " " + p.name) == known.end())
-            fail_unknown(p, {known.begin(), known.end()});
+            report_unknown(p, {known.begin(), known.end()});
 }
 
-void ParameterList::fail_unknown(const Parameter& p, const std::vector<std::string_view>& known) const {
+void ParameterList::report_unknown(const Parameter& p, const std::vector<std::string_view>& known) const {
     std::vector<std::string> right;
     for (const std::string_view k : known) {
         if (k.substr(k.find(' ') + 1) != p.name) continue;
         std::string declaration = quoted(std::string(k));
         if (std::find(right.begin(), right.end(), declaration) == right.end()) right.push_back(std::move(declaration));
     }
-    if (right.empty()) fail(p.where, what_ + ": unknown parameter " + title(p) + "; remove it or correct its name");
+    if (right.empty()) return report(p.where, what_ + ": unknown parameter " + title(p) + "; remove it or correct its name");
     std::string list = right[0];
     for (size_t i = 1; i < right.size(); ++i) list += " or " + right[i];
-    fail(p.where, what_ + ": " + title(p) + " has the wrong type; write " + list);
+    report(p.where, what_ + ": " + title(p) + " has the wrong type; write " + list);
 }
 
 void ParameterList::add_defaults(const ParameterList& defaults) {

@@ -32,6 +32,9 @@ class ParameterList {
     ParameterList() = default;
     ParameterList(const Location& where, std::string what) : where_(where), what_(std::move(what)) {}
 
+    /// Unknown and refused parameters become faults of `diagnostics`, which may collect them; without it they end the import.
+    void report_to(Diagnostics* diagnostics) { diagnostics_ = diagnostics; }
+
     const Location& where() const { return where_; }
     const std::string& what() const { return what_; }
 
@@ -50,6 +53,14 @@ class ParameterList {
     std::optional<Vec3> one_point3(std::string_view name) const;
     /// Numbers of a list parameter, in tuples of `tuple` (2 for point2, 3 for point3 ...); null if absent.
     const std::vector<double>* numbers(std::string_view type, std::string_view name, size_t tuple) const;
+
+    /// The same as find_any(), but asks without using it.
+    const Parameter* peek(std::string_view name) const;
+    void remove(std::string_view name);
+    /// Removes what is not among `names`, which are separated by blanks.
+    void keep_only(std::string_view names);
+    /// Sets a parameter of numbers if there is none of the name.
+    void add_default(std::string_view type, std::string_view name, std::vector<double> numbers);
 
     /// Names a parameter that may be ignored: a warning with the reason if it is present.
     void ignore(Diagnostics* diagnostics, std::string_view name, const std::string& reason) const;
@@ -71,13 +82,15 @@ class ParameterList {
     void override_with(const ParameterList& newer);
 
   private:
+    void report(const Location& where, const std::string& what) const;
     const Parameter& expect_one(const Parameter& p, size_t count) const;
     /// For one that is not among the `known` ones, by its type or its very name.
-    [[noreturn]] void fail_unknown(const Parameter& p, const std::vector<std::string_view>& known) const;
+    void report_unknown(const Parameter& p, const std::vector<std::string_view>& known) const;
 
     Location where_;
     std::string what_;
     std::vector<Parameter> parameters_;
+    Diagnostics* diagnostics_ = nullptr;
     mutable std::vector<std::string> asked_;  ///< "type name" of every typed question, for the wrong-type hint.
 };
 

@@ -1,7 +1,11 @@
 #include "common/import/parser.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include "common/import/features.h"
+#include "common/import/foreign.h"
 
 namespace lightloom::import {
 namespace {
@@ -101,11 +105,12 @@ std::string read_string(Tokenizer* tokens, const Location& where, const std::str
 }
 
 double read_number(Tokenizer* tokens, const Location& where, const std::string& word) {
-    const Token token = tokens->next();
+    const Token token = tokens->peek();
     double value = 0;
     if (token.kind != TokenKind::kWord || !parse_number(token.text, &value))
         fail(token.where.line ? token.where : where,
              word + " needs a finite number" + (token.kind == TokenKind::kEnd ? "" : ", not " + quoted(std::string(token.text))));
+    tokens->next();
     return value;
 }
 
@@ -143,26 +148,74 @@ Parser::Parser(Context* context) : context_(context) {
 void Parser::parse_main(const std::string& name) {
     const Location where{context_->intern_file_name(name), 0};
     parse_file(name, where);
-    if (!scopes_.empty()) {
+    context_->diagnostics.guard([&] {
+        if (scopes_.empty()) return;
         const std::string name_of_scope = scope_name(scopes_.back().kind);
         fail(scopes_.back().where, "this " + name_of_scope + "Begin is never closed; add the missing " + name_of_scope + "End");
-    }
-    if (!in_world_) fail(where, "the file has no WorldBegin; a scene needs one before its shapes and lights");
+    });
+    context_->diagnostics.guard([&] {
+        if (!in_world_) fail(where, "the file has no WorldBegin; a scene needs one before its shapes and lights");
+    });
     place_instances();
 }
 
 void Parser::parse_file(const std::string& name, const Location& from) {
-    std::string text = context_->read_file(from, name);
-    if (has_suffix(name, ".gz")) {
-        Result<std::string> inflated = inflate_gzip(text, context_->options.max_file_bytes);
+    const std::string text = read_text(name, from);
+    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+    std::string_view contents = text;
+    if (contents.starts_with(kByteOrderMark)) contents.remove_prefix(kByteOrderMark.size());
+    Tokenizer tokens(contents, context_->intern_file_name(name));
+    open_files_.push_back(name);
+    for (bool at_end = false; !at_end;) {
+        const bool good = context_->diagnostics.guard([&] {
+            at_end = tokens.peek().kind == TokenKind::kEnd;
+            if (at_end) return;
+            const Token token = tokens.next();
+            directive(&tokens, token);
+        });
+        if (!good) skip_to_directive(&tokens);
+    }
+    open_files_.pop_back();
+}
+
+std::string Parser::read_text(const std::string& name, const Location& from) {
+    Result<std::string> bytes = context_->files->read(name);
+    if (!bytes.ok()) fail(from, bytes.status().message());
+    std::string text = std::move(bytes).value();
+    const uint64_t limit = context_->options.max_file_bytes;
+    if (text.starts_with("\x1f\x8b")) {
+        Result<std::string> inflated = inflate_gzip(text, limit);
         if (!inflated.ok()) fail(from, quoted(name) + ": " + inflated.status().message());
         text = std::move(inflated).value();
+    } else if (has_suffix(name, ".gz")) {
+        fail(from, quoted(name) + " is not compressed by gzip, although it is named so");
     }
-    Tokenizer tokens(text, context_->intern_file_name(name));
-    while (tokens.peek().kind != TokenKind::kEnd) {
-        const Token token = tokens.next();
-        directive(&tokens, token);
-    }
+    const Location itself{context_->intern_file_name(name), 0};
+    if (is_lfs_pointer(text))
+        fail(itself, "this is a pointer that Git LFS left in place of the file; fetch the file with `git lfs pull`");
+    if (const std::optional<std::string> foreign = foreign_scene(name, text)) fail(itself, *foreign);
+    // Files that include each other several times multiply on every level.
+    text_bytes_ += text.size();
+    if (text_bytes_ > limit)
+        fail(from, "the scene's text, with every file as often as it is included, has more than " + std::to_string(limit) +
+                       " bytes; put repeated content into an object");
+    return text;
+}
+
+void Parser::skip_to_directive(Tokenizer* tokens) {
+    // Directives are words that begin with a capital; of values only the names of what is no number do.
+    const auto begins_directive = [](const Token& token) {
+        if (token.kind != TokenKind::kWord || token.text.empty()) return false;
+        const bool is_value = token.text == "NaN" || token.text == "Inf" || token.text == "Infinity";
+        return token.text[0] >= 'A' && token.text[0] <= 'Z' && !is_value;
+    };
+    for (bool found = false; !found;)
+        // What cannot be read as a token is part of the same fault.
+        try {
+            found = tokens->peek().kind == TokenKind::kEnd || begins_directive(tokens->peek());
+            if (!found) tokens->next();
+        } catch (const ImportFailure&) {
+        }
 }
 
 void Parser::directive(Tokenizer* tokens, const Token& token) {
@@ -172,6 +225,7 @@ void Parser::directive(Tokenizer* tokens, const Token& token) {
     if (transformation(tokens, word, token.where) || scope(tokens, word, token.where) || global_option(tokens, word, token.where) ||
         world_item(tokens, word, token.where))
         return;
+    note_old_syntax(token.where, word, "", {});
     fail(token.where, "unknown directive " + quoted(word) + "; remove it or correct its name");
 }
 
@@ -187,15 +241,18 @@ bool Parser::transformation(Tokenizer* tokens, const std::string& word, const Lo
     } else if (word == "Rotate") {
         const auto v = read_numbers(tokens, where, word, 4);
         if (std::fabs(v[0]) > 1e6) fail(where, "Rotate: the angle is beyond a million degrees");
-        if (v[1] == 0 && v[2] == 0 && v[3] == 0) fail(where, "Rotate: the axis is zero");
-        transform(where, [&](const Mat4& m) { return m * rotation(v[0], v[1], v[2], v[3]); });
+        const bool has_axis = v[1] != 0 || v[2] != 0 || v[3] != 0;
+        transform(
+            where, [&](const Mat4& m) { return has_axis ? m * rotation(v[0], v[1], v[2], v[3]) : scaling(0, 0, 0); },
+            "Rotate: the axis is zero");
     } else if (word == "LookAt") {
         const auto v = read_numbers(tokens, where, word, 9);
         if (!within_bounds(vec3(v, 0)) || !within_bounds(vec3(v, 3)))
             fail(where, "LookAt: the eye or the target lies beyond 1e15; scale the scene down");
         const std::optional<Mat4> look = look_at(vec3(v, 0), vec3(v, 3), vec3(v, 6));
-        if (!look) fail(where, "LookAt: the eye equals the target, or the up vector is parallel to the view direction");
-        transform(where, [&](const Mat4& m) { return m * *look; });
+        transform(
+            where, [&](const Mat4& m) { return look ? m * *look : scaling(0, 0, 0); },
+            "LookAt: the eye equals the target, or the up vector is parallel to the view direction");
     } else if (word == "Transform") {
         const Mat4 matrix = read_matrix(tokens, where, word);
         transform(where, [&](const Mat4&) { return matrix; });
@@ -203,15 +260,15 @@ bool Parser::transformation(Tokenizer* tokens, const std::string& word, const Lo
         const Mat4 matrix = read_matrix(tokens, where, word);
         transform(where, [&](const Mat4& m) { return m * matrix; });
     } else if (word == "CoordinateSystem") {
-        coordinate_systems_[read_string(tokens, where, word)] = {state_.ctm[0], state_.ctm[1]};
+        coordinate_systems_[read_string(tokens, where, word)] = {{state_.ctm[0], state_.ctm[1]},
+                                                                 {state_.fault[0], state_.fault[1]}};
     } else if (word == "CoordSysTransform") {
         const std::string name = read_string(tokens, where, word);
         const auto it = coordinate_systems_.find(name);
         if (it == coordinate_systems_.end())
             fail(where,
                  "CoordSysTransform: no coordinate system is named " + quoted(name) + "; define it with CoordinateSystem first");
-        state_.ctm[0] = it->second[0];
-        state_.ctm[1] = it->second[1];
+        for (int i = 0; i < 2; ++i) state_.ctm[i] = it->second.ctm[i], state_.fault[i] = it->second.fault[i];
     } else if (word == "ActiveTransform") {
         active_transform(tokens, where);
     } else if (word == "TransformTimes") {
@@ -233,19 +290,25 @@ void Parser::active_transform(Tokenizer* tokens, const Location& where) {
     state_.active[1] = which != "StartTime";
 }
 
-void Parser::transform(const Location& where, const std::function<Mat4(const Mat4&)>& f) {
+void Parser::transform(const Location& where, const std::function<Mat4(const Mat4&)>& f, std::string_view why) {
     for (int i = 0; i < 2; ++i) {
         if (!state_.active[i]) continue;
         state_.ctm[i] = f(state_.ctm[i]);
-        if (!inverse(state_.ctm[i])) fail(where, "the transformation becomes singular or infinite here; correct its numbers");
+        TransformFault& fault = state_.fault[i];
+        if (inverse(state_.ctm[i]))
+            fault = {};
+        else if (fault.why.empty())
+            fault = {where, std::string(why.empty() ? "it becomes singular or infinite" : why)};
     }
 }
 
-const Mat4& Parser::static_transform(const Location& where, const std::string& what) const {
+const Mat4& Parser::static_transform(const Location& where, const std::string& what) {
+    const TransformFault& fault = state_.fault[0];
+    if (!fault.why.empty())
+        fail(where, what + " cannot be placed with the transformation as it is since " + fault.where.text() + ": " + fault.why +
+                        "; correct its numbers");
     if (!(state_.ctm[0] == state_.ctm[1]))
-        fail(where, what +
-                        " moves while the shutter is open (ActiveTransform); motion is not supported, remove one of "
-                        "the transformations");
+        context_->unsupported(where, "motion", what + " moves while the shutter is open (ActiveTransform); motion");
     return state_.ctm[0];
 }
 
@@ -267,8 +330,9 @@ bool Parser::scope(Tokenizer* tokens, const std::string& word, const Location& w
         if (in_world_) fail(where, "a second WorldBegin; remove it");
         in_world_ = true;
         state_.ctm[0] = state_.ctm[1] = Mat4();
+        state_.fault[0] = state_.fault[1] = {};
         state_.active[0] = state_.active[1] = true;
-        coordinate_systems_["world"] = {Mat4(), Mat4()};
+        coordinate_systems_["world"] = {};
     } else if (word == "Include") {
         include(tokens, where);
     } else if (word == "Import") {
@@ -305,18 +369,19 @@ void Parser::close_scope(char kind, const std::string& word, const Location& whe
 
 void Parser::include(Tokenizer* tokens, const Location& where) {
     const std::string reference = read_string(tokens, where, "Include");
-    const Result<std::string> name = normalise_reference(reference);
+    const Result<std::string> name = context_->files->resolve(reference);
     if (!name.ok()) fail(where, name.status().message());
-    if (include_depth_ >= kMaxIncludeDepth)
-        fail(where, "Include is nested deeper than " + std::to_string(kMaxIncludeDepth) + " files; does " + quoted(reference) +
-                        " include itself?");
-    // Files that include each other several times multiply on every level.
+    if (const auto first = std::find(open_files_.begin(), open_files_.end(), *name); first != open_files_.end()) {
+        std::string circle;
+        for (auto file = first; file != open_files_.end(); ++file) circle += *file + " > ";
+        fail(where, "Include " + quoted(reference) + " goes round in a circle: " + circle + *name);
+    }
+    if (open_files_.size() > kMaxIncludeDepth)
+        fail(where, "Include is nested deeper than " + std::to_string(kMaxIncludeDepth) + " files");
     if (++include_count_ > kMaxIncludes)
         fail(where,
              "the scene includes files more than " + std::to_string(kMaxIncludes) + " times; put repeated content into an object");
-    ++include_depth_;
     parse_file(*name, where);
-    --include_depth_;
 }
 
 void Parser::import(Tokenizer* tokens, const Location& where) {
@@ -325,9 +390,12 @@ void Parser::import(Tokenizer* tokens, const Location& where) {
     const GraphicsState state = state_;
     const auto coordinate_systems = coordinate_systems_;
     const size_t outer = std::exchange(outer_scopes_, scopes_.size());
-    include(tokens, where);
-    if (scopes_.size() != outer_scopes_)
-        fail(where, "the imported file leaves the scope open that begins at " + scopes_.back().where.text());
+    context_->diagnostics.guard([&] {
+        include(tokens, where);
+        if (scopes_.size() != outer_scopes_)
+            fail(where, "the imported file leaves the scope open that begins at " + scopes_.back().where.text());
+    });
+    scopes_.erase(scopes_.begin() + std::ptrdiff_t(outer_scopes_), scopes_.end());
     outer_scopes_ = outer;
     state_ = state;
     coordinate_systems_ = coordinate_systems;
@@ -338,7 +406,8 @@ void Parser::attribute(Tokenizer* tokens, const Location& where) {
     if (target != "shape" && target != "light" && target != "material" && target != "medium" && target != "texture")
         fail(where, "Attribute " + quoted(target) + ": the target must be shape, light, material, medium or texture");
     const std::string what = "Attribute " + quoted(target);
-    const ParameterList list = ParameterList::parse(tokens, where, what);
+    ParameterList list = ParameterList::parse(tokens, where, what);
+    list.report_to(&context_->diagnostics);
     if (target == "shape") list.check(kShapeParameters);
     if (target == "light") list.check(kLightParameters);
     if (target == "material") list.check(kMaterialParameters);
@@ -347,16 +416,41 @@ void Parser::attribute(Tokenizer* tokens, const Location& where) {
     state_.attributes.try_emplace(target, ParameterList(where, what)).first->second.override_with(list);
 }
 
-void Parser::require_world(const Location& where, const std::string& word, bool wanted) const {
+void Parser::require_world(const Location& where, const std::string& word, bool wanted) {
     if (in_world_ == wanted) return;
-    fail(where, word + (wanted ? " must come after WorldBegin" : " must come before WorldBegin"));
+    context_->diagnostics.fault({where, word + (wanted ? " must come after WorldBegin" : " must come before WorldBegin"), {}});
+    in_world_ = true;  // Said once.
 }
 
 ParameterList Parser::parameters(Tokenizer* tokens, const Location& where, const std::string& word, const std::string& kind,
                                  const std::string& target) {
+    note_old_syntax(where, word, kind, {});
     ParameterList list = ParameterList::parse(tokens, where, word + " " + quoted(kind));
+    list.report_to(&context_->diagnostics);
     if (const auto it = state_.attributes.find(target); it != state_.attributes.end()) list.add_defaults(it->second);
+    note_old_syntax(where, word, kind, list);
     return list;
+}
+
+void Parser::note_old_syntax(const Location& where, const std::string& word, const std::string& kind, const ParameterList& list) {
+    if (context_->old_syntax || !(is_old_directive(word, kind) || has_old_parameter(word, list))) return;
+    context_->old_syntax = ImportFailure{where, word + (kind.empty() ? "" : " " + quoted(kind)), {}};
+}
+
+bool Parser::leave_out(const std::string& word, std::string* kind, ParameterList* list) {
+    bool all = false;
+    for (const FeatureRule* rule : feature_rules(word, *kind, *list)) {
+        const Parameter* p = rule->parameter.empty() ? nullptr : list->peek(rule->parameter);
+        const Location& where = p ? p->where : list->where();
+        const std::string what = p ? list->what() + ": " + quoted(p->type + " " + p->name) : list->what();
+        const bool leaves_out = context_->leaves_out(where, rule->feature);
+        if (!leaves_out && !rule->is_refused) continue;
+        if (!leaves_out)
+            context_->diagnostics.fault(
+                {where, what + " is not supported" + how_to_leave_out(rule->feature, rule->becomes), std::string(rule->feature)});
+        all = apply(*rule, kind, list) || all;
+    }
+    return all;
 }
 
 }  // namespace lightloom::import

@@ -19,12 +19,20 @@ class Parser {
     void parse_main(const std::string& name);
 
   private:
-    static constexpr int kMaxIncludeDepth = 16;
-    static constexpr int kMaxIncludes = 100000;
+    static constexpr size_t kMaxIncludeDepth = 64;
+    /// Each takes some microseconds. Text is limited, too; but files without any multiply by including one another.
+    static constexpr int kMaxIncludes = 10'000'000;
     static constexpr size_t kMaxScopeDepth = 1024;
+
+    /// Why a transformation cannot be undone: things may not be placed with it, but a file may set it and place nothing.
+    struct TransformFault {
+        Location where;
+        std::string why;  ///< Empty: it can.
+    };
 
     struct GraphicsState {
         Mat4 ctm[2];  ///< At the start and at the end of the shutter interval; only equal ones can be rendered.
+        TransformFault fault[2];
         bool active[2] = {true, true};
         bool reverse_orientation = false;
         MaterialReference material;
@@ -45,6 +53,10 @@ class Parser {
     };
 
     void parse_file(const std::string& name, const Location& from);
+    /// The file's text, inflated if it is compressed. Fails for one of another format.
+    std::string read_text(const std::string& name, const Location& from);
+    /// After a fault: to the next word that begins a directive.
+    void skip_to_directive(Tokenizer* tokens);
     void directive(Tokenizer* tokens, const Token& token);
     bool transformation(Tokenizer* tokens, const std::string& word, const Location& where);
     bool scope(Tokenizer* tokens, const std::string& word, const Location& where);
@@ -68,22 +80,33 @@ class Parser {
     /// "Word "kind" parameters" with the defaults of Attribute `target` (may be empty) added.
     ParameterList parameters(Tokenizer* tokens, const Location& where, const std::string& word, const std::string& kind,
                              const std::string& target);
-    /// Applies `f` to the transformations that ActiveTransform selects; fails if one becomes singular.
-    void transform(const Location& where, const std::function<Mat4(const Mat4&)>& f);
-    /// The transformation of a shape, light or camera; fails if it moves.
-    const Mat4& static_transform(const Location& where, const std::string& what) const;
-    void require_world(const Location& where, const std::string& word, bool wanted) const;
+    /// Deals with what features.h lists in a directive; `word` is "Material" for MakeNamedMaterial, too. True if nothing is left of
+    /// it.
+    bool leave_out(const std::string& word, std::string* kind, ParameterList* list);
+    /// Remembers the first directive of pbrt before version 4.
+    void note_old_syntax(const Location& where, const std::string& word, const std::string& kind, const ParameterList& list);
+    /// Applies `f` to the transformations that ActiveTransform selects. `why` says what is wrong with one that `f` makes singular.
+    void transform(const Location& where, const std::function<Mat4(const Mat4&)>& f, std::string_view why = {});
+    /// The transformation of a shape, light, instance or camera; fails if it moves or cannot be undone.
+    const Mat4& static_transform(const Location& where, const std::string& what);
+    void require_world(const Location& where, const std::string& word, bool wanted);
 
     Context* context_;
     GraphicsState state_;
     std::vector<Scope> scopes_;
     size_t outer_scopes_ = 0;  ///< Those of them that the file being imported may not close.
-    std::map<std::string, std::array<Mat4, 2>> coordinate_systems_;
+    struct CoordinateSystem {
+        Mat4 ctm[2];
+        TransformFault fault[2];
+    };
+    std::map<std::string, CoordinateSystem> coordinate_systems_;
     std::map<std::string, int32_t> objects_;
     std::vector<PendingInstance> instances_;
     std::map<std::string, bool> media_;
     int32_t current_object_ = kNone;
-    int include_depth_ = 0, include_count_ = 0;
+    std::vector<std::string> open_files_;  ///< The one being read and those that include it, outermost first.
+    int include_count_ = 0;
+    uint64_t text_bytes_ = 0;  ///< Of all files, as often as they are included.
     bool in_world_ = false;
 };
 

@@ -23,13 +23,19 @@ struct Property {
     Scalar type = Scalar::kFloat;
     bool is_list = false;
     Scalar count_type = Scalar::kUint8;
-    int slot = -1;  ///< Index into VertexValue for vertices; 0 marks a face's index list; -1 is skipped.
+    int slot = -1;  ///< Index into VertexValue for vertices; 0 marks the index list of faces and strips; -1 is skipped.
 };
 
 struct Element {
     std::string name;
     uint64_t count = 0;
     std::vector<Property> properties;
+
+    Property* find(std::string_view wanted, bool is_list) {
+        for (Property& p : properties)
+            if (p.name == wanted && p.is_list == is_list) return &p;
+        return nullptr;
+    }
 };
 
 enum VertexValue { kX, kY, kZ, kNx, kNy, kNz, kU, kV, kVertexValues };
@@ -58,27 +64,30 @@ std::optional<Scalar> scalar_type(std::string_view name) {
     return std::nullopt;
 }
 
-int vertex_slot(std::string_view name) {
-    constexpr std::array<std::pair<std::string_view, VertexValue>, 14> kNames{{
-        {"x", kX},
-        {"y", kY},
-        {"z", kZ},
-        {"nx", kNx},
-        {"ny", kNy},
-        {"nz", kNz},
-        {"u", kU},
-        {"v", kV},
-        {"s", kU},
-        {"t", kV},
-        {"texture_u", kU},
-        {"texture_v", kV},
-        {"texture_s", kU},
-        {"texture_t", kV},
-    }};
-    for (const auto& [text, slot] : kNames)
-        if (text == name) return slot;
-    return -1;
+/// Says what the properties of the vertices are for. Of several pairs of (u, v) pbrt takes the first in this order.
+void set_vertex_slots(Element* vertex) {
+    constexpr std::array<std::pair<std::string_view, VertexValue>, 6> kGeometry{
+        {{"x", kX}, {"y", kY}, {"z", kZ}, {"nx", kNx}, {"ny", kNy}, {"nz", kNz}}};
+    for (const auto& [name, slot] : kGeometry)
+        if (Property* p = vertex->find(name, false)) p->slot = slot;
+    constexpr std::array<std::array<std::string_view, 2>, 4> kPairs{
+        {{"u", "v"}, {"s", "t"}, {"texture_u", "texture_v"}, {"texture_s", "texture_t"}}};
+    for (const auto& [u, v] : kPairs) {
+        Property *const first = vertex->find(u, false), *const second = vertex->find(v, false);
+        if (!first || !second) continue;
+        first->slot = kU;
+        second->slot = kV;
+        return;
+    }
 }
+
+void set_index_slot(Element* faces) {
+    Property* p = faces->find("vertex_indices", true);
+    if (!p) p = faces->find("vertex_index", true);
+    if (p) p->slot = 0;
+}
+
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
 std::vector<std::string_view> split_words(std::string_view line) {
     std::vector<std::string_view> words;
@@ -100,10 +109,16 @@ class Reader {
 
   private:
     Status header();
+    std::optional<std::string_view> next_header_line();
     Status header_line(const std::vector<std::string_view>& words);
     Status check_claims() const;
     Status vertices(const Element& element, PlyMesh* mesh);
     Status faces(const Element& element, PlyMesh* mesh);
+    Status strips(const Element& element, PlyMesh* mesh);
+    Status start_index_list(const Element& element, PlyMesh* mesh) const;
+    bool is_vertex(double number) const { return number >= 0 && number < double(vertex_count_) && number == std::floor(number); }
+    /// Of face or strip `i`.
+    Status bad_index(const Element& element, uint64_t i) const;
     Status skip(const Element& element);
     bool value(Scalar type, double* out);
     bool skip_property(const Property& p);
@@ -119,12 +134,13 @@ class Reader {
     size_t pos_ = 0;
     Format format_ = Format::kAscii;
     bool have_format_ = false;
+    char line_end_ = '\n';
     std::vector<Element> elements_;
+    uint64_t vertex_count_ = 0;  ///< As the header says: faces may come first.
 };
 
 Status Reader::header_line(const std::vector<std::string_view>& words) {
     const std::string_view key = words[0];
-    if (key == "comment" || key == "obj_info") return {};
     if (key == "format") {
         if (words.size() != 3 || words[2] != "1.0") return invalid_argument("the PLY format line is not \"format KIND 1.0\"");
         if (words[1] == "ascii")
@@ -156,42 +172,55 @@ Status Reader::header_line(const std::vector<std::string_view>& words) {
         if (!p.is_list && words.size() != 3) return invalid_argument("a PLY property line is malformed");
         const auto type = scalar_type(words[p.is_list ? 3 : 1]);
         const auto count_type = p.is_list ? scalar_type(words[2]) : Scalar::kUint8;
-        if (!type || !count_type || *count_type >= Scalar::kFloat) return invalid_argument("a PLY property has an unknown type");
+        if (!type) return invalid_argument("unknown type " + quoted(std::string(words[p.is_list ? 3 : 1])) + " of a PLY property");
+        if (!count_type || *count_type >= Scalar::kFloat)
+            return invalid_argument("the count of a PLY list has the type " + quoted(std::string(words[2])) +
+                                    ", which is not one of integers");
         p.type = *type;
         p.count_type = *count_type;
         p.name = words.back();
-        if (element.name == "vertex" && !p.is_list) p.slot = vertex_slot(p.name);
-        if (element.name == "face" && p.is_list && (p.name == "vertex_indices" || p.name == "vertex_index")) p.slot = 0;
-        if (p.slot >= 0)
-            for (const Property& other : element.properties)
-                if (other.slot == p.slot)
-                    return invalid_argument("the PLY properties " + quoted(other.name) + " and " + quoted(p.name) +
-                                            " say the same thing twice");
+        if (element.find(p.name, true) || element.find(p.name, false))
+            return invalid_argument("the PLY property " + quoted(p.name) + " of element " + quoted(element.name) +
+                                    " is declared twice");
         element.properties.push_back(std::move(p));
         return {};
     }
     return invalid_argument("unknown PLY header line " + quoted(std::string(key)));
 }
 
+/// The next line without its end; nothing if there is none.
+std::optional<std::string_view> Reader::next_header_line() {
+    if (pos_ >= bytes_.size()) return std::nullopt;
+    const size_t begin = pos_, end = std::min(bytes_.find(line_end_, begin), bytes_.size());
+    pos_ = std::min(end + 1, bytes_.size());
+    return bytes_.substr(begin, end - begin);
+}
+
 Status Reader::header() {
-    if (bytes_.substr(0, 3) != "ply" || (bytes_.size() > 3 && bytes_[3] != '\n' && bytes_[3] != '\r'))
+    if (bytes_.substr(0, 3) != "ply" || (bytes_.size() > 3 && !is_blank(bytes_[3])))
         return invalid_argument("this is not a PLY file (it does not begin with \"ply\")");
-    pos_ = std::min(bytes_.find('\n'), bytes_.size());
+    // Some files end their lines with a carriage return alone.
+    const size_t end = bytes_.find_first_of("\r\n");
+    if (end != std::string_view::npos && bytes_[end] == '\r' && bytes_.substr(end + 1, 1) != "\n") line_end_ = '\r';
+    next_header_line();
     constexpr size_t kMaxProperties = 256;
     size_t lines = 0;
     for (;;) {
-        if (pos_ >= bytes_.size()) return data_loss("the PLY header has no end_header line");
-        const size_t begin = pos_ + 1;
-        pos_ = std::min(bytes_.find('\n', begin), bytes_.size());
-        if (begin > bytes_.size()) return data_loss("the PLY header has no end_header line");
-        const auto words = split_words(bytes_.substr(begin, pos_ - begin));
-        if (words.empty()) continue;
+        const std::optional<std::string_view> line = next_header_line();
+        if (!line) return data_loss("the PLY header has no end_header line");
+        const auto words = split_words(*line);
+        if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
         if (words[0] == "end_header") break;
         LL_RETURN_IF_ERROR(header_line(words));
-        if (words[0] != "comment" && ++lines > kMaxProperties) return invalid_argument("the PLY header has more than 256 lines");
+        if (++lines > kMaxProperties) return invalid_argument("the PLY header has more than 256 lines");
     }
-    pos_ = std::min(pos_ + 1, bytes_.size());
     if (!have_format_) return invalid_argument("the PLY header has no format line");
+    for (Element& element : elements_) {
+        if (element.name == "vertex") set_vertex_slots(&element);
+        if (element.name == "face" || element.name == "tristrips") set_index_slot(&element);
+    }
+    const auto vertex = std::find_if(elements_.begin(), elements_.end(), [](const Element& e) { return e.name == "vertex"; });
+    if (vertex != elements_.end()) vertex_count_ = vertex->count;
     return check_claims();
 }
 
@@ -203,7 +232,7 @@ Status Reader::check_claims() const {
         for (const Property& p : element.properties)
             record += format_ == Format::kAscii ? 2 : kScalarBytes[size_t(p.is_list ? p.count_type : p.type)];
         if (record == 0) {
-            if (element.count > 0) return invalid_argument("the PLY element " + quoted(element.name) + " has no properties");
+            if (element.count > 0 && element.name == "vertex") return invalid_argument("the PLY vertices have no properties");
             continue;
         }
         // The last ascii value needs no separator.
@@ -245,13 +274,19 @@ bool Reader::value(Scalar type, double* out) {
         pos_ += size;
         return true;
     }
-    while (pos_ < bytes_.size() && (bytes_[pos_] == ' ' || bytes_[pos_] == '\n' || bytes_[pos_] == '\r' || bytes_[pos_] == '\t'))
-        ++pos_;
+    while (pos_ < bytes_.size() && is_blank(bytes_[pos_])) ++pos_;
+    if (pos_ + 1 < bytes_.size() && bytes_[pos_] == '+' && bytes_[pos_ + 1] != '-') ++pos_;
     const char* begin = bytes_.data() + pos_;
     const auto [end, error] = std::from_chars(begin, bytes_.data() + bytes_.size(), *out);
-    if (error != std::errc()) return false;
+    if (error == std::errc::result_out_of_range) {
+        // Too small to matter, or too large for anything here.
+        const std::string_view text(begin, size_t(end - begin));
+        *out = text.find("e-") != text.npos || text.find("E-") != text.npos ? 0.0 : double(INFINITY);
+    } else if (error != std::errc()) {
+        return false;
+    }
     pos_ += size_t(end - begin);
-    return pos_ == bytes_.size() || bytes_[pos_] == ' ' || bytes_[pos_] == '\n' || bytes_[pos_] == '\r' || bytes_[pos_] == '\t';
+    return pos_ == bytes_.size() || is_blank(bytes_[pos_]);
 }
 
 bool Reader::skip_property(const Property& p) {
@@ -308,26 +343,38 @@ Status Reader::vertices(const Element& element, PlyMesh* mesh) {
     return {};
 }
 
-Status Reader::faces(const Element& element, PlyMesh* mesh) {
+Status Reader::start_index_list(const Element& element, PlyMesh* mesh) const {
     bool has_indices = false;
     for (const Property& p : element.properties) {
         has_indices = has_indices || p.slot == 0;
-        if (p.slot < 0 && p.name != "face_indices") mesh->ignored_properties.push_back("face " + p.name);
+        if (p.slot < 0 && p.name != "face_indices") mesh->ignored_properties.push_back(element.name + " " + p.name);
     }
-    if (!has_indices && element.count > 0) return invalid_argument("the PLY faces have no vertex_indices list");
-    const double vertex_count = double(mesh->positions.size());
+    if (!has_indices && element.count > 0)
+        return invalid_argument("the PLY element " + quoted(element.name) + " has no vertex_indices list");
+    return {};
+}
+
+Status Reader::bad_index(const Element& element, uint64_t i) const {
+    return invalid_argument("the PLY " + (element.name == "face" ? element.name : "triangle strip") + " " + std::to_string(i) +
+                            " refers to a vertex that does not exist (the mesh has " + std::to_string(vertex_count_) + ")");
+}
+
+Status Reader::faces(const Element& element, PlyMesh* mesh) {
+    LL_RETURN_IF_ERROR(start_index_list(element, mesh));
     mesh->indices.reserve(element.count * 3);
+    uint32_t face = 0;  // Number of those that are kept.
     for (uint64_t i = 0; i < element.count; ++i)
         for (const Property& p : element.properties) {
-            if (p.slot < 0) {
+            const size_t begin = pos_;
+            double count = 0;
+            if (p.slot >= 0 && !value(p.count_type, &count)) return ended(element, i);
+            if (p.slot < 0 || (count >= 0 && count < 3)) {
+                pos_ = begin;
                 if (!skip_property(p)) return ended(element, i);
+                mesh->skipped_faces += p.slot >= 0;
                 continue;
             }
-            double count = 0;
-            if (!value(p.count_type, &count)) return ended(element, i);
-            if (count < 3)
-                return invalid_argument("the PLY face " + std::to_string(i) + " has " + std::to_string(int64_t(count)) +
-                                        " vertices; it needs three or more");
+            if (count < 0) return invalid_argument("the PLY face " + std::to_string(i) + " has a negative number of vertices");
             // Up to the first polygon, every face is the triangle of the same number.
             mesh->has_polygons = mesh->has_polygons || count > 4;
             const bool polygons = count > 3 || !mesh->faces.empty();
@@ -336,21 +383,54 @@ Status Reader::faces(const Element& element, PlyMesh* mesh) {
             for (double corner = 0; corner < count; ++corner) {
                 double number = 0;
                 if (!value(p.type, &number)) return ended(element, i);
-                if (!(number >= 0 && number < vertex_count) || number != std::floor(number))
-                    return invalid_argument("the PLY face " + std::to_string(i) +
-                                            " refers to a vertex that does not exist (the mesh has " +
-                                            std::to_string(mesh->positions.size()) + ")");
+                if (!is_vertex(number)) return bad_index(element, i);
                 const uint32_t index = uint32_t(number);
                 if (corner >= 2) mesh->indices.insert(mesh->indices.end(), {first, previous, index});
-                if (corner >= 2 && polygons) mesh->faces.push_back(uint32_t(i));
+                if (corner >= 2 && polygons) mesh->faces.push_back(face);
                 if (corner == 0) first = index;
                 previous = index;
+            }
+            ++face;
+        }
+    return {};
+}
+
+/// Every vertex but two makes a triangle with the two before it, every other one turned round; a negative number starts anew.
+Status Reader::strips(const Element& element, PlyMesh* mesh) {
+    LL_RETURN_IF_ERROR(start_index_list(element, mesh));
+    for (uint64_t i = 0; i < element.count; ++i)
+        for (const Property& p : element.properties) {
+            if (p.slot < 0) {
+                if (!skip_property(p)) return ended(element, i);
+                continue;
+            }
+            double count = 0;
+            if (!value(p.count_type, &count)) return ended(element, i);
+            uint32_t before[2] = {};
+            size_t length = 0;
+            for (double k = 0; k < count; ++k) {
+                double number = 0;
+                if (!value(p.type, &number)) return ended(element, i);
+                if (number < 0) {
+                    length = 0;
+                    continue;
+                }
+                if (!is_vertex(number)) return bad_index(element, i);
+                const uint32_t index = uint32_t(number);
+                if (length >= 2) {
+                    const size_t odd = length % 2;
+                    mesh->indices.insert(mesh->indices.end(), {before[odd], before[1 - odd], index});
+                }
+                before[0] = before[1];
+                before[1] = index;
+                ++length;
             }
         }
     return {};
 }
 
 Status Reader::skip(const Element& element) {
+    if (element.properties.empty()) return {};
     for (uint64_t i = 0; i < element.count; ++i)
         for (const Property& p : element.properties)
             if (!skip_property(p)) return ended(element, i);
@@ -359,22 +439,27 @@ Status Reader::skip(const Element& element) {
 
 Status Reader::read(PlyMesh* mesh) {
     LL_RETURN_IF_ERROR(header());
+    if (vertex_count_ > UINT32_MAX) return invalid_argument("the PLY mesh has more than 2^32 vertices");
+    // Strips are an older way to write faces: of files that have both, only the faces are read.
+    const bool has_faces =
+        std::any_of(elements_.begin(), elements_.end(), [](const Element& e) { return e.name == "face" && e.count > 0; });
+    const std::string_view index_element = has_faces ? "face" : "tristrips";
     bool seen_vertices = false, seen_faces = false;
     for (const Element& element : elements_) {
         if (element.name == "vertex" && !seen_vertices) {
-            if (element.count > UINT32_MAX) return invalid_argument("the PLY mesh has more than 2^32 vertices");
             LL_RETURN_IF_ERROR(vertices(element, mesh));
             seen_vertices = true;
-        } else if (element.name == "face" && !seen_faces) {
-            if (!seen_vertices) return invalid_argument("the PLY faces come before the vertices");
-            LL_RETURN_IF_ERROR(faces(element, mesh));
+        } else if (element.name == index_element && !seen_faces) {
+            LL_RETURN_IF_ERROR(has_faces ? faces(element, mesh) : strips(element, mesh));
             seen_faces = true;
         } else {
             LL_RETURN_IF_ERROR(skip(element));
         }
     }
-    if (!seen_vertices || !seen_faces) return invalid_argument("the PLY file has no vertex or no face element");
-    if (mesh->indices.empty()) return invalid_argument("the PLY mesh has no faces");
+    if (!seen_vertices || !seen_faces) return invalid_argument("the PLY file has no vertices or no faces");
+    if (mesh->skipped_faces > 0 && mesh->indices.empty())
+        return invalid_argument("no face of the PLY mesh has three or more vertices");
+    if (mesh->indices.empty()) return invalid_argument("the PLY mesh has no triangles");
     return {};
 }
 

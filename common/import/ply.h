@@ -16,10 +16,12 @@ struct PlyMesh {
     std::vector<uint32_t> indices;
     std::vector<uint32_t> faces;                  ///< The face of every triangle; empty if all faces are triangles.
     bool has_polygons = false;                    ///< Faces of more than four vertices.
+    size_t skipped_faces = 0;                     ///< Those of fewer than three vertices, which are left out.
     std::vector<std::string> ignored_properties;  ///< Vertex and face properties that nothing here uses.
 };
 
-/// Decodes a PLY file. Polygons become fans of triangles around their first vertex. Reserves no more memory than the
+/// Decodes a PLY file. Polygons become fans of triangles around their first vertex, triangle strips triangles. Elements may come
+/// in any order; those that nothing here uses, and what follows the last one, are skipped. Reserves no more memory than the
 /// data can fill, whatever the header claims; every index is checked and every position and (u, v) is finite. The error
 /// message does not name the file.
 Result<PlyMesh> read_ply(std::string_view bytes);

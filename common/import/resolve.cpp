@@ -116,18 +116,21 @@ void add_shape(Context* context, PendingShape shape) {
 }  // namespace
 
 void resolve_shapes(Context* context) {
-    for (PendingShape& shape : context->shapes) add_shape(context, std::move(shape));
+    Diagnostics& d = context->diagnostics;
+    for (PendingShape& shape : context->shapes) d.guard([&] { add_shape(context, std::move(shape)); });
     context->shapes.clear();
     // Definitions that no shape uses are still checked: a typing error in them should not wait for their first use.
     for (const auto& [name, definition] : context->named_materials)
-        resolve_material_reference(context, {true, name, 0, definition.parameters.where()});
+        d.guard([&] { resolve_material_reference(context, {true, name, 0, definition.parameters.where()}); });
     for (size_t i = 1; i < context->anonymous_materials.size(); ++i)
-        resolve_material_reference(context, {false, "", int(i), context->anonymous_materials[i].parameters.where()});
+        d.guard([&] {
+            resolve_material_reference(context, {false, "", int(i), context->anonymous_materials[i].parameters.where()});
+        });
     for (const auto& [name, definition] : context->float_textures)
-        named_texture(context, definition.parameters.where(), name, TextureUse::kFloat);
+        d.guard([&] { named_texture(context, definition.parameters.where(), name, TextureUse::kFloat); });
     for (const auto& [name, definition] : context->spectrum_textures) {
         const bool used = context->resolved_textures.contains({name, TextureUse::kUnbounded});
-        if (!used) named_texture(context, definition.parameters.where(), name, TextureUse::kReflectance);
+        if (!used) d.guard([&] { named_texture(context, definition.parameters.where(), name, TextureUse::kReflectance); });
     }
 }
 

@@ -136,6 +136,9 @@ TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const S
         context->diagnostics.warn(parameters.where(), quoted(reference) +
                                                           ": faces of more than four vertices become fans of "
                                                           "triangles; pbrt leaves them out");
+    if (ply->skipped_faces > 0)
+        context->diagnostics.warn(parameters.where(), quoted(reference) + ": " + std::to_string(ply->skipped_faces) +
+                                                          " faces of fewer than three vertices are left out, as in pbrt");
     TriangleMesh mesh;
     mesh.positions = std::move(ply->positions);
     mesh.normals = std::move(ply->normals);

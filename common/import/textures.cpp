@@ -21,7 +21,7 @@ std::string read_spectrum_file(Context* context, const Parameter& p, const std::
     const std::string given = what + ": " + quoted("spectrum " + p.name) + " is " + quoted(name);
     if (is_named_spectrum(name))
         fail(p.where, given + ", a spectrum that is known by name but not supported here; give its values or a file");
-    const Result<std::string> path = normalise_reference(name);
+    const Result<std::string> path = context->files->resolve(name);
     if (!path.ok()) fail(p.where, given + ": " + path.status().message());
     Result<std::string> text = context->files->read(*path);
     if (text.ok()) return std::move(text).value();
@@ -220,13 +220,17 @@ TextureId named_texture(Context* context, const Location& where, const std::stri
     if (resolved.size() > 300000) fail(where, "the scene has more than 300000 textures");
     resolved[{name, use}] = kInProgress;
     if (++context->texture_depth > kMaxNesting) fail(where, "textures refer to one another more than 31 levels deep");
-    const TextureId id = make_texture(context, it->second, use);
+    const TextureId id = context->resolve_or<TextureId>([&] { return constant_texture(context, Rgb(0.5f)); },
+                                                        [&] {
+                                                            const TextureId made = make_texture(context, it->second, use);
+                                                            it->second.parameters.finish();
+                                                            return made;
+                                                        });
     --context->texture_depth;
     const TextureCost cost = context->texture_costs[size_t(id)];
     if (cost.levels > kMaxNesting) fail(where, "textures refer to one another more than 31 levels deep");
     if (cost.visits > kMaxVisits)
         fail(where, "the texture " + quoted(name) + " needs more than 4096 look-ups; use fewer textures in one another");
-    it->second.parameters.finish();
     resolved[{name, use}] = id;
     return id;
 }

@@ -25,13 +25,12 @@ Token Tokenizer::next() {
 void Tokenizer::scan() {
     while (pos_ < text_.size()) {
         const char c = text_[pos_];
-        if (c == '\n') {
-            ++line_;
-            ++pos_;
-        } else if (is_space(c)) {
+        if (is_space(c)) {
+            // A carriage return alone ends a line, too: in comments it has to.
+            line_ += c == '\n' || (c == '\r' && (pos_ + 1 == text_.size() || text_[pos_ + 1] != '\n'));
             ++pos_;
         } else if (c == '#') {
-            while (pos_ < text_.size() && text_[pos_] != '\n') ++pos_;
+            while (pos_ < text_.size() && text_[pos_] != '\n' && text_[pos_] != '\r') ++pos_;
         } else {
             break;
         }

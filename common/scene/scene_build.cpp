@@ -155,7 +155,7 @@ Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions
             return invalid_argument("the film's crop window is empty or outside of the frame");
     }
     if (frame.crop.area() > kMaxPartialPixels)
-        return invalid_argument("the resolution gives " + std::to_string(frame.crop.area()) + " pixels to render; at most " +
+        return invalid_argument("the resolution gives " + pixels_and_memory(frame.crop.area()) + "; at most " +
                                 std::to_string(kMaxPartialPixels) + " are possible");
     return frame;
 }

@@ -20,6 +20,20 @@ std::optional<std::string_view> take_line(std::string_view& text) {
     return line;
 }
 
+/// "a,b,c": lower-case letters, digits and hyphens, ascending.
+bool parse_names(std::string_view text, std::vector<std::string>* names) {
+    for (size_t begin = 0; begin <= text.size();) {
+        const size_t end = std::min(text.find(',', begin), text.size());
+        std::string name(text.substr(begin, end - begin));
+        const auto plain = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-'; };
+        if (name.empty() || name.size() > 64 || !std::all_of(name.begin(), name.end(), plain)) return false;
+        if (!names->empty() && !(names->back() < name)) return false;
+        names->push_back(std::move(name));
+        begin = end + 1;
+    }
+    return true;
+}
+
 Status bad_line(int number, std::string_view what) {
     return invalid_argument("scene file list, line " + std::to_string(number) + ": " + std::string(what));
 }
@@ -49,6 +63,8 @@ Status validate_asset_path(std::string_view path) {
 std::string AssetManifest::canonical_text() const {
     std::string text(kHeader);
     text += "\nmain " + main + "\n";
+    for (size_t i = 0; i < without.size(); ++i) text += (i == 0 ? "without " : ",") + without[i];
+    if (!without.empty()) text += "\n";
     for (const AssetEntry& e : entries) {
         text += e.digest.hex() + " " + std::to_string(e.size_bytes) + " " + e.path + "\n";
     }
@@ -65,6 +81,13 @@ Result<AssetManifest> AssetManifest::parse(std::string_view text) {
     ++number;
     if (!line || !line->starts_with("main ")) return bad_line(number, "expected \"main PATH\"");
     manifest.main = line->substr(5);
+    constexpr std::string_view kWithout = "without ";
+    if (text.starts_with(kWithout)) {
+        line = take_line(text);
+        ++number;
+        if (!line || !parse_names(line->substr(kWithout.size()), &manifest.without))
+            return bad_line(number, "expected \"without NAME,NAME...\" in ascending order");
+    }
     while (!text.empty()) {
         line = take_line(text);
         ++number;
@@ -90,10 +113,14 @@ Result<AssetManifest> AssetManifest::parse(std::string_view text) {
     return manifest;
 }
 
-Result<AssetManifest> AssetManifest::of_files(const std::filesystem::path& directory, const std::vector<std::string>& files) {
+Result<AssetManifest> AssetManifest::of_files(const std::filesystem::path& directory, const std::vector<std::string>& files,
+                                              std::vector<std::string> without) {
     if (files.empty()) return invalid_argument("a scene needs at least one file");
     AssetManifest manifest;
     manifest.main = files.front();
+    std::sort(without.begin(), without.end());
+    without.erase(std::unique(without.begin(), without.end()), without.end());
+    manifest.without = std::move(without);
     for (const std::string& file : files) {
         LL_RETURN_IF_ERROR(validate_asset_path(file));
         AssetEntry entry{.path = file};

@@ -27,6 +27,9 @@ struct AssetEntry {
 struct AssetManifest {
     std::string main;  ///< Path of the scene file; one of the entries.
     std::vector<AssetEntry> entries;
+    /// What is left out of the scene when it is read: ImportOptions::without, ascending, no name twice. The scene's root depends on
+    /// it, so that all who read the scene see the same one.
+    std::vector<std::string> without;
 
     /// The canonical text that proto/lightloom/v1/asset_service.proto describes.
     std::string canonical_text() const;
@@ -36,7 +39,8 @@ struct AssetManifest {
     static Result<AssetManifest> parse(std::string_view text);
     /// Hashes files below `directory`; the first is the main file. Fails on a name that may not travel or a file that
     /// cannot be read.
-    static Result<AssetManifest> of_files(const std::filesystem::path& directory, const std::vector<std::string>& files);
+    static Result<AssetManifest> of_files(const std::filesystem::path& directory, const std::vector<std::string>& files,
+                                          std::vector<std::string> without = {});
 };
 
 /// Relative, UTF-8, no empty, "." or ".." component, no backslash, no control character, components up to 255 bytes.

@@ -273,6 +273,14 @@ TEST(Coordinator, OpensOnlyGroupsThatTheRoomForWaitingPartialsHolds) {
     EXPECT_EQ(units_in_flight(5 * group_bytes), 6u);
 }
 
+TEST(Coordinator, AFrameThatTheMemoryCannotHoldIsRefusedWithWhatItTakes) {
+    FakeService service(whole(4000, 1000), std::nullopt, [](CoordinatorOptions& o) { o.memory_bytes = 1'000'000'000; });
+    const JobInfo job = service.wait_end(service.submit(service.spec(1)));
+    EXPECT_EQ(job.state, JobState::kFailed);
+    for (const char* part : {"4000000 pixels", "take 2 GB", "host has 1 GB"})
+        EXPECT_NE(job.message.find(part), std::string::npos) << job.message;
+}
+
 TEST(Coordinator, ForgetsTheOldestEndedJobsOnly) {
     FakeService service(whole(40, 30), std::nullopt, [](CoordinatorOptions& o) { o.kept_jobs = 2, o.max_jobs = 3; });
     const std::string running = service.submit(service.spec(1));

@@ -225,6 +225,8 @@ TEST(Results, ReplayCommandsAreOneShellCommand) {
     spec.algorithm = testing::algorithm_of("path", {{"rr-start", "6"}});
     const std::string plain = replay_command(spec, "room/a-b.pbrt", {{0, 0}, {3, 6, false}});
     EXPECT_EQ(plain.find('\''), std::string::npos) << plain;
+    EXPECT_NE(replay_command(spec, "a.pbrt", {{0, 0}, {3, 6, false}}, {"bump", "media"}).find(" --without bump,media --seed "),
+              std::string::npos);
     const std::string scene = "my room; it's \"$HOME\" `x`.pbrt";
     const std::string command = "printf '%s|' " + replay_command(spec, scene, {{0, 0}, {3, 6, false}});
     FILE* shell = ::popen(command.c_str(), "r");

@@ -77,6 +77,37 @@ Digest embedded(const Service& service, int workers, int threads, const std::vec
     return service.digest(name);
 }
 
+/// Files beside the scene's directory travel, and what is left out is left out by everybody.
+TEST(Processes, AllLeaveTheSameOutAndSeeTheSameRoot) {
+    const Service service;
+    std::filesystem::create_directories(service.path("house/rooms"));
+    const std::string scene = service.path("house/rooms/scene.pbrt");
+    std::ofstream(scene) << "Film \"rgb\" PixelFilter \"box\" LookAt 0 0 -4 0 0 0 0 1 0 Camera \"perspective\" \"float fov\" 40\n"
+                            "WorldBegin LightSource \"infinite\" MediumInterface \"fog\" \"\"\nInclude \"../ball.pbrt\"\n";
+    std::ofstream(service.path("house/ball.pbrt")) << "Material \"hair\" Shape \"sphere\"\nShape \"curve\"\n";
+    std::vector<std::string> job{"--without", "media,hair,curves,motion", "--resolution", "16x16", "--spp", "4"};
+    const auto run = [&](const std::string& name, std::vector<std::string> arguments) {
+        arguments.insert(arguments.end(), {"-o", service.path(name + ".exr")});
+        arguments.insert(arguments.end(), job.begin(), job.end());
+        return Process("lightloom", arguments, service.path(name + ".log")).wait();
+    };
+    const auto worker = service.worker("worker", 1);
+    ASSERT_EQ(run("embedded", {"render", scene, "--threads", "1"}), 0) << service.log("embedded");
+    ASSERT_EQ(run("service", {"submit", scene, "--server", service.address()}), 0)
+        << service.log("service") << service.log("worker");
+    EXPECT_EQ(service.digest("embedded"), service.digest("service"));
+    for (const char* name : {"embedded", "service"}) {
+        const Json spec = service.manifest(name)["spec"];
+        EXPECT_EQ(spec["scene"], "rooms/scene.pbrt");
+        EXPECT_EQ(spec["without"], Json({"curves", "hair", "media"}));
+    }
+    EXPECT_NE(service.log("service").find("left out: curves (1, first at ../ball.pbrt:2)"), std::string::npos)
+        << service.log("service");
+    job[1] = "media,hair";
+    EXPECT_EQ(run("refused", {"submit", scene, "--server", service.address()}), 2);
+    EXPECT_NE(service.log("refused").find("--without curves"), std::string::npos) << service.log("refused");
+}
+
 TEST(Processes, BytesAreTheSameHoweverAJobIsRun) {
     const Service service({"--shuffle-leases", "11"});
     const Digest reference = embedded(service, 1, 1, kJob);

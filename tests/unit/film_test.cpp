@@ -344,6 +344,15 @@ TEST(PartialExr, RoundTripsBitForBit) {
     }
 }
 
+/// One line of more than 2^31 bytes cannot be stored, however few pixels of a large frame have a splat.
+TEST(PartialExr, SparseSplatsStayWithinALine) {
+    const FrameLayout large{16384, 16384, {0, 0, 16384, 16384}};
+    const Rect tile{0, 0, 1, 1};
+    constexpr uint64_t kMost = uint64_t(INT32_MAX) / 28;
+    EXPECT_LT(partial_payload_size(large, tile, kMost), (uint64_t(1) << 31) + 4096);
+    EXPECT_GT(partial_payload_size(large, tile, kMost + 1), uint64_t(16384) * 16384 * 24);
+}
+
 TEST(PartialExr, IsAnExrThatOpenExrReads) {
     const uint32_t area = uint32_t(kFrame.crop.area());
     for (const uint32_t splats : {0u, 50u, area}) {

@@ -277,6 +277,18 @@ TEST(AssetManifest, CanonicalTextIsTheOnlyOneAccepted) {
             EXPECT_EQ(parsed->canonical_text(), changed);
         }
     }
+    // What is left out is part of the scene.
+    const auto without = AssetManifest::of_files(directory.path, {"scene.pbrt", "meshes/a.ply"}, {"media", "bump", "media"});
+    ASSERT_TRUE(without.ok());
+    EXPECT_NE(without->root(), manifest->root());
+    const auto parsed = AssetManifest::parse(without->canonical_text());
+    ASSERT_TRUE(parsed.ok()) << parsed.status().message();
+    EXPECT_EQ(parsed->without, (std::vector<std::string>{"bump", "media"}));
+    EXPECT_EQ(parsed->entries.size(), 2u);
+    for (const char* bad : {"", "media,bump", "bump,bump", "bump,", ",bump", "Bump", "bump media"}) {
+        std::string changed = without->canonical_text();
+        EXPECT_FALSE(AssetManifest::parse(changed.replace(changed.find("bump,media"), 10, bad)).ok()) << bad;
+    }
     EXPECT_FALSE(AssetManifest::of_files(directory.path, {"../x"}).ok());
     EXPECT_EQ(AssetManifest::of_files(directory.path, {"none"}).status().code(), StatusCode::kNotFound);
 }
