@@ -67,29 +67,21 @@ float read_index(Context* context, const ParameterList& p, std::string_view name
     return index;
 }
 
-/// The metal that "metal-Cu-eta" names together with its property; nothing for any other spectrum.
-std::optional<ConductorRgb> metal_of(const Parameter* p, std::string_view property) {
-    if (!p || p->strings.size() != 1 || !has_suffix(p->strings[0], property)) return std::nullopt;
-    return named_metal(p->strings[0].substr(0, p->strings[0].size() - property.size()));
-}
-
 /// The reflectance or eta and k of a conductor; `prefix` is "" or "conductor.".
 void read_conductor(Context* context, const ParameterList& p, const std::string& prefix, Material* m) {
     m->reflectance = spectrum_texture_parameter(context, p, "reflectance", TextureUse::kReflectance);
     const std::string eta_name = prefix + "eta", k_name = prefix + "k";
     if (m->reflectance != kNone) {
         for (const std::string_view name : {eta_name, k_name})
-            for (const std::string_view type : {"rgb", "spectrum", "texture"})
+            for (const std::string_view type : {"rgb", "spectrum", "blackbody", "texture"})
                 if (p.find(type, name))
                     fail(p.where(), p.what() + ": give either reflectance or " + eta_name + " and " + k_name + ", not both");
         return;
     }
     const Parameter *eta = p.find("spectrum", eta_name), *k = p.find("spectrum", k_name);
-    // A metal's eta and k are reduced together, see spectra.h.
-    const std::optional<ConductorRgb> eta_metal = metal_of(eta, "-eta"), k_metal = metal_of(k, "-k");
-    if (eta_metal) m->eta = constant_texture(context, eta_metal->eta);
-    if (k_metal) m->k = constant_texture(context, k_metal->k);
-    if (eta && k && !eta_metal && !k_metal) {
+    const auto is_named = [](const Parameter* s) { return s && s->strings.size() == 1 && named_index(s->strings[0]); };
+    // A metal's eta and k are reduced together, see spectra.h; those of a name have been.
+    if (eta && k && !is_named(eta) && !is_named(k)) {
         const ConductorRgb both = conductor_rgb(*spectrum_parameter(context, p, eta_name), *spectrum_parameter(context, p, k_name));
         m->eta = constant_texture(context, both.eta);
         m->k = constant_texture(context, both.k);
