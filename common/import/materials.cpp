@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "common/import/context.h"
+#include "common/import/images.h"
 #include "common/import/spectra.h"
 
 namespace lightloom::import {
@@ -141,17 +142,39 @@ void read_mix(Context* context, const ParameterList& p, Material* m) {
     if (m->mix_amount == kNone) m->mix_amount = constant_texture(context, Rgb(0.5f));
 }
 
+void read_bump(Context* context, const ParameterList& p, Material* m) {
+    const std::string reference = p.one_string("normalmap", "");
+    if (reference.empty()) {
+        m->displacement = float_texture_parameter(context, p, "displacement");
+        return;
+    }
+    p.ignore(&context->diagnostics, "displacement", "beside a normal map it is not used, as in pbrt");
+    const Location& where = p.find("string", "normalmap")->where;
+    if (has_fixed_encoding(reference))
+        context->diagnostics.warn(where, p.what() + ": the normals of " + quoted(reference) +
+                                             " are decoded as sRGB, as in pbrt, which takes JPEG and TGA files for nothing else; "
+                                             "convert it to PNG");
+    ImageRequest request;
+    request.srgb = false;
+    TextureNode node;
+    node.kind = TextureKind::kImage;
+    node.image = context->load_image(where, reference, request);
+    if (context->scene.images[size_t(node.image)].channels != 3)
+        fail(where, p.what() + ": the normal map " + quoted(reference) + " has no red, green and blue channels");
+    m->normal_map = add_node(context, node);
+}
+
 /// Index of the new material, or kInterfaceMaterial.
 MaterialId make_material(Context* context, const std::string& name, const Definition& definition) {
     const ParameterList& p = definition.parameters;
     const std::string& kind = definition.kind;
     p.accept("string", "type");
-    p.refuse("normalmap", "normal maps change the picture; remove the parameter to render without");
-    p.refuse("displacement", "bump maps change the picture; remove the parameter to render without");
     Material m;
     m.name = name;
     m.remap_roughness = true;
     if (kind == "interface" || kind == "none" || kind.empty()) {
+        for (const std::string_view map : {"displacement", "normalmap"})
+            p.ignore(&context->diagnostics, map, "a shape of this material has no surface");
         p.finish();
         return kInterfaceMaterial;
     }
@@ -203,11 +226,15 @@ MaterialId make_material(Context* context, const std::string& name, const Defini
     } else if (kind == "mix") {
         m.kind = MaterialKind::kMix;
         read_mix(context, p, &m);
+        constexpr const char* kElsewhere = "a mix is one of its materials at every point; give it to those";
+        p.ignore(&context->diagnostics, "normalmap", kElsewhere);  // as pbrt does, which refuses the other
+        p.refuse("displacement", kElsewhere);
     } else {
         fail(p.where(), p.what() + ": the material " + quoted(kind) +
                             " is not supported; use diffuse, diffusetransmission, conductor, dielectric, "
                             "thindielectric, coateddiffuse, coatedconductor, mix or interface");
     }
+    if (m.kind != MaterialKind::kMix) read_bump(context, p, &m);
     p.finish();
     const MaterialId id = MaterialId(context->scene.materials.size());
     if (m.kind == MaterialKind::kMix)

@@ -77,6 +77,8 @@ class Scene {
   private:
     Scene() = default;
     void collect_emitters(std::vector<Emitter>* emitters);
+    /// The shading frame of a material with a displacement or normal map. Of a mix, the point's material becomes the one chosen.
+    void tilt(const RawHit& hit, SurfacePoint* point) const;
     float smallest_reach(const Bounds3& bounds) const;
     void summarise();
     void triangle_point(const TriangleMesh& mesh, const RawHit& hit, SurfacePoint* out) const;
@@ -89,6 +91,7 @@ class Scene {
     std::vector<int32_t> sphere_emitter_;      // per world sphere
     std::vector<Mat4> instance_inverse_;
     std::vector<std::string> light_sources_;  // where each light group came from
+    std::vector<uint8_t> tilts_;              // per material, whether tilt() has to look at it; empty if none
     EmitterSet emitters_;
     Camera camera_;
     /// Largest coordinate magnitude in the whole scene, at most 1/4: in a scene of ordinary size small primitives keep the

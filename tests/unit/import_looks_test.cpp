@@ -83,8 +83,6 @@ TEST(ImportMaterial, InterfaceShapesDoNotExist) {
 
 TEST(ImportMaterial, WhatIsNotModelledIsNamed) {
     expect_error("Material \"hair\"", {"hair", "not supported"});
-    expect_error("Material \"diffuse\" \"string normalmap\" \"n.png\"", {"normal maps"});
-    expect_error("Material \"diffuse\" \"texture displacement\" \"d\"", {"bump"});
     expect_error("Material \"diffuse\" \"rgb reflectance\" [1.5 0 0]", {"above 1"});
     expect_error("Material \"diffuse\" \"rgb reflectance\" [-1 0 0]", {"negative"});
     expect_error("Material \"diffuse\" \"float reflectance\" 0.5", {"wrong type"});
