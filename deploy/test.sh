@@ -32,8 +32,8 @@ cmake --build --preset fuzz
 seconds=${LIGHTLOOM_FUZZ_SECONDS:-60}
 corpus=$(mktemp -d)
 trap 'rm -rf "$corpus"' EXIT
-declare -A dictionary=([pbrt]="-dict=$root/tests/fuzz/pbrt.dict" [ply]=)
-for target in pbrt ply; do
+declare -A dictionary=([pbrt]="-dict=$root/tests/fuzz/pbrt.dict" [ply]= [pfm]=)
+for target in pbrt ply pfm; do
     mkdir "$corpus/$target"
     (cd "$corpus" && "$root/build/fuzz/bin/${target}_fuzz" -max_total_time="$seconds" -rss_limit_mb=2048 -timeout=20 \
         -verbosity=0 -print_funcs=0 ${dictionary[$target]} -print_final_stats=1 "$corpus/$target" "$root/tests/fuzz/corpus/$target")

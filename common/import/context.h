@@ -146,9 +146,11 @@ TextureId named_texture(Context* context, const Location& where, const std::stri
 /// Parameter `name` as "float" or "texture"; kNone if absent.
 TextureId float_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name);
 
-/// Parameter `name` as "rgb", "spectrum" or "texture"; kNone if absent. Not kFloat.
+/// Parameter `name` as "rgb", "spectrum", "blackbody" or "texture"; kNone if absent. Not kFloat.
 TextureId spectrum_texture_parameter(Context* context, const ParameterList& parameters, std::string_view name, TextureUse use);
 
+/// The temperature of a parameter of type "blackbody"; fails if it is not one or out of range. `what` names the directive.
+double kelvin_of(const Parameter& p, const std::string& what);
 /// Parameter `name` of type "spectrum" read from its values or file; nothing if absent.
 std::optional<Spectrum> spectrum_parameter(Context* context, const ParameterList& parameters, std::string_view name);
 

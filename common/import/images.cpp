@@ -9,6 +9,7 @@
 #include "common/import/diagnostics.h"
 #include "common/import/exr_image.h"
 #include "common/import/file_source.h"
+#include "common/import/pfm_image.h"
 
 // The decoder for the small formats; everything that would touch files or allocate without bound is switched off.
 #define STB_IMAGE_STATIC
@@ -169,7 +170,7 @@ Result<Image> read_image(const std::string& name, const std::string& bytes, cons
     const std::string extension = lower_extension(name);
     if (bytes.size() > (size_t(1) << 30)) return invalid_argument("the image file is larger than 1 GiB");
     Result<Image> image =
-        invalid_argument("images of type " + quoted(extension) + " are not supported; use png, jpg, tga, hdr or exr");
+        invalid_argument("images of type " + quoted(extension) + " are not supported; use png, jpg, tga, hdr, pfm or exr");
     if (extension == "exr") {
         Result<ExrPixels> exr = read_exr(bytes);
         if (!exr.ok()) return exr.status();
@@ -178,6 +179,14 @@ Result<Image> read_image(const std::string& name, const std::string& bytes, cons
         out.height = exr->height;
         fill(&out, exr->values.data(), exr->channels, true, request, 1.0f, {});
         if (request.channels == ImageChannels::kColour && out.channels == 3) to_srgb_primaries(exr->primaries, &out, &out_of_gamut);
+        image = std::move(out);
+    } else if (extension == "pfm") {
+        const Result<PfmPixels> pfm = read_pfm(bytes, warning);
+        if (!pfm.ok()) return pfm.status();
+        Image out;
+        out.width = pfm->width;
+        out.height = pfm->height;
+        fill(&out, pfm->values.data(), pfm->channels, false, request, 1.0f, {});
         image = std::move(out);
     } else if (has_fixed_encoding(name)) {
         image = read_with_stb(bytes, {request.channels});
@@ -194,8 +203,11 @@ Result<Image> read_image(const std::string& name, const std::string& bytes, cons
             negative = negative || v < 0;
             v = std::max(v, 0.0f);
         }
-        if (negative) *warning = "negative values become 0, as in pbrt";
-        if (out_of_gamut) *warning = "colours outside of sRGB's gamut lose saturation at equal luminance";
+        const auto warn = [&](const char* text) { *warning += (warning->empty() ? "" : "; ") + std::string(text); };
+        if (out_of_gamut)
+            warn("colours outside of sRGB's gamut lose saturation at equal luminance");
+        else if (negative)
+            warn("negative values become 0, as in pbrt");
     }
     return image;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Image files to Image: PNG, JPEG, TGA and HDR through stb_image, EXR through OpenEXR.
+// Image files to Image: PNG, JPEG, TGA and HDR through stb_image, EXR through OpenEXR, PFM by our own reader.
 
 #include <string>
 
@@ -27,7 +27,7 @@ bool has_fixed_encoding(const std::string& name);
 
 /// Decodes `bytes` of the file `name` (its extension selects the format). Dimensions are checked against the size of
 /// the data before anything of their size is allocated. Values that are not finite are an error. Neither the
-/// message nor `*warning`, what of the picture changed, names the file.
+/// message nor `*warning` (empty before: what of the picture changed) names the file.
 Result<Image> read_image(const std::string& name, const std::string& bytes, const ImageRequest& request, std::string* warning);
 
 }  // namespace lightloom::import

@@ -23,9 +23,7 @@ Rgb light_colour(Context* context, const ParameterList& p, std::string_view name
         if (given->numbers.size() != 3) fail(given->where, p.what() + ": " + quoted(given->name) + " needs three numbers");
         colour = {float(given->numbers[0]), float(given->numbers[1]), float(given->numbers[2])};
     } else if ((given = p.find("blackbody", name))) {
-        if (given->numbers.size() != 1 || !(given->numbers[0] >= 100) || !(given->numbers[0] <= 1e6))
-            fail(given->where, p.what() + ": a black body needs one temperature between 100 and 1000000 kelvin");
-        colour = blackbody_rgb(given->numbers[0], &clipped);
+        colour = blackbody_rgb(kelvin_of(*given, p.what()), &clipped);
     } else if ((given = p.find("spectrum", name))) {
         std::optional<Rgb> reduced;
         if (given->strings.size() == 1) reduced = named_illuminant_rgb(given->strings[0], &clipped);

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "common/import/context.h"
+#include "common/import/images.h"
 #include "common/import/spectra.h"
 
 namespace lightloom::import {
@@ -67,29 +68,21 @@ float read_index(Context* context, const ParameterList& p, std::string_view name
     return index;
 }
 
-/// The metal that "metal-Cu-eta" names together with its property; nothing for any other spectrum.
-std::optional<ConductorRgb> metal_of(const Parameter* p, std::string_view property) {
-    if (!p || p->strings.size() != 1 || !has_suffix(p->strings[0], property)) return std::nullopt;
-    return named_metal(p->strings[0].substr(0, p->strings[0].size() - property.size()));
-}
-
 /// The reflectance or eta and k of a conductor; `prefix` is "" or "conductor.".
 void read_conductor(Context* context, const ParameterList& p, const std::string& prefix, Material* m) {
     m->reflectance = spectrum_texture_parameter(context, p, "reflectance", TextureUse::kReflectance);
     const std::string eta_name = prefix + "eta", k_name = prefix + "k";
     if (m->reflectance != kNone) {
         for (const std::string_view name : {eta_name, k_name})
-            for (const std::string_view type : {"rgb", "spectrum", "texture"})
+            for (const std::string_view type : {"rgb", "spectrum", "blackbody", "texture"})
                 if (p.find(type, name))
                     fail(p.where(), p.what() + ": give either reflectance or " + eta_name + " and " + k_name + ", not both");
         return;
     }
     const Parameter *eta = p.find("spectrum", eta_name), *k = p.find("spectrum", k_name);
-    // A metal's eta and k are reduced together, see spectra.h.
-    const std::optional<ConductorRgb> eta_metal = metal_of(eta, "-eta"), k_metal = metal_of(k, "-k");
-    if (eta_metal) m->eta = constant_texture(context, eta_metal->eta);
-    if (k_metal) m->k = constant_texture(context, k_metal->k);
-    if (eta && k && !eta_metal && !k_metal) {
+    const auto is_named = [](const Parameter* s) { return s && s->strings.size() == 1 && named_index(s->strings[0]); };
+    // A metal's eta and k are reduced together, see spectra.h; those of a name have been.
+    if (eta && k && !is_named(eta) && !is_named(k)) {
         const ConductorRgb both = conductor_rgb(*spectrum_parameter(context, p, eta_name), *spectrum_parameter(context, p, k_name));
         m->eta = constant_texture(context, both.eta);
         m->k = constant_texture(context, both.k);
@@ -149,17 +142,39 @@ void read_mix(Context* context, const ParameterList& p, Material* m) {
     if (m->mix_amount == kNone) m->mix_amount = constant_texture(context, Rgb(0.5f));
 }
 
+void read_bump(Context* context, const ParameterList& p, Material* m) {
+    const std::string reference = p.one_string("normalmap", "");
+    if (reference.empty()) {
+        m->displacement = float_texture_parameter(context, p, "displacement");
+        return;
+    }
+    p.ignore(&context->diagnostics, "displacement", "beside a normal map it is not used, as in pbrt");
+    const Location& where = p.find("string", "normalmap")->where;
+    if (has_fixed_encoding(reference))
+        context->diagnostics.warn(where, p.what() + ": the normals of " + quoted(reference) +
+                                             " are decoded as sRGB, as in pbrt, which takes JPEG and TGA files for nothing else; "
+                                             "convert it to PNG");
+    ImageRequest request;
+    request.srgb = false;
+    TextureNode node;
+    node.kind = TextureKind::kImage;
+    node.image = context->load_image(where, reference, request);
+    if (context->scene.images[size_t(node.image)].channels != 3)
+        fail(where, p.what() + ": the normal map " + quoted(reference) + " has no red, green and blue channels");
+    m->normal_map = add_node(context, node);
+}
+
 /// Index of the new material, or kInterfaceMaterial.
 MaterialId make_material(Context* context, const std::string& name, const Definition& definition) {
     const ParameterList& p = definition.parameters;
     const std::string& kind = definition.kind;
     p.accept("string", "type");
-    p.refuse("normalmap", "normal maps change the picture; remove the parameter to render without");
-    p.refuse("displacement", "bump maps change the picture; remove the parameter to render without");
     Material m;
     m.name = name;
     m.remap_roughness = true;
     if (kind == "interface" || kind == "none" || kind.empty()) {
+        for (const std::string_view map : {"displacement", "normalmap"})
+            p.ignore(&context->diagnostics, map, "a shape of this material has no surface");
         p.finish();
         return kInterfaceMaterial;
     }
@@ -211,11 +226,15 @@ MaterialId make_material(Context* context, const std::string& name, const Defini
     } else if (kind == "mix") {
         m.kind = MaterialKind::kMix;
         read_mix(context, p, &m);
+        constexpr const char* kElsewhere = "a mix is one of its materials at every point; give it to those";
+        p.ignore(&context->diagnostics, "normalmap", kElsewhere);  // as pbrt does, which refuses the other
+        p.refuse("displacement", kElsewhere);
     } else {
         fail(p.where(), p.what() + ": the material " + quoted(kind) +
                             " is not supported; use diffuse, diffusetransmission, conductor, dielectric, "
                             "thindielectric, coateddiffuse, coatedconductor, mix or interface");
     }
+    if (m.kind != MaterialKind::kMix) read_bump(context, p, &m);
     p.finish();
     const MaterialId id = MaterialId(context->scene.materials.size());
     if (m.kind == MaterialKind::kMix)

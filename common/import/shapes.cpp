@@ -49,7 +49,8 @@ TriangleMesh place(Context* context, const ParameterList& parameters, TriangleMe
         if (!is_finite(p)) fail(parameters.where(), parameters.what() + ": a vertex is not finite after its transformation");
         if (!within_bounds(p)) fail(parameters.where(), parameters.what() + ": a vertex lies beyond 1e15; scale the scene down");
     }
-    mesh.attributes.flip_normal = state.reverse_orientation != state.object_to_world.swaps_handedness();
+    mesh.attributes.mirrored = state.object_to_world.swaps_handedness();
+    mesh.attributes.flip_normal = state.reverse_orientation != mesh.attributes.mirrored;
     std::vector<Vec3> substitutes;
     for (size_t i = 0; i < mesh.normals.size(); ++i) {
         Vec3 n = world_to_object.normal_by_inverse(mesh.normals[i]);
@@ -112,7 +113,7 @@ TriangleMesh read_mesh(const ParameterList& parameters, size_t corners) {
 TriangleMesh triangle_mesh(Context* context, const ParameterList& parameters, const ShapeState& state) {
     TriangleMesh mesh = read_mesh(parameters, 3);
     parameters.ignore(&context->diagnostics, "S",
-                      "tangents only turn anisotropic highlights, which follow the (u, v) directions here");
+                      "tangents only turn anisotropic highlights and normal maps, which follow the (u, v) directions here");
     parameters.ignore(&context->diagnostics, "faceIndices", "no texture here is looked up by face");
     return place(context, parameters, std::move(mesh), state);
 }
@@ -198,6 +199,7 @@ std::variant<TriangleMesh, Sphere> sphere(Context* context, const ParameterList&
     }
     s.orientation = Frame(axes[0], axes[1], axes[2]);
     s.attributes.flip_normal = quadric(state).reverse_orientation;
+    s.attributes.mirrored = state.object_to_world.swaps_handedness();
     return s;
 }
 

@@ -129,6 +129,18 @@ Rgb blackbody_rgb(double kelvin, bool* clipped) {
     return unit_luminance_rgb(x, y, z, clipped);
 }
 
+Spectrum blackbody_spectrum(double kelvin) {
+    constexpr double kSecond = 1.4387769e7;  // h c / k_B in nm K
+    constexpr double kWien = 2.8977720e6;    // peak wavelength times temperature, nm K
+    const double peak = kWien / kelvin, top = kSecond / kWien;
+    Spectrum out;
+    for (int nm = kFirst; nm <= kFirst + kStep * (kCount - 1); ++nm) {
+        const double arg = kSecond / (nm * kelvin), s = peak / nm;
+        out.push_back({double(nm), s * s * s * s * s * math::exp(top - arg) * (1 - math::exp(-top)) / (1 - math::exp(-arg))});
+    }
+    return out;
+}
+
 std::optional<Rgb> named_illuminant_rgb(const std::string& name, bool* clipped) {
     struct Named {
         std::string_view name;
@@ -214,11 +226,19 @@ std::optional<float> named_glass(const std::string& name) {
     return std::nullopt;
 }
 
+std::optional<Rgb> named_index(const std::string& name) {
+    if (const auto glass = named_glass(name)) return Rgb(*glass);
+    for (const std::string_view suffix : {"-eta", "-k"}) {
+        if (!has_suffix(name, suffix)) continue;
+        if (const auto metal = named_metal(name.substr(0, name.size() - suffix.size())))
+            return suffix == "-eta" ? metal->eta : metal->k;
+    }
+    return std::nullopt;
+}
+
 bool is_named_spectrum(const std::string& name) {
     bool clipped = false;
-    for (const std::string_view suffix : {"-eta", "-k"})
-        if (has_suffix(name, suffix) && named_metal(name.substr(0, name.size() - suffix.size()))) return true;
-    return named_glass(name) || named_illuminant_rgb(name, &clipped);
+    return named_index(name) || named_illuminant_rgb(name, &clipped);
 }
 
 std::optional<Spectrum> spectrum_from_pairs(const std::vector<double>& values) {
@@ -233,7 +253,9 @@ std::optional<Spectrum> spectrum_from_pairs(const std::vector<double>& values) {
 
 std::optional<Spectrum> parse_spectrum_text(const std::string& text) {
     const std::string no_name;
-    Tokenizer tokens(text, &no_name);
+    std::string without_commas = text;
+    std::replace(without_commas.begin(), without_commas.end(), ',', ' ');
+    Tokenizer tokens(without_commas, &no_name);
     std::vector<double> values;
     while (tokens.peek().kind != TokenKind::kEnd) {
         const Token token = tokens.next();

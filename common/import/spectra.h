@@ -16,6 +16,9 @@
 // * The index of a dielectric: its value at the sodium line (587.6 nm, the n_d of a glass catalogue); dispersion is
 //   ignored, which the import says.
 //
+// A black body is a light of its colour, and anywhere else the spectrum that is 1 at its peak, as in pbrt. A named index of
+// refraction is known by its reduction only; as a reflectance it is that, clamped to [0, 1] per channel, which the import says.
+//
 // A spectrum is linear between its samples and zero outside of them, as in pbrt.
 
 #include <optional>
@@ -40,6 +43,8 @@ Rgb unit_luminance_rgb(double x, double y, double z, bool* clipped);
 std::optional<Rgb> illuminant_rgb(const Spectrum& spectrum, bool* clipped);
 /// A black body's colour, luminance 1. `kelvin` is positive.
 Rgb blackbody_rgb(double kelvin, bool* clipped);
+/// A black body from 380 to 780 nm, relative to its peak (which may lie elsewhere), as pbrt takes one for anything but a light.
+Spectrum blackbody_spectrum(double kelvin);
 /// The colour of a named light spectrum (stdillum-..., illum-acesD60); nothing for an unknown name.
 std::optional<Rgb> named_illuminant_rgb(const std::string& name, bool* clipped);
 
@@ -57,10 +62,13 @@ ConductorRgb conductor_rgb(const Spectrum& eta, const Spectrum& k);
 std::optional<ConductorRgb> named_metal(const std::string& name);
 /// n_d of "glass-BK7" and its kin; nothing for an unknown name.
 std::optional<float> named_glass(const std::string& name);
+/// The reduced index "metal-Ag-eta", "metal-Ag-k", or a glass's n_d in every channel; nothing for any other name.
+std::optional<Rgb> named_index(const std::string& name);
 /// Whether a parameter of some kind may have this name as its spectrum: any of the above, a metal's with "-eta" or "-k".
 bool is_named_spectrum(const std::string& name);
 
-/// A spectrum file: pairs of wavelength and value, '#' comments. Nothing if the text is not that.
+/// A spectrum file: pairs of wavelength and value with blanks or commas between the numbers, '#' comments. Nothing if the text is
+/// not that.
 std::optional<Spectrum> parse_spectrum_text(const std::string& text);
 /// Pairs as a parameter lists them; nothing if their number is odd or the wavelengths do not increase.
 std::optional<Spectrum> spectrum_from_pairs(const std::vector<double>& values);

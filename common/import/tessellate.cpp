@@ -43,6 +43,7 @@ TriangleMesh tessellate_disk(float radius, float inner_radius, float height) {
 TriangleMesh tessellate_sphere(float radius) {
     constexpr int kSectors = 2 * kSphereRings;
     TriangleMesh mesh;
+    mesh.curved = true;
     for (int ring = 0; ring <= kSphereRings; ++ring) {
         const float v = float(ring) / kSphereRings;
         const math::SinCos theta = math::sincos_turns(0.5 * double(ring) / kSphereRings);
@@ -81,6 +82,7 @@ T bilinear(const T* c, float u, float v) {
 TriangleMesh tessellate_patches(const TriangleMesh& patches, bool* curved, std::vector<uint32_t>* faces) {
     constexpr Vec2 kCorners[4] = {{0, 0}, {1, 0}, {0, 1}, {1, 1}};
     TriangleMesh mesh;
+    mesh.curved = true;
     for (size_t face = 0; face + 3 < patches.indices.size(); face += 4) {
         Vec3 p[4], n[4];
         Vec2 uv[4];

@@ -29,8 +29,9 @@ std::string read_spectrum_file(Context* context, const Parameter& p, const std::
     fail(p.where, given + ", which is neither a spectrum known by name nor a file below the scene's directory; correct it");
 }
 
-/// Reads a spectrum given by file or values; fails if there is none.
+/// Reads a spectrum given by file, values or temperature; fails if there is none.
 Spectrum read_spectrum(Context* context, const Parameter& p, const std::string& what) {
+    if (p.type == "blackbody") return blackbody_spectrum(kelvin_of(p, what));
     if (!p.numbers.empty() && p.strings.empty()) {
         if (auto spectrum = spectrum_from_pairs(p.numbers)) return *spectrum;
         fail(p.where,
@@ -45,6 +46,15 @@ Spectrum read_spectrum(Context* context, const Parameter& p, const std::string& 
 
 Rgb colour_of(Context* context, const Parameter& p, const std::string& what, TextureUse use) {
     Rgb colour;
+    if (p.type == "spectrum" && p.strings.size() == 1) {
+        if (const std::optional<Rgb> index = named_index(p.strings[0])) {
+            if (use == TextureUse::kReflectance)
+                context->diagnostics.warn(p.where, what + ": " + quoted("spectrum " + p.name) + " is the index of refraction " +
+                                                       quoted(p.strings[0]) +
+                                                       "; as a reflectance it is taken per colour channel, not per wavelength");
+            return *index;
+        }
+    }
     if (p.type == "rgb") {
         if (p.numbers.size() != 3) fail(p.where, what + ": " + quoted("rgb " + p.name) + " needs three numbers");
         colour = {float(p.numbers[0]), float(p.numbers[1]), float(p.numbers[2])};
@@ -273,10 +283,16 @@ TextureId spectrum_texture_parameter(Context* context, const ParameterList& para
         if (p->strings.size() != 1) fail(p->where, parameters.what() + ": " + quoted(p->name) + " needs one texture name");
         return named_texture(context, p->where, p->strings[0], use);
     }
-    for (const std::string_view type : {"rgb", "spectrum"})
+    for (const std::string_view type : {"rgb", "spectrum", "blackbody"})
         if (const Parameter* p = parameters.find(type, name))
             return constant_texture(context, colour_of(context, *p, parameters.what(), use));
     return kNone;
+}
+
+double kelvin_of(const Parameter& p, const std::string& what) {
+    if (p.numbers.size() != 1 || !(p.numbers[0] >= 100) || !(p.numbers[0] <= 1e6))
+        fail(p.where, what + ": a black body needs one temperature between 100 and 1000000 kelvin");
+    return p.numbers[0];
 }
 
 std::optional<Spectrum> spectrum_parameter(Context* context, const ParameterList& parameters, std::string_view name) {

@@ -62,6 +62,9 @@ struct Material {
                                               ///< pbrt's "maxdepth"; every other one is a base reflection. 0: all.
     MaterialId mix_a = kNone, mix_b = kNone;  ///< kMix: a with probability 1 - amount, b with probability amount.
     TextureId mix_amount = kNone;
+    // What tilts the shading normal, see bump.h; at most one is in force, and a kMix has neither.
+    TextureId displacement = kNone;  ///< Height above the surface along the shading normal, scene units; the first channel counts.
+    TextureId normal_map = kNone;    ///< Unit normal n in the shading frame (s, t, n) as (n + 1) / 2.
 };
 
 /// Emission of an area light, attached to shapes. Radiance, W / (m^2 sr) per colour channel, scene units.
@@ -78,6 +81,7 @@ struct ShapeAttributes {
     bool flip_normal = false;  ///< Reverses the geometric normal cross(p1 - p0, p2 - p0) (pbrt: ReverseOrientation xor
                                ///< a handedness-swapping transformation).
     std::string source;        ///< "file:line" of the shape, for messages.
+    bool mirrored = false;     ///< The transformation that placed the shape swaps handedness: so does the frame of its tangents.
 };
 
 struct TriangleMesh {
@@ -86,6 +90,7 @@ struct TriangleMesh {
                                     ///< normal of a triangle is flipped into the hemisphere of its shading normals.
     std::vector<Vec2> uvs;          ///< Empty, or one per position; empty means (0,0) (1,0) (1,1) at the three corners.
     std::vector<uint32_t> indices;  ///< Three per triangle.
+    bool curved = false;            ///< Stands for a curved surface of its own tangents, see tangents_of() in bump.h.
     ShapeAttributes attributes;
 };
 

@@ -33,57 +33,62 @@ ConductorIndex conductor_index(const TextureTables& tables, const Material& m, V
 
 }  // namespace
 
-Bsdf resolve_material(const TextureTables& tables, MaterialId material, Vec2 uv, float choice) {
+MaterialId choose_material(const TextureTables& tables, MaterialId material, Vec2 uv, float choice) {
     // Import bounds the nesting; a cycle that got past it ends as an absorber instead of hanging a worker.
     for (int level = 0; level < 32 && material != kNone; ++level) {
         const Material& m = tables.materials[size_t(material)];
-        const float ior = m.ior > 0 ? m.ior : 1.0f;
-        switch (m.kind) {
-            case MaterialKind::kMix: {
-                const float amount = value(tables, m.mix_amount, uv, Rgb(0.5f)).r;
-                // What is left of `choice` is uniform again, for mixes inside mixes.
-                if (choice < amount) {
-                    choice /= amount < 1 ? amount : 1.0f;
-                    material = m.mix_b;
-                } else {
-                    choice = amount > 0 ? (choice - amount) / (1 - amount) : choice;
-                    material = m.mix_a;
-                }
-                continue;
-            }
-            case MaterialKind::kDiffuse: return make_diffuse(reflectance(tables, m.reflectance, uv, Rgb(0.5f)));
-            case MaterialKind::kDiffuseTransmission:
-                return make_diffuse_transmission(reflectance(tables, m.reflectance, uv, Rgb(0.25f)),
-                                                 reflectance(tables, m.transmittance, uv, Rgb(0.25f)));
-            case MaterialKind::kThinDielectric: return make_thin_dielectric(ior);
-            case MaterialKind::kConductor:
-            case MaterialKind::kDielectric:
-            case MaterialKind::kCoatedDiffuse:
-            case MaterialKind::kCoatedConductor: break;  // They have a roughness, which comes next.
+        if (m.kind != MaterialKind::kMix) return material;
+        const float amount = value(tables, m.mix_amount, uv, Rgb(0.5f)).r;
+        // What is left of `choice` is uniform again, for mixes inside mixes.
+        if (choice < amount) {
+            choice /= amount < 1 ? amount : 1.0f;
+            material = m.mix_b;
+        } else {
+            choice = amount > 0 ? (choice - amount) / (1 - amount) : choice;
+            material = m.mix_a;
         }
-        const float alpha_x = alpha(tables, m.roughness_u, uv, m.remap_roughness);
-        const float alpha_y = m.roughness_v == m.roughness_u ? alpha_x : alpha(tables, m.roughness_v, uv, m.remap_roughness);
-        switch (m.kind) {
-            case MaterialKind::kConductor: {
-                const ConductorIndex index = conductor_index(tables, m, uv);
-                return make_conductor(index.eta, index.k, alpha_x, alpha_y);
-            }
-            case MaterialKind::kDielectric: return make_dielectric(ior, alpha_x, alpha_y);
-            case MaterialKind::kCoatedDiffuse:
-                return make_coated_diffuse(reflectance(tables, m.reflectance, uv, Rgb(0.5f)), ior, m.thickness, alpha_x, alpha_y,
-                                           (m.layer_events + 1) / 2);
-            case MaterialKind::kCoatedConductor: {
-                const ConductorIndex index = conductor_index(tables, m, uv);
-                return make_coated_conductor(index.eta, index.k, alpha(tables, m.base_roughness_u, uv, m.remap_roughness),
-                                             alpha(tables, m.base_roughness_v, uv, m.remap_roughness), ior, m.thickness, alpha_x,
-                                             alpha_y);
-            }
-            case MaterialKind::kMix:
-            case MaterialKind::kDiffuse:
-            case MaterialKind::kDiffuseTransmission:
-            case MaterialKind::kThinDielectric: break;
+    }
+    return kNone;
+}
+
+Bsdf resolve_material(const TextureTables& tables, MaterialId material, Vec2 uv, float choice) {
+    const MaterialId chosen = choose_material(tables, material, uv, choice);
+    if (chosen == kNone) return {};
+    const Material& m = tables.materials[size_t(chosen)];
+    const float ior = m.ior > 0 ? m.ior : 1.0f;
+    switch (m.kind) {
+        case MaterialKind::kDiffuse: return make_diffuse(reflectance(tables, m.reflectance, uv, Rgb(0.5f)));
+        case MaterialKind::kDiffuseTransmission:
+            return make_diffuse_transmission(reflectance(tables, m.reflectance, uv, Rgb(0.25f)),
+                                             reflectance(tables, m.transmittance, uv, Rgb(0.25f)));
+        case MaterialKind::kThinDielectric: return make_thin_dielectric(ior);
+        case MaterialKind::kMix:  // choose_material() returns none
+        case MaterialKind::kConductor:
+        case MaterialKind::kDielectric:
+        case MaterialKind::kCoatedDiffuse:
+        case MaterialKind::kCoatedConductor: break;  // They have a roughness, which comes next.
+    }
+    const float alpha_x = alpha(tables, m.roughness_u, uv, m.remap_roughness);
+    const float alpha_y = m.roughness_v == m.roughness_u ? alpha_x : alpha(tables, m.roughness_v, uv, m.remap_roughness);
+    switch (m.kind) {
+        case MaterialKind::kConductor: {
+            const ConductorIndex index = conductor_index(tables, m, uv);
+            return make_conductor(index.eta, index.k, alpha_x, alpha_y);
         }
-        return {};
+        case MaterialKind::kDielectric: return make_dielectric(ior, alpha_x, alpha_y);
+        case MaterialKind::kCoatedDiffuse:
+            return make_coated_diffuse(reflectance(tables, m.reflectance, uv, Rgb(0.5f)), ior, m.thickness, alpha_x, alpha_y,
+                                       (m.layer_events + 1) / 2);
+        case MaterialKind::kCoatedConductor: {
+            const ConductorIndex index = conductor_index(tables, m, uv);
+            return make_coated_conductor(index.eta, index.k, alpha(tables, m.base_roughness_u, uv, m.remap_roughness),
+                                         alpha(tables, m.base_roughness_v, uv, m.remap_roughness), ior, m.thickness, alpha_x,
+                                         alpha_y);
+        }
+        case MaterialKind::kMix:
+        case MaterialKind::kDiffuse:
+        case MaterialKind::kDiffuseTransmission:
+        case MaterialKind::kThinDielectric: break;
     }
     return {};
 }

@@ -6,6 +6,7 @@
 
 #include "common/core/math.h"
 #include "common/core/rng.h"
+#include "common/scene/bump.h"
 
 namespace lightloom {
 namespace {
@@ -15,15 +16,6 @@ namespace {
 float position_hash(const Vec3& p) {
     const uint64_t xy = (uint64_t(std::bit_cast<uint32_t>(p.x)) << 32) | std::bit_cast<uint32_t>(p.y);
     return float(mix64(mix64(xy + 0x632be59bd9b4e019ull) ^ std::bit_cast<uint32_t>(p.z)) >> 40) * 0x1p-24f;
-}
-
-/// A tangent frame around `n` aligned with dp/du where there is one (anisotropic roughness needs it).
-Frame frame_along(const Vec3& n, const Vec3& dpdu) {
-    const Vec3 t = cross(n, dpdu);
-    const float len2 = length_squared(t);
-    if (!(len2 > 0)) return Frame(n);
-    const Vec3 unit_t = t / std::sqrt(len2);
-    return {cross(unit_t, n), unit_t, n};
 }
 
 }  // namespace
@@ -78,6 +70,7 @@ bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out, float cle
     RawHit hit;
     if (!find_surface(o, d, clearance, &hit)) return false;
     surface_point(o, d, hit, out);
+    if (!tilts_.empty() && tilts_[size_t(out->material)] != 0) tilt(hit, out);
     return true;
 }
 
@@ -127,6 +120,26 @@ void Scene::surface_point(const Vec3& o, const Vec3& d, const RawHit& hit, Surfa
         out->shading = frame_along(n, m.vector(out->shading.s));
     }
     out->reach = std::max(out->reach, least_reach_);
+}
+
+void Scene::tilt(const RawHit& hit, SurfacePoint* point) const {
+    point->material = choose_material(tables_, point->material, point->uv, position_hash(point->p));
+    if (point->material == kNone) return;
+    const Material& material = description_.materials[size_t(point->material)];
+    if (material.displacement == kNone && material.normal_map == kNone) return;
+    const Instance* instance = hit.instance >= 0 ? &description_.instances[size_t(hit.instance)] : nullptr;
+    const Mat4* to_object = instance ? &instance_inverse_[size_t(hit.instance)] : nullptr;
+    const ObjectDefinition* object = instance ? &description_.objects[size_t(instance->object)] : nullptr;
+    const auto& meshes = object ? object->meshes : description_.meshes;
+    SurfaceTangents tangents;
+    if (hit.geometry < meshes.size()) {
+        tangents = tangents_of(meshes[hit.geometry], hit);
+    } else {
+        const Sphere& s = (object ? object->spheres : description_.spheres)[hit.primitive];
+        tangents = tangents_of(s, normalize((to_object ? to_object->point(point->p) : point->p) - s.centre));
+    }
+    if (instance) tangents.transform(instance->object_to_world, *to_object);
+    point->shading = tilted_frame(tables_, material, *point, tangents);
 }
 
 Bsdf Scene::bsdf_at(const SurfacePoint& point) const {

@@ -91,6 +91,8 @@ class Scene {
     Status find_contacts(std::vector<Emitter>* emitters, float largest);
     bool find_surface(const Vec3& o, const Vec3& d, float clearance, RawHit* hit) const;
     void surface_point(const Vec3& o, const Vec3& d, const RawHit& hit, SurfacePoint* out) const;
+    /// The shading frame of a material with a displacement or normal map. Of a mix, the point's material becomes the one chosen.
+    void tilt(const RawHit& hit, SurfacePoint* point) const;
     void summarise();
     void triangle_point(const TriangleMesh& mesh, const RawHit& hit, SurfacePoint* out) const;
     static float opacity(const void* user, int32_t object, uint32_t geometry, uint32_t primitive, float u, float v);
@@ -102,6 +104,7 @@ class Scene {
     std::vector<int32_t> sphere_emitter_;      // per world sphere
     std::vector<Mat4> instance_inverse_;
     std::vector<std::string> light_sources_;  // where each light group came from
+    std::vector<uint8_t> tilts_;              // per material, whether tilt() has to look at it; empty if none
     EmitterSet emitters_;
     Camera camera_;
     float camera_clearance_ = 0;

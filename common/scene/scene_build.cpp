@@ -23,6 +23,24 @@ void drop_degenerate_triangles(TriangleMesh* mesh) {
     index.resize(kept);
 }
 
+/// Which materials have a displacement or a normal map, or lead to one as mixes. Empty if none does.
+std::vector<uint8_t> tilting_materials(const std::vector<Material>& materials) {
+    std::vector<uint8_t> tilts(materials.size());
+    const auto leads = [&](MaterialId id) { return id != kNone && tilts[size_t(id)] != 0; };
+    for (bool found = true; found;) {
+        found = false;
+        for (size_t i = 0; i < materials.size(); ++i) {
+            const Material& m = materials[i];
+            const bool own = m.displacement != kNone || m.normal_map != kNone;
+            if (tilts[i] != 0 || !(m.kind == MaterialKind::kMix ? leads(m.mix_a) || leads(m.mix_b) : own)) continue;
+            tilts[i] = 1;
+            found = true;
+        }
+    }
+    if (std::find(tilts.begin(), tilts.end(), 1) == tilts.end()) tilts.clear();
+    return tilts;
+}
+
 }  // namespace
 
 void Scene::collect_emitters(std::vector<Emitter>* emitters) {
@@ -176,6 +194,7 @@ Result<std::unique_ptr<Scene>> Scene::build(SceneDescription description, const 
     prepare(d.meshes);
     for (ObjectDefinition& o : d.objects) prepare(o.meshes);
     scene->tables_ = {d.textures, d.images, d.materials};
+    scene->tilts_ = tilting_materials(d.materials);
     for (const Instance& i : d.instances) scene->instance_inverse_.push_back(*inverse(i.object_to_world));
 
     Result<FrameLayout> layout = frame_layout(d.film, options);

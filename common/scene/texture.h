@@ -23,8 +23,12 @@ enum class TextureUse { kUnbounded, kReflectance };
 /// at v = 1. Never reads out of range.
 Rgb evaluate_texture(const TextureTables& tables, TextureId id, Vec2 uv, TextureUse use = TextureUse::kUnbounded);
 
-/// Resolve `material` at (u, v). A kMix material is decided stochastically but reproducibly from `choice` in [0, 1): the
-/// decision is part of the vertex, so every technique that produces the same vertex sees the same surface.
+/// What `material` comes down to at (u, v): itself unless it is a kMix, which is decided stochastically but reproducibly from
+/// `choice` in [0, 1). The decision is part of the vertex, so every technique that produces the same vertex sees the same
+/// surface. kNone for mixes that lead nowhere.
+MaterialId choose_material(const TextureTables& tables, MaterialId material, Vec2 uv, float choice);
+
+/// Resolve `material` at (u, v); `choice` as in choose_material().
 Bsdf resolve_material(const TextureTables& tables, MaterialId material, Vec2 uv, float choice);
 
 }  // namespace lightloom

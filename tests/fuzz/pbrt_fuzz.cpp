@@ -16,6 +16,7 @@ const char kPly[] =
     "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
 // An uncompressed TGA of 1 x 1 pixel.
 const char kTga[] = "\0\0\2\0\0\0\0\0\0\0\0\0\1\0\1\0\30\0\1\2\3";
+const char kPfm[] = "Pf 1 1 -1\n\0\0\0\77";
 
 }  // namespace
 
@@ -29,6 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
                                                       {"self.gz", text},
                                                       {"a.ply", kPly},
                                                       {"a.tga", std::string(kTga, sizeof kTga - 1)},
+                                                      {"a.pfm", std::string(kPfm, sizeof kPfm - 1)},
                                                       {"a.spd", "400 1\n700 0.5\n"},
                                                       {"../b.pbrt", "ReverseOrientation\n"}};
     const auto source = [&] { return lightloom::import::MemorySource(contents, {"room", "scenes"}); };

@@ -83,8 +83,6 @@ TEST(ImportMaterial, InterfaceShapesDoNotExist) {
 
 TEST(ImportMaterial, WhatIsNotModelledIsNamed) {
     expect_error("Material \"hair\"", {"hair", "not supported"});
-    expect_error("Material \"diffuse\" \"string normalmap\" \"n.png\"", {"normalmap", "--without bump"});
-    expect_error("Material \"diffuse\" \"texture displacement\" \"d\"", {"bump"});
     expect_error("Material \"diffuse\" \"rgb reflectance\" [1.5 0 0]", {"above 1"});
     expect_error("Material \"diffuse\" \"rgb reflectance\" [-1 0 0]", {"negative"});
     expect_error("Material \"diffuse\" \"float reflectance\" 0.5", {"wrong type"});
@@ -387,13 +385,58 @@ TEST(ImportSpectra, InScenes) {
                      {"scene.pbrt:4: ", ("\"spectrum " + c.parameter + "\" is \"" + c.name + "\"").c_str(),
                       "neither a spectrum known by name nor a file"});
     // Known, but not as this.
-    for (const std::string name : {"glass-BK7", "stdillum-A", "metal-Ag-k", "metal-Ag-eta"})
+    for (const std::string name : {"stdillum-A", "illum-acesD60"})
         expect_error("Material \"diffuse\" \"spectrum reflectance\" \"" + name + "\"", {name.c_str(), "known by name but not"});
+    expect_error("Material \"dielectric\" \"spectrum eta\" \"metal-Ag-eta\"", {"metal-Ag-eta", "known by name but not"});
     expect_error("Material \"diffuse\" \"spectrum reflectance\" \"../r.spd\"", {"spectrum reflectance", "leaves"});
     expect_error("LightSource \"point\" \"blackbody I\" -3", {"kelvin"});
+    expect_error("Material \"diffuse\" \"blackbody reflectance\" -3", {"scene.pbrt:3", "kelvin"});
     expect_error("Material \"diffuse\" \"spectrum reflectance\" [400 1 300 1]", {"increasing"});
     expect_error("Material \"diffuse\" \"spectrum reflectance\" \"r.spd\"", {"not a spectrum"}, {{"r.spd", "400 one"}});
     expect_error("LightSource \"point\" \"spectrum I\" [100 1 200 1]", {"luminance"});
+}
+
+/// Anything but a light takes a black body relative to its peak.
+TEST(ImportSpectra, BlackBodiesAsReflectances) {
+    const import::Spectrum warm = import::blackbody_spectrum(5000);
+    EXPECT_NEAR(import::evaluate(warm, 2.8977720e6 / 5000), 1, 1e-5) << "Wien's displacement law";
+    // Planck's law at 450 nm over its peak at 579.55 nm.
+    const double x = 1.4387769e7 / (450 * 5000.0), peak = 1.4387769e7 / 2.8977720e6;
+    EXPECT_NEAR(import::evaluate(warm, 450), std::pow(579.5544 / 450, 5) * std::expm1(peak) / std::expm1(x), 1e-5);
+    const auto reflectance = [](const std::string& material) {
+        const SceneDescription d = world(material + kShape);
+        return value(d, material_of(d).reflectance);
+    };
+    const Rgb expected = import::reflectance_rgb(warm);
+    EXPECT_GT(expected.r, expected.b);
+    EXPECT_EQ(reflectance("Material \"diffuse\" \"blackbody reflectance\" 5000"), expected);
+    EXPECT_EQ(reflectance("Material \"coateddiffuse\" \"blackbody reflectance\" 5000"), expected);
+    EXPECT_EQ(reflectance("Attribute \"material\" \"blackbody reflectance\" 5000 Material \"diffuse\""), expected);
+    EXPECT_EQ(reflectance("Texture \"b\" \"spectrum\" \"constant\" \"blackbody value\" 5000 "
+                          "Texture \"t\" \"spectrum\" \"mix\" \"texture tex1\" \"b\" \"blackbody tex2\" 5000 "
+                          "Material \"diffuse\" \"texture reflectance\" \"t\""),
+              expected);
+    // Their peak lies in the infrared.
+    EXPECT_LT(reflectance("Material \"diffuse\" \"blackbody reflectance\" 1500").max_component(), 0.1f);
+    const SceneDescription d = world("Material \"conductor\" \"blackbody eta\" 5000 \"rgb k\" [2 2 2]" + kShape);
+    EXPECT_EQ(value(d, material_of(d).eta), import::index_rgb(warm));
+    expect_error("Material \"conductor\" \"rgb reflectance\" [1 1 1] \"blackbody k\" 5000", {"not both"});
+}
+
+TEST(ImportSpectra, NamedIndicesInTexturesAndAsReflectances) {
+    const std::string silver = "Texture \"n\" \"spectrum\" \"constant\" \"spectrum value\" \"metal-Ag-eta\" ";
+    SceneDescription d = world(silver + "Material \"conductor\" \"texture eta\" \"n\" \"spectrum k\" \"metal-Ag-k\"" + kShape);
+    EXPECT_EQ(value(d, material_of(d).eta), import::named_metal("metal-Ag")->eta);
+    EXPECT_EQ(value(d, material_of(d).k), import::named_metal("metal-Ag")->k);
+    d = world("Material \"conductor\" \"spectrum eta\" \"glass-BK7\" \"spectrum k\" [300 2 900 2]" + kShape);
+    EXPECT_EQ(value(d, material_of(d).eta), Rgb(1.5168f));
+    EXPECT_NEAR(value(d, material_of(d).k).g, 2, 1e-5);
+    d = world("Material \"diffuse\" \"spectrum reflectance\" \"metal-Ag-eta\"" + kShape);
+    EXPECT_EQ(value(d, material_of(d).reflectance), import::named_metal("metal-Ag")->eta);
+    expect_warning("Material \"diffuse\" \"spectrum reflectance\" \"metal-Ag-eta\"", "per colour channel");
+    // Numbers with commas between them, as spreadsheets write them.
+    d = world("Material \"diffuse\" \"spectrum reflectance\" \"r.csv\"" + kShape, {{"r.csv", "300,0.25\n900, 0.25\n"}});
+    EXPECT_NEAR(value(d, material_of(d).reflectance).g, 0.25, 1e-6);
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 // Textures, and the image files that they read.
 
 #include <array>
+#include <bit>
 #include <cmath>
+#include <limits>
 
 #include "import_looks.h"
 
@@ -126,6 +128,65 @@ TEST(ImportTexture, PrimariesOfExrFilesBecomeThoseOfSrgb) {
     expect_error(texture, {"c.exr", "chromaticities"}, {{"c.exr", exr(Rgb(0.5f), kAces)}});
 }
 
+/// A PFM of `floats` in the order of the file: rows from the bottom.
+std::string pfm(const std::string& header, const std::vector<float>& floats, bool little_endian) {
+    std::string out = header;
+    for (const float v : floats) {
+        const uint32_t code = std::bit_cast<uint32_t>(v);
+        for (int i = 0; i < 4; ++i) out += char(code >> 8 * (little_endian ? i : 3 - i));
+    }
+    return out;
+}
+
+TEST(ImportTexture, PortableFloatMaps) {
+    const std::vector<float> colours{1, 0, 0, 0, 0.5f, 0, 0, 0, 0.25f, 0.75f, 0.75f, 0.75f};
+    const auto look = [](const std::string& bytes, Vec2 uv) {
+        const SceneDescription d = world(
+            "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.PFM\" \"string filter\" \"point\" "
+            "Material \"diffuse\" \"texture reflectance\" \"t\"" +
+                kShape,
+            {{"a.PFM", bytes}});
+        EXPECT_TRUE(d.warnings.empty());
+        return value(d, material_of(d).reflectance, uv);
+    };
+    const std::string little = pfm("PF\n2 2\n-1.0\n", colours, true);
+    for (const std::string& bytes : {little, pfm("PF\n2 2\n1.0\n", colours, false), pfm("PF\r\n2 2\r\n-1\r\n", colours, true),
+                                     pfm("PF # by hand\n# 2 pixels\n 2\t2\n  -1e0 ", colours, true)}) {
+        EXPECT_EQ(look(bytes, {0.25f, 0.25f}), Rgb(1, 0, 0));
+        EXPECT_EQ(look(bytes, {0.75f, 0.25f}), Rgb(0, 0.5f, 0));
+        EXPECT_EQ(look(bytes, {0.25f, 0.75f}), Rgb(0, 0, 0.25f));
+        EXPECT_EQ(look(bytes, {0.75f, 0.75f}), Rgb(0.75f));
+    }
+    EXPECT_EQ(look(pfm("PF 2 2 -0.5 ", colours, true), {0.25f, 0.25f}), Rgb(0.5f, 0, 0)) << "the scale multiplies, as in pbrt";
+    EXPECT_EQ(look(pfm("Pf 1 2 1 ", {0.25f, 0.5f}, false), {0.5f, 0.75f}), Rgb(0.5f));
+    // The first pixel begins with the byte of a line feed.
+    EXPECT_EQ(look(pfm("Pf 1 1 -1\r", {std::bit_cast<float>(0x3f00000au)}, true), {0.5f, 0.5f}).r,
+              std::bit_cast<float>(0x3f00000au));
+
+    const std::string floats = "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"a.pfm\" ";
+    const SceneDescription grey =
+        world(floats + "Shape \"sphere\" \"texture alpha\" \"t\"", {{"a.pfm", pfm("PF 1 1 -1\n", {0.25f, 0.5f, 0.75f}, true)}});
+    EXPECT_FLOAT_EQ(value(grey, grey.spheres[0].attributes.alpha).r, 0.5f);
+    const SceneDescription sky = world("LightSource \"infinite\" \"string filename\" \"a.pfm\"", {{"a.pfm", little}});
+    EXPECT_EQ(sky.images.at(0).texel(0, 1), Rgb(1, 0, 0));
+
+    const auto refused = [&](const std::string& bytes, std::initializer_list<const char*> parts) {
+        expect_error(floats, parts, {{"a.pfm", bytes}});
+    };
+    refused("", {"scene.pbrt:3", "a.pfm", "PF or Pf"});
+    refused("P6 1 1 255\n123", {"PF or Pf"});
+    refused("PF 1 x -1\n", {"\"x\"", "height"});
+    refused("PF -1 1 -1\n", {"\"-1\"", "width"});
+    refused("PF 1 1\n", {"scale"});
+    refused(pfm("PF 1 1 0\n", {1, 1, 1}, true), {"\"0\"", "scale"});
+    refused(little.substr(0, little.size() - 1), {"cut short", "48 bytes", "47 are there"});
+    refused("PF 9999 9999 -1\n", {"9999 x 9999", "cannot hold"});
+    refused(pfm("Pf 1 1 -1\n", {std::numeric_limits<float>::infinity()}, true), {"finite"});
+    expect_warning(floats, "last 3 bytes", {{"a.pfm", pfm("Pf 1 1 -1\n", {1}, true) + "end"}});
+    const std::string colour = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.pfm\" ";
+    expect_warning(colour, "behind the pixels, are ignored; negative values", {{"a.pfm", pfm("Pf 1 1 -1\n", {-1}, true) + "end"}});
+}
+
 /// The same spectrum is reduced in one way as a reflectance and in another as an index.
 TEST(ImportTexture, SpectraAreReducedByTheirUse) {
     const std::string green = "[400 0.05 499 0.05 500 0.9 560 0.9 561 0.05 700 0.05]";
@@ -153,7 +214,7 @@ TEST(ImportTexture, SpectraAreReducedByTheirUse) {
 TEST(ImportTexture, Errors) {
     expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.png\"", {"scene.pbrt:3", "no.png"});
     expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.bmp\"", {"bmp", "png"}, {{"no.bmp", "BM"}});
-    for (const char* name : {"a.png", "a.jpg", "a.hdr", "a.tga", "a.exr"})
+    for (const char* name : {"a.png", "a.jpg", "a.hdr", "a.tga", "a.exr", "a.pfm"})
         expect_error(std::string("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"") + name + "\"", {name},
                      {{name, "rubbish"}});
     std::string huge = tga(1, 1, "");
