@@ -103,7 +103,7 @@ bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out) const {
 }
 
 Bsdf Scene::bsdf_at(const SurfacePoint& point) const {
-    return resolve_material(tables_, point.material, point.uv, position_hash(point.p));
+    return resolve_material(tables_, point.material, {point.uv, point.p}, position_hash(point.p));
 }
 
 bool Scene::occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3& q, const Vec3& ng_q, float reach_q) const {
@@ -117,22 +117,30 @@ bool Scene::occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3&
     return accel_->occluded(from, q - from, 0.99999f);
 }
 
-float Scene::opacity(const void* user, int32_t object, uint32_t geometry, uint32_t primitive, float u, float v) {
+float Scene::opacity(const void* user, const Accel::OpacityQuery& query) {
     const Scene& scene = *static_cast<const Scene*>(user);
     const SceneDescription& d = scene.description_;
-    if (geometry == Accel::kSphereGeometry) {
-        const Sphere& s = (object < 0 ? d.spheres : d.objects[size_t(object)].spheres)[primitive];
-        return s.attributes.alpha == kNone ? 1 : evaluate_texture(scene.tables_, s.attributes.alpha, {u, v}).r;
+    TexturePoint at{{query.u, query.v}, {}};
+    TextureId alpha;
+    if (query.geometry == Accel::kSphereGeometry) {
+        const Sphere& s = (query.object < 0 ? d.spheres : d.objects[size_t(query.object)].spheres)[query.primitive];
+        alpha = s.attributes.alpha;
+        if (alpha == kNone) return 1;
+        at.p = s.centre + query.outward * s.radius;
+    } else {
+        const TriangleMesh& mesh = (query.object < 0 ? d.meshes : d.objects[size_t(query.object)].meshes)[query.geometry];
+        alpha = mesh.attributes.alpha;
+        const uint32_t* index = &mesh.indices[size_t(query.primitive) * 3];
+        Vec2 uv[3] = {{0, 0}, {1, 0}, {1, 1}};
+        if (!mesh.uvs.empty())
+            for (int i = 0; i < 3; ++i) uv[i] = mesh.uvs[index[i]];
+        const float u = query.u, v = query.v, w = 1 - u - v;
+        at.uv = {w * uv[0].x + u * uv[1].x + v * uv[2].x, w * uv[0].y + u * uv[1].y + v * uv[2].y};
+        const Vec3& p0 = mesh.positions[index[0]];
+        at.p = p0 + (mesh.positions[index[1]] - p0) * u + (mesh.positions[index[2]] - p0) * v;
     }
-    const TriangleMesh& mesh = (object < 0 ? d.meshes : d.objects[size_t(object)].meshes)[geometry];
-    const uint32_t* index = &mesh.indices[size_t(primitive) * 3];
-    Vec2 uv[3] = {{0, 0}, {1, 0}, {1, 1}};
-    if (!mesh.uvs.empty())
-        for (int i = 0; i < 3; ++i) uv[i] = mesh.uvs[index[i]];
-    const float w = 1 - u - v;
-    return evaluate_texture(scene.tables_, mesh.attributes.alpha,
-                            {w * uv[0].x + u * uv[1].x + v * uv[2].x, w * uv[0].y + u * uv[1].y + v * uv[2].y})
-        .r;
+    if (query.instance >= 0) at.p = d.instances[size_t(query.instance)].object_to_world.point(at.p);
+    return evaluate_texture(scene.tables_, alpha, at).r;
 }
 
 }  // namespace lightloom

@@ -44,20 +44,20 @@ Rgb image_value(const TextureNode& node, const Image& image, Vec2 st) {
 
 }  // namespace
 
-Rgb evaluate_texture(const TextureTables& tables, TextureId id, Vec2 uv, TextureUse use) {
+Rgb evaluate_texture(const TextureTables& tables, TextureId id, const TexturePoint& at, TextureUse use) {
     const TextureNode& node = tables.nodes[size_t(id)];
-    const Vec2 st{node.su * uv.x + node.du, node.sv * uv.y + node.dv};
+    const Vec2 st{node.su * at.uv.x + node.du, node.sv * at.uv.y + node.dv};
     switch (node.kind) {
         case TextureKind::kConstant: return node.value;
-        case TextureKind::kScale: return evaluate_texture(tables, node.a, uv, use) * evaluate_texture(tables, node.b, uv);
+        case TextureKind::kScale: return evaluate_texture(tables, node.a, at, use) * evaluate_texture(tables, node.b, at);
         case TextureKind::kMix: {
-            const Rgb t = evaluate_texture(tables, node.amount, uv);
-            return evaluate_texture(tables, node.a, uv, use) * (Rgb(1.0f) - t) + evaluate_texture(tables, node.b, uv, use) * t;
+            const Rgb t = evaluate_texture(tables, node.amount, at);
+            return evaluate_texture(tables, node.a, at, use) * (Rgb(1.0f) - t) + evaluate_texture(tables, node.b, at, use) * t;
         }
         case TextureKind::kCheckerboard: {
-            if (!(std::fabs(st.x) < 1e9f && std::fabs(st.y) < 1e9f)) return evaluate_texture(tables, node.a, uv, use);
+            if (!(std::fabs(st.x) < 1e9f && std::fabs(st.y) < 1e9f)) return evaluate_texture(tables, node.a, at, use);
             const int64_t cells = int64_t(std::floor(st.x)) + int64_t(std::floor(st.y));
-            return evaluate_texture(tables, (cells & 1) == 0 ? node.a : node.b, uv, use);
+            return evaluate_texture(tables, (cells & 1) == 0 ? node.a : node.b, at, use);
         }
         case TextureKind::kImage: {
             const Rgb v = image_value(node, tables.images[size_t(node.image)], st);
