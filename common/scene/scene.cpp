@@ -120,13 +120,14 @@ bool Scene::occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3&
 float Scene::opacity(const void* user, const Accel::OpacityQuery& query) {
     const Scene& scene = *static_cast<const Scene*>(user);
     const SceneDescription& d = scene.description_;
+    const bool needs_place = !d.texture_spaces.empty();
     TexturePoint at{{query.u, query.v}, {}};
     TextureId alpha;
     if (query.geometry == Accel::kSphereGeometry) {
         const Sphere& s = (query.object < 0 ? d.spheres : d.objects[size_t(query.object)].spheres)[query.primitive];
         alpha = s.attributes.alpha;
         if (alpha == kNone) return 1;
-        at.p = s.centre + query.outward * s.radius;
+        if (needs_place) at.p = s.centre + query.outward * s.radius;
     } else {
         const TriangleMesh& mesh = (query.object < 0 ? d.meshes : d.objects[size_t(query.object)].meshes)[query.geometry];
         alpha = mesh.attributes.alpha;
@@ -137,9 +138,9 @@ float Scene::opacity(const void* user, const Accel::OpacityQuery& query) {
         const float u = query.u, v = query.v, w = 1 - u - v;
         at.uv = {w * uv[0].x + u * uv[1].x + v * uv[2].x, w * uv[0].y + u * uv[1].y + v * uv[2].y};
         const Vec3& p0 = mesh.positions[index[0]];
-        at.p = p0 + (mesh.positions[index[1]] - p0) * u + (mesh.positions[index[2]] - p0) * v;
+        if (needs_place) at.p = p0 + (mesh.positions[index[1]] - p0) * u + (mesh.positions[index[2]] - p0) * v;
     }
-    if (query.instance >= 0) at.p = d.instances[size_t(query.instance)].object_to_world.point(at.p);
+    if (needs_place && query.instance >= 0) at.p = d.instances[size_t(query.instance)].object_to_world.point(at.p);
     return evaluate_texture(scene.tables_, alpha, at).r;
 }
 

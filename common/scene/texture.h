@@ -13,6 +13,7 @@ struct TextureTables {
     std::span<const TextureNode> nodes;
     std::span<const Image> images;
     std::span<const Material> materials;
+    std::span<const Mat4> spaces = {};
 };
 
 /// Where a texture is looked up. The same surface point has the same one whatever technique found it.

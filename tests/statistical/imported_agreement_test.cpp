@@ -27,6 +27,7 @@ constexpr File kFiles[] = {
     {"furnace-sphere", "path light bdpt"},
     {"instances", "path light bdpt"},
     {"point-spot", "path light bdpt"},
+    {"procedural", "path light bdpt"},
     {"smooth-normals", "path light bdpt"},
     {"textures", "path light bdpt"},
     {"thin-lens", "path light bdpt"},

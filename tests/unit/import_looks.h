@@ -14,7 +14,7 @@ inline const std::string kShape = " Shape \"sphere\" ";
 inline Material material_of(const SceneDescription& d) { return d.materials.at(size_t(d.spheres.at(0).attributes.material)); }
 
 inline Rgb value(const SceneDescription& d, TextureId id, Vec2 uv = {0.3f, 0.3f}, const Vec3& p = {}) {
-    return evaluate_texture({d.textures, d.images, d.materials}, id, {uv, p});
+    return evaluate_texture({d.textures, d.images, d.materials, d.texture_spaces}, id, {uv, p});
 }
 
 /// An uncompressed 24-bit TGA; `bgr` holds rows from the bottom.
