@@ -28,6 +28,7 @@ constexpr File kFiles[] = {
     {"instances", "path light bdpt"},
     {"point-spot", "path light bdpt"},
     {"procedural", "path light bdpt"},
+    {"shapes", "path light bdpt"},
     {"smooth-normals", "path light bdpt"},
     {"textures", "path light bdpt"},
     {"thin-lens", "path light bdpt"},
