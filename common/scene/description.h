@@ -43,17 +43,17 @@ enum class TextureMapping : uint8_t {
 
 struct TextureNode {
     TextureKind kind = TextureKind::kConstant;
+    uint8_t octaves = 0;             ///< kFractal, kWrinkled, kMarble.
     Rgb value{0.0f};                 ///< kConstant. A float texture has three equal components.
     TextureId a = kNone, b = kNone;  ///< kScale: a * b. kMix: (1-amount) a + amount b. Checkerboards: the two colours. kDots:
                                      ///< inside and outside.
-    TextureId amount = kNone;  ///< kMix only.
-    int32_t image = kNone;     ///< kImage: index into SceneDescription::images.
+    TextureId amount = kNone;        ///< kMix only.
+    int32_t image = kNone;           ///< kImage: index into SceneDescription::images.
     WrapMode wrap = WrapMode::kRepeat;
     bool nearest = false;                          ///< kImage: point lookup; bilinear otherwise.
-    float scale = 1;                               ///< kImage: multiplies the looked-up value. kMarble: multiplies the place.
     bool invert = false;                           ///< kImage: 1 - the scaled value (pbrt's order); below zero is zero.
     TextureMapping mapping = TextureMapping::kUv;  ///< kCheckerboard, kImage, kDots.
-    uint8_t octaves = 0;                           ///< kFractal, kWrinkled, kMarble.
+    float scale = 1;                               ///< kImage: multiplies the looked-up value. kMarble: multiplies the place.
     float su = 1, sv = 1, du = 0, dv = 0;          ///< TextureMapping::kUv.
     int32_t space = kNone;                         ///< Index into SceneDescription::texture_spaces: other mappings, and the kinds
                                                    ///< that are functions of the place (kSolidCheckerboard, kFractal and below).
