@@ -10,8 +10,9 @@
 namespace lightloom {
 
 struct ImportOptions {
-    bool strict = false;                          ///< Warnings become errors.
-    uint64_t max_file_bytes = uint64_t(8) << 30;  ///< Refuse larger files before reading them.
+    bool strict = false;                                    ///< Warnings become errors.
+    uint64_t max_file_bytes = uint64_t(8) << 30;            ///< Refuse larger files before reading them.
+    uint64_t max_subdivided_triangles = uint64_t(1) << 23;  ///< Refuse subdivision surfaces that would become more.
 };
 
 struct ImportedScene {

@@ -2,8 +2,8 @@
 //
 // Orientation: a mesh keeps its corners in file order; `flip_normal` is ReverseOrientation xor "the transformation
 // swaps handedness", which makes the geometric normal the image of the object-space one. pbrt-v4 turns the
-// object-space normal of a mirrored sphere or disk where a ray hits it: a mirrored glass sphere is a hole in glass. Where it
-// samples light on one it does not; so spheres and disks that emit keep their side here, hit or sampled.
+// object-space normal of a mirrored sphere, disk or cylinder where a ray hits it: a mirrored glass sphere is a hole in glass. Where
+// it samples light on one it does not; so those that emit keep their side here, hit or sampled.
 
 #include <cmath>
 
@@ -263,7 +263,8 @@ TriangleMesh subdivision_surface(Context* context, const ParameterList& paramete
     const int levels = parameters.one_int("levels", 3);
     parameters.accept("string", "scheme");  // There is one; pbrt looks at no other either.
     const TriangleMesh control = read_points_and_indices(parameters, 3);
-    Result<TriangleMesh> mesh = loop_subdivide(control.positions, control.indices, levels);
+    Result<TriangleMesh> mesh =
+        loop_subdivide(control.positions, control.indices, levels, context->options.max_subdivided_triangles);
     if (!mesh.ok()) fail(parameters.where(), parameters.what() + ": " + mesh.status().message());
     return place(context, parameters, std::move(mesh).value(), state);
 }

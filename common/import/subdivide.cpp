@@ -217,13 +217,14 @@ bool to_unit(const Point& n, Vec3* out) {
 
 }  // namespace
 
-Result<TriangleMesh> loop_subdivide(const std::vector<Vec3>& points, const std::vector<uint32_t>& indices, int levels) {
+Result<TriangleMesh> loop_subdivide(const std::vector<Vec3>& points, const std::vector<uint32_t>& indices, int levels,
+                                    uint64_t max_triangles) {
     if (levels < 0) return invalid_argument("levels must not be negative");
     uint64_t triangles = indices.size() / 3;
-    for (int i = 0; i < levels && triangles > 0 && triangles <= kMaxSubdividedTriangles; ++i) triangles *= 4;
-    if (triangles > kMaxSubdividedTriangles)
-        return invalid_argument("with " + std::to_string(levels) + " levels it becomes more than " +
-                                std::to_string(kMaxSubdividedTriangles) + " triangles; use fewer levels");
+    for (int i = 0; i < levels && triangles > 0 && triangles <= max_triangles; ++i) triangles *= 4;
+    if (triangles > max_triangles)
+        return invalid_argument("with " + std::to_string(levels) + " levels it becomes more than " + std::to_string(max_triangles) +
+                                " triangles; use fewer levels");
     Result<Level> control = control_mesh(points, indices);
     if (!control.ok()) return control.status();
     Level level = std::move(control).value();

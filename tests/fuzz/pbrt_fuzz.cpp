@@ -30,6 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
                                                                              {"a.spd", "400 1\n700 0.5\n"}});
     lightloom::ImportOptions options;
     options.max_file_bytes = 16 << 20;
+    options.max_subdivided_triangles = 1 << 14;
     const auto scene = lightloom::import::import_from(&files, "scene.pbrt", options);
     // An error is one line that names the file.
     if (!scene.ok() && (scene.status().message().empty() || scene.status().message().find('\n') != std::string::npos))

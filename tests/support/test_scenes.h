@@ -202,7 +202,7 @@ inline std::shared_ptr<const Scene> textures_in_space() {
         TextureNode node;
         node.kind = kind;
         node.space = space;
-        node.octaves = 4;
+        node.octaves = 2;
         node.omega = 0.5f;
         node.variation = 0.7f;
         return node;

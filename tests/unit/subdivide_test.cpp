@@ -108,7 +108,7 @@ struct Plain {
 };
 
 TriangleMesh subdivided(const Control& control, int levels) {
-    Result<TriangleMesh> mesh = loop_subdivide(control.points, control.indices, levels);
+    Result<TriangleMesh> mesh = loop_subdivide(control.points, control.indices, levels, 1 << 20);
     EXPECT_TRUE(mesh.ok()) << mesh.status().message();
     return mesh.ok() ? std::move(mesh).value() : TriangleMesh{};
 }
