@@ -35,7 +35,8 @@ const char* name_of(MaterialKind kind) {
 }
 
 const char* name_of(TextureKind kind) {
-    constexpr std::array<const char*, 5> kNames{"constant", "scale", "mix", "checkerboard", "image"};
+    constexpr std::array<const char*, 11> kNames{"constant", "scale", "mix",      "checkerboard", "image", "solid checkerboard",
+                                                 "dots",     "fbm",   "wrinkled", "windy",        "marble"};
     return kNames[size_t(kind)];
 }
 

@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <tuple>
@@ -43,6 +44,8 @@ struct MaterialReference {
 struct Definition {
     std::string kind;  ///< "imagemap", "diffuse", ...
     ParameterList parameters;
+    Mat4 to_world = {};  ///< Of a texture: the transformation in force at its directive.
+    bool moves = false;  ///< Whether that changes while the shutter is open.
 };
 
 struct AreaLightDefinition {
@@ -56,7 +59,7 @@ struct PendingShape {
     int32_t object = kNone;       ///< Index into SceneDescription::objects, or kNone.
     MaterialReference material;
     std::shared_ptr<const AreaLightDefinition> area_light;  ///< Null if the shape does not emit.
-    bool is_scaled_quadric = false;                         ///< A sphere or disk that its transformation makes larger or smaller.
+    bool is_scaled_quadric = false;  ///< A sphere, disk or cylinder that its transformation makes larger or smaller.
     float alpha = 1;
     std::string alpha_texture;  ///< Empty if the shape has none.
     Location where;
@@ -102,6 +105,7 @@ struct Context {
     std::map<std::string, MaterialId> resolved_named_materials;
     std::map<int, MaterialId> resolved_anonymous_materials;
     std::map<std::tuple<float, float, float>, TextureId> constants;
+    std::map<decltype(Mat4::m), int32_t> texture_spaces;
     std::map<std::string, int32_t> image_index;  ///< By file, encoding and channel choice.
     std::map<std::tuple<float, float, float, bool>, int32_t> emission_index;
     std::vector<TextureCost> texture_costs;        ///< One per scene texture.
@@ -151,8 +155,21 @@ TextureId spectrum_texture_parameter(Context* context, const ParameterList& para
 
 /// The temperature of a parameter of type "blackbody"; fails if it is not one or out of range. `what` names the directive.
 double kelvin_of(const Parameter& p, const std::string& what);
+/// Parameter `name` as the texture that another one is made of; `fallback` if absent.
+TextureId texture_operand(Context* context, const ParameterList& parameters, std::string_view name, TextureUse use, float fallback);
+
 /// Parameter `name` of type "spectrum" read from its values or file; nothing if absent.
 std::optional<Spectrum> spectrum_parameter(Context* context, const ParameterList& parameters, std::string_view name);
+
+// procedural.cpp
+/// The 2D mapping of a texture: from (u, v), or from the place in the space of its transformation.
+void read_mapping(Context* context, const Definition& definition, TextureNode* node);
+/// A checkerboard, dots, fbm, wrinkled, windy or marble; nothing for another kind.
+std::optional<TextureId> procedural_texture(Context* context, const Definition& definition, TextureUse use);
+/// Of one of these, but for those of float textures that consist of others.
+TextureRange noise_range(const TextureNode& node);
+/// Noise evaluations of one look-up.
+double noise_cost(const TextureNode& node);
 
 // materials.cpp
 MaterialId resolve_material_reference(Context* context, const MaterialReference& reference);

@@ -171,7 +171,8 @@ void Parser::texture(Tokenizer* tokens, const Location& where) {
     if (was_ptex && type == "spectrum") list.add_default("rgb", "value", {0.5, 0.5, 0.5});
     if (const auto it = state_.attributes.find("texture"); it != state_.attributes.end()) list.add_defaults(it->second);
     auto& table = type == "float" ? context_->float_textures : context_->spectrum_textures;
-    if (!table.try_emplace(name, Definition{kind, std::move(list)}).second)
+    Definition definition{kind, std::move(list), state_.ctm[0], !(state_.ctm[0] == state_.ctm[1])};
+    if (!table.try_emplace(name, std::move(definition)).second)
         fail(where, "the " + type + " texture " + quoted(name) + " is defined twice; rename one of the two");
 }
 
@@ -205,7 +206,7 @@ void Parser::shape(Tokenizer* tokens, const Location& where) {
     });
     if (!good) pending.geometry = Sphere{}, pending.faces = {};
     if (!pending.area_light) pending.faces = {};
-    pending.is_scaled_quadric = (kind == "sphere" || kind == "disk") && has_scale(state_.ctm[0]);
+    pending.is_scaled_quadric = (kind == "sphere" || kind == "disk" || kind == "cylinder") && has_scale(state_.ctm[0]);
     context_->shapes.push_back(std::move(pending));
 }
 

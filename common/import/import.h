@@ -12,6 +12,7 @@ namespace lightloom {
 struct ImportOptions {
     bool strict = false;                          ///< Warnings become errors.
     uint64_t max_file_bytes = uint64_t(8) << 30;  ///< Refuse larger files, and text beyond it in all, before reading them.
+    uint64_t max_subdivided_triangles = uint64_t(1) << 23;  ///< Refuse subdivision surfaces that would become more.
     /// The scene's root: the scene file lies below it, and the scene may not leave it. Empty: the root may lie up to three
     /// directories above the scene file's, or is the current directory if that is farther up; never that of the file system.
     std::string root;

@@ -25,6 +25,8 @@ constexpr std::string_view kShapeParameters[] = {"float alpha",
                                                  "point2 uv",
                                                  "integer indices",
                                                  "integer faceIndices",
+                                                 "integer levels",
+                                                 "string scheme",
                                                  "string filename",
                                                  "float edgelength",
                                                  "float displacement",
@@ -97,12 +99,15 @@ constexpr std::string_view kMaterialParameters[] = {"string type",
                                                     "float amount",
                                                     "texture amount"};
 constexpr std::string_view kTextureParameters[] = {
-    "float value",       "rgb value",      "spectrum value",      "blackbody value", "texture value",   "float tex",
-    "rgb tex",           "spectrum tex",   "blackbody tex",       "texture tex",     "float tex1",      "rgb tex1",
-    "spectrum tex1",     "blackbody tex1", "texture tex1",        "float tex2",      "rgb tex2",        "spectrum tex2",
-    "blackbody tex2",    "texture tex2",   "float scale",         "texture scale",   "float amount",    "texture amount",
-    "integer dimension", "string mapping", "float uscale",        "float vscale",    "float udelta",    "float vdelta",
-    "string filename",   "string filter",  "float maxanisotropy", "string wrap",     "string encoding", "bool invert"};
+    "float value",       "rgb value",        "spectrum value",      "blackbody value", "texture value",   "float tex",
+    "rgb tex",           "spectrum tex",     "blackbody tex",       "texture tex",     "float tex1",      "rgb tex1",
+    "spectrum tex1",     "blackbody tex1",   "texture tex1",        "float tex2",      "rgb tex2",        "spectrum tex2",
+    "blackbody tex2",    "texture tex2",     "float scale",         "texture scale",   "float amount",    "texture amount",
+    "integer dimension", "string mapping",   "float uscale",        "float vscale",    "float udelta",    "float vdelta",
+    "string filename",   "string filter",    "float maxanisotropy", "string wrap",     "string encoding", "bool invert",
+    "vector3 v1",        "vector3 v2",       "float inside",        "rgb inside",      "spectrum inside", "texture inside",
+    "float outside",     "rgb outside",      "spectrum outside",    "texture outside", "integer octaves", "float roughness",
+    "float variation",   "blackbody inside", "blackbody outside"};
 
 std::string read_string(Tokenizer* tokens, const Location& where, const std::string& word) {
     const Token token = tokens->next();

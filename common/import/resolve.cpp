@@ -100,7 +100,7 @@ void add_shape(Context* context, PendingShape shape) {
         const bool powered = area_light_uses_power(*shape.area_light);
         if (powered && shape.is_scaled_quadric)
             context->diagnostics.warn(shape.where,
-                                      "the light emits its power from the sphere or disk as it is scaled; pbrt-v4 "
+                                      "the light emits its power from the sphere, disk or cylinder as it is scaled; pbrt-v4 "
                                       "takes the area before the transformation, and warns of the scale");
         if (powered && mesh) return add_powered_mesh(context, std::move(*mesh), shape);
         const double area = sphere ? 4 * kPiD * double(sphere->radius) * sphere->radius : 0;

@@ -2,14 +2,15 @@
 //
 // Orientation: a mesh keeps its corners in file order; `flip_normal` is ReverseOrientation xor "the transformation
 // swaps handedness", which makes the geometric normal the image of the object-space one. pbrt-v4 turns the
-// object-space normal of a mirrored sphere or disk where a ray hits it: a mirrored glass sphere is a hole in glass. Where it
-// samples light on one it does not; so spheres and disks that emit keep their side here, hit or sampled.
+// object-space normal of a mirrored sphere, disk or cylinder where a ray hits it: a mirrored glass sphere is a hole in glass. Where
+// it samples light on one it does not; so those that emit keep their side here, hit or sampled.
 
 #include <cmath>
 
 #include "common/core/math.h"
 #include "common/import/context.h"
 #include "common/import/ply.h"
+#include "common/import/subdivide.h"
 #include "common/import/tessellate.h"
 
 namespace lightloom::import {
@@ -79,21 +80,12 @@ std::vector<Vec3> points(const ParameterList& parameters, std::string_view type,
     return out;
 }
 
-/// P, N, uv and indices of trianglemesh and bilinearmesh; `corners` vertices make one face.
-TriangleMesh read_mesh(const ParameterList& parameters, size_t corners) {
+/// P and indices; `corners` vertices make one face.
+TriangleMesh read_points_and_indices(const ParameterList& parameters, size_t corners) {
     const std::string& what = parameters.what();
     TriangleMesh mesh;
     mesh.positions = points(parameters, "point3", "P");
     if (mesh.positions.empty()) fail(parameters.where(), what + " has no \"point3 P\"");
-    mesh.normals = points(parameters, "normal", "N");
-    if (const std::vector<double>* uv = parameters.numbers("point2", "uv", 2))
-        for (size_t i = 0; i < uv->size(); i += 2) mesh.uvs.push_back({float((*uv)[i]), float((*uv)[i + 1])});
-    if (!mesh.normals.empty() && mesh.normals.size() != mesh.positions.size())
-        fail(parameters.where(), what + ": N has " + std::to_string(mesh.normals.size()) + " normals for " +
-                                     std::to_string(mesh.positions.size()) + " points");
-    if (!mesh.uvs.empty() && mesh.uvs.size() != mesh.positions.size())
-        fail(parameters.where(), what + ": uv has " + std::to_string(mesh.uvs.size()) + " pairs for " +
-                                     std::to_string(mesh.positions.size()) + " points");
     if (const std::vector<double>* indices = parameters.numbers("integer", "indices", corners)) {
         mesh.indices.reserve(indices->size());
         for (const double index : *indices) {
@@ -107,6 +99,22 @@ TriangleMesh read_mesh(const ParameterList& parameters, size_t corners) {
     } else {
         fail(parameters.where(), what + " has no \"integer indices\"");
     }
+    return mesh;
+}
+
+/// Of trianglemesh and bilinearmesh: the same with N and uv.
+TriangleMesh read_mesh(const ParameterList& parameters, size_t corners) {
+    const std::string& what = parameters.what();
+    TriangleMesh mesh = read_points_and_indices(parameters, corners);
+    mesh.normals = points(parameters, "normal", "N");
+    if (const std::vector<double>* uv = parameters.numbers("point2", "uv", 2))
+        for (size_t i = 0; i < uv->size(); i += 2) mesh.uvs.push_back({float((*uv)[i]), float((*uv)[i + 1])});
+    if (!mesh.normals.empty() && mesh.normals.size() != mesh.positions.size())
+        fail(parameters.where(), what + ": N has " + std::to_string(mesh.normals.size()) + " normals for " +
+                                     std::to_string(mesh.positions.size()) + " points");
+    if (!mesh.uvs.empty() && mesh.uvs.size() != mesh.positions.size())
+        fail(parameters.where(), what + ": uv has " + std::to_string(mesh.uvs.size()) + " pairs for " +
+                                     std::to_string(mesh.positions.size()) + " points");
     return mesh;
 }
 
@@ -153,15 +161,34 @@ TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const S
     return place(context, parameters, std::move(mesh), state);
 }
 
-void require_full_turn(const ParameterList& parameters) {
-    if (parameters.one_float("phimax", 360) < 360)
-        fail(parameters.where(), parameters.what() + ": a phimax below 360 is not supported; use a triangle mesh");
+/// The angle that a part of a quadric covers, in degrees; as in pbrt, more than a full turn is one.
+float read_phimax(const ParameterList& parameters) {
+    const float phimax = parameters.one_float("phimax", 360);
+    if (!(phimax > 0)) fail(parameters.where(), parameters.what() + ": phimax must be positive, in degrees");
+    return std::fmin(phimax, 360.0f);
+}
+
+struct Interval {
+    float zmin, zmax;
+};
+
+/// zmin and zmax, as far as they lie within `limits`.
+Interval read_interval(Context* context, const ParameterList& parameters, const Interval& fallback, const Interval& limits) {
+    Interval z{parameters.one_float("zmin", fallback.zmin), parameters.one_float("zmax", fallback.zmax)};
+    if (z.zmin > z.zmax) {
+        context->diagnostics.warn(parameters.where(), parameters.what() + ": zmin is above zmax; as in pbrt, they are exchanged");
+        std::swap(z.zmin, z.zmax);
+    }
+    z = {std::fmax(z.zmin, limits.zmin), std::fmin(z.zmax, limits.zmax)};
+    if (!(z.zmin < z.zmax))
+        fail(parameters.where(), parameters.what() + ": zmin and zmax leave nothing of it; set zmin below zmax");
+    return z;
 }
 
 /// All triangles are parts of one shape.
 void join(const TriangleMesh& mesh, std::vector<uint32_t>* faces) { faces->assign(mesh.indices.size() / 3, 0); }
 
-/// Of a sphere or disk, see above.
+/// Of a sphere, disk or cylinder, see above.
 ShapeState quadric(ShapeState state) {
     if (!state.emits && state.object_to_world.swaps_handedness()) state.reverse_orientation = !state.reverse_orientation;
     return state;
@@ -171,17 +198,22 @@ std::variant<TriangleMesh, Sphere> sphere(Context* context, const ParameterList&
                                           std::vector<uint32_t>* faces) {
     const float radius = parameters.one_float("radius", 1);
     if (!(radius > 0)) fail(parameters.where(), parameters.what() + ": the radius must be positive");
-    if (parameters.one_float("zmin", -radius) > -radius || parameters.one_float("zmax", radius) < radius)
-        fail(parameters.where(),
-             parameters.what() + ": zmin or zmax cut the sphere; partial spheres are not supported, use a triangle mesh");
-    require_full_turn(parameters);
+    const Interval whole{-radius, radius}, z = read_interval(context, parameters, whole, whole);
+    const float phimax = read_phimax(parameters);
+    if (z.zmin > -radius || z.zmax < radius || phimax < 360) {
+        context->diagnostics.warn(parameters.where(), parameters.what() + ": a part of a sphere becomes triangles with smooth " +
+                                                          "normals and exactly its area, true to 0.03 % of the radius");
+        TriangleMesh mesh = tessellate_sphere(radius, z.zmin, z.zmax, phimax);
+        join(mesh, faces);
+        return place(context, parameters, std::move(mesh), quadric(state));
+    }
     checked_inverse(parameters, state.object_to_world);
     const std::optional<double> scale = similarity_scale(state.object_to_world);
     if (!scale) {
         context->diagnostics.warn(parameters.where(), parameters.what() +
                                                           ": its transformation is not a similarity, so it becomes " +
                                                           std::to_string(kEllipsoidTriangles) + " triangles with smooth normals");
-        TriangleMesh mesh = tessellate_sphere(radius);
+        TriangleMesh mesh = tessellate_sphere(radius, -radius, radius, 360);
         join(mesh, faces);
         return place(context, parameters, std::move(mesh), quadric(state));
     }
@@ -208,13 +240,38 @@ TriangleMesh disk(Context* context, const ParameterList& parameters, const Shape
     const float height = parameters.one_float("height", 0);
     if (!(radius > 0) || !(inner >= 0) || !(inner < radius))
         fail(parameters.where(), parameters.what() + ": radius must be positive and larger than innerradius");
-    require_full_turn(parameters);
+    const float phimax = read_phimax(parameters);
     context->diagnostics.warn(parameters.where(),
-                              parameters.what() + ": disks become a ring of " + std::to_string(kDiskSegments) +
-                                  " segments of exactly the disk's area; the rim is true to 0.03 % of the radius");
-    TriangleMesh mesh = tessellate_disk(radius, inner, height);
+                              parameters.what() + ": disks become a ring of " + std::to_string(kTurnSegments) +
+                                  " segments (a turn) of exactly the disk's area; the rim is true to 0.03 % of the radius");
+    TriangleMesh mesh = tessellate_disk(radius, inner, height, phimax);
     join(mesh, faces);
     return place(context, parameters, std::move(mesh), quadric(state));
+}
+
+TriangleMesh cylinder(Context* context, const ParameterList& parameters, const ShapeState& state, std::vector<uint32_t>* faces) {
+    const float radius = parameters.one_float("radius", 1);
+    if (!(radius > 0)) fail(parameters.where(), parameters.what() + ": the radius must be positive");
+    const Interval z = read_interval(context, parameters, {-1, 1}, {-HUGE_VALF, HUGE_VALF});
+    const float phimax = read_phimax(parameters);
+    context->diagnostics.warn(parameters.where(),
+                              parameters.what() + ": cylinders become a ring of " + std::to_string(kTurnSegments) +
+                                  " segments (a turn) of exactly the cylinder's area with smooth normals, true " +
+                                  "to 0.03 % of the radius");
+    TriangleMesh mesh = tessellate_cylinder(radius, z.zmin, z.zmax, phimax);
+    join(mesh, faces);
+    return place(context, parameters, std::move(mesh), quadric(state));
+}
+
+/// As in pbrt, the outside of the limit surface is the side from which the corners of a face are seen clockwise.
+TriangleMesh subdivision_surface(Context* context, const ParameterList& parameters, const ShapeState& state) {
+    const int levels = parameters.one_int("levels", 3);
+    parameters.accept("string", "scheme");  // There is one; pbrt looks at no other either.
+    const TriangleMesh control = read_points_and_indices(parameters, 3);
+    Result<TriangleMesh> mesh =
+        loop_subdivide(control.positions, control.indices, levels, context->options.max_subdivided_triangles);
+    if (!mesh.ok()) fail(parameters.where(), parameters.what() + ": " + mesh.status().message());
+    return place(context, parameters, std::move(mesh).value(), state);
 }
 
 TriangleMesh bilinear_mesh(Context* context, const ParameterList& parameters, const ShapeState& state,
@@ -239,8 +296,11 @@ std::variant<TriangleMesh, Sphere> make_shape(Context* context, const std::strin
     if (kind == "plymesh") return ply_mesh(context, parameters, state, faces);
     if (kind == "sphere") return sphere(context, parameters, state, faces);
     if (kind == "disk") return disk(context, parameters, state, faces);
+    if (kind == "cylinder") return cylinder(context, parameters, state, faces);
+    if (kind == "loopsubdiv") return subdivision_surface(context, parameters, state);
     if (kind == "bilinearmesh") return bilinear_mesh(context, parameters, state, faces);
-    fail(parameters.where(), parameters.what() + " is not supported; use trianglemesh, plymesh, sphere, disk or bilinearmesh");
+    fail(parameters.where(),
+         parameters.what() + " is not supported; use trianglemesh, plymesh, loopsubdiv, sphere, disk, cylinder or bilinearmesh");
 }
 
 }  // namespace lightloom::import

@@ -1,5 +1,6 @@
 #include "common/import/tessellate.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -19,20 +20,45 @@ std::optional<double> similarity_scale(const Mat4& m) {
     return std::sqrt(mean) / std::fabs(m.m[3][3]);
 }
 
-TriangleMesh tessellate_disk(float radius, float inner_radius, float height) {
-    // The polygon of n corners at distance r' has the area n/2 r'^2 sin(2 pi / n); make it pi r^2.
-    const double angle = 2 * kPiD / kDiskSegments;
-    const double grow = std::sqrt(angle / math::sin(angle));
+namespace {
+
+/// Directions in the plane of x and y, evenly over a part of a turn.
+struct Fan {
+    uint32_t segments;
+    double turns;
+
+    explicit Fan(float phimax) : segments(uint32_t(std::ceil(kTurnSegments * double(phimax) / 360))), turns(double(phimax) / 360) {}
+    double angle() const { return turns * 2 * kPiD / segments; }
+    math::SinCos direction(uint32_t i) const {
+        return math::sincos_turns(turns == 1 ? double(i % segments) / segments : turns * double(i) / segments);
+    }
+};
+
+double area_of(const TriangleMesh& mesh) {
+    double sum = 0;
+    for (size_t i = 0; i < mesh.indices.size(); i += 3) {
+        const Vec3& a = mesh.positions[mesh.indices[i]];
+        sum += 0.5 * double(length(cross(mesh.positions[mesh.indices[i + 1]] - a, mesh.positions[mesh.indices[i + 2]] - a)));
+    }
+    return sum;
+}
+
+}  // namespace
+
+TriangleMesh tessellate_disk(float radius, float inner_radius, float height, float phimax) {
+    // The triangle of two corners at distance r' and the centre has the area r'^2 sin(a) / 2; make it r^2 a / 2.
+    const Fan fan(phimax);
+    const double grow = std::sqrt(fan.angle() / math::sin(fan.angle()));
     TriangleMesh mesh;
-    for (int i = 0; i <= kDiskSegments; ++i) {
-        const math::SinCos d = math::sincos_turns(double(i % kDiskSegments) / kDiskSegments);
-        const float u = float(i) / kDiskSegments;
+    for (uint32_t i = 0; i <= fan.segments; ++i) {
+        const math::SinCos d = fan.direction(i);
+        const float u = float(i) / float(fan.segments);
         for (const float r : {inner_radius, radius}) {
             mesh.positions.push_back({float(d.cos * r * grow), float(d.sin * r * grow), height});
             mesh.uvs.push_back({u, (radius - r) / (radius - inner_radius)});
         }
     }
-    for (uint32_t i = 0; i < kDiskSegments; ++i) {
+    for (uint32_t i = 0; i < fan.segments; ++i) {
         const uint32_t a = 2 * i;  // inner, outer, next inner, next outer
         if (inner_radius > 0) mesh.indices.insert(mesh.indices.end(), {a, a + 1, a + 2});
         mesh.indices.insert(mesh.indices.end(), {a + 1, a + 3, a + 2});
@@ -40,28 +66,57 @@ TriangleMesh tessellate_disk(float radius, float inner_radius, float height) {
     return mesh;
 }
 
-TriangleMesh tessellate_sphere(float radius) {
-    constexpr int kSectors = 2 * kSphereRings;
+TriangleMesh tessellate_sphere(float radius, float zmin, float zmax, float phimax) {
+    // Polar angles are counted from the south pole, in turns.
+    const double lowest = 0.5 - math::acos(double(zmin) / radius) / (2 * kPiD);
+    const double highest = 0.5 - math::acos(double(zmax) / radius) / (2 * kPiD);
+    const bool south = zmin <= -radius, north = zmax >= radius;
+    const Fan fan(phimax);
+    const uint32_t rings = std::max(1u, uint32_t(std::ceil((highest - lowest) * 2 * kSphereRings)));
     TriangleMesh mesh;
     mesh.curved = true;
-    for (int ring = 0; ring <= kSphereRings; ++ring) {
-        const float v = float(ring) / kSphereRings;
-        const math::SinCos theta = math::sincos_turns(0.5 * double(ring) / kSphereRings);
-        const double sine = ring == 0 || ring == kSphereRings ? 0 : theta.sin;
-        for (int sector = 0; sector <= kSectors; ++sector) {
-            const math::SinCos phi = math::sincos_turns(double(sector % kSectors) / kSectors);
+    for (uint32_t ring = 0; ring <= rings; ++ring) {
+        const math::SinCos theta = math::sincos_turns(lowest + (highest - lowest) * double(ring) / rings);
+        const double sine = (south && ring == 0) || (north && ring == rings) ? 0 : theta.sin;
+        for (uint32_t sector = 0; sector <= fan.segments; ++sector) {
+            const math::SinCos phi = fan.direction(sector);
             const Vec3 n{float(sine * phi.cos), float(sine * phi.sin), float(-theta.cos)};
             mesh.positions.push_back(n * radius);
             mesh.normals.push_back(n);
-            mesh.uvs.push_back({float(sector) / kSectors, v});
+            mesh.uvs.push_back({float(sector) / float(fan.segments), float(ring) / float(rings)});
         }
     }
-    for (uint32_t ring = 0; ring < kSphereRings; ++ring)
-        for (uint32_t sector = 0; sector < kSectors; ++sector) {
-            const uint32_t a = ring * (kSectors + 1) + sector, b = a + kSectors + 1;
-            if (ring > 0) mesh.indices.insert(mesh.indices.end(), {a, a + 1, b + 1});
-            if (ring + 1 < kSphereRings) mesh.indices.insert(mesh.indices.end(), {a, b + 1, b});
+    for (uint32_t ring = 0; ring < rings; ++ring)
+        for (uint32_t sector = 0; sector < fan.segments; ++sector) {
+            const uint32_t a = ring * (fan.segments + 1) + sector, b = a + fan.segments + 1;
+            if (!south || ring > 0) mesh.indices.insert(mesh.indices.end(), {a, a + 1, b + 1});
+            if (!north || ring + 1 < rings) mesh.indices.insert(mesh.indices.end(), {a, b + 1, b});
         }
+    if (south && north && fan.turns == 1) return mesh;
+    const double area = fan.turns * 2 * kPiD * radius * (double(zmax) - zmin);
+    const float grow = float(std::sqrt(area / area_of(mesh)));
+    for (Vec3& p : mesh.positions) p *= grow;
+    return mesh;
+}
+
+TriangleMesh tessellate_cylinder(float radius, float zmin, float zmax, float phimax) {
+    // A chord between corners at distance r' is 2 r' sin(a / 2) long; make it r a.
+    const Fan fan(phimax);
+    const double grow = 0.5 * fan.angle() / math::sin(0.5 * fan.angle());
+    TriangleMesh mesh;
+    mesh.curved = true;
+    for (uint32_t i = 0; i <= fan.segments; ++i) {
+        const math::SinCos d = fan.direction(i);
+        for (const bool top : {false, true}) {
+            mesh.positions.push_back({float(d.cos * radius * grow), float(d.sin * radius * grow), top ? zmax : zmin});
+            mesh.normals.push_back({float(d.cos), float(d.sin), 0});
+            mesh.uvs.push_back({float(i) / float(fan.segments), top ? 1.0f : 0.0f});
+        }
+    }
+    for (uint32_t i = 0; i < fan.segments; ++i) {
+        const uint32_t a = 2 * i;  // bottom, top, next bottom, next top
+        mesh.indices.insert(mesh.indices.end(), {a, a + 2, a + 3, a, a + 3, a + 1});
+    }
     return mesh;
 }
 

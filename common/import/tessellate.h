@@ -7,8 +7,8 @@
 
 namespace lightloom::import {
 
-inline constexpr int kDiskSegments = 128;
-inline constexpr int kSphereRings = 64;
+inline constexpr int kTurnSegments = 128;  ///< Of a full turn; a part of it has as many as its share, rounded up.
+inline constexpr int kSphereRings = 64;    ///< From pole to pole.
 inline constexpr int kEllipsoidTriangles = 2 * (2 * kSphereRings) * (kSphereRings - 1);
 inline constexpr int kPatchSteps = 16;
 
@@ -16,11 +16,19 @@ inline constexpr int kPatchSteps = 16;
 /// relative 1e-5); nothing for others.
 std::optional<double> similarity_scale(const Mat4& m);
 
-/// A disk or ring about the z axis at `height`. Its rims are polygons scaled so that the area is that of the true disk.
-TriangleMesh tessellate_disk(float radius, float inner_radius, float height);
+/// A sector of `phimax` degrees, in (0, 360], of the disk or ring about the z axis at `height`. Its rims are polygons scaled so
+/// that the area is that of the true shape; they stay within 3 10^-4 of the radius.
+TriangleMesh tessellate_disk(float radius, float inner_radius, float height, float phimax);
 
-/// A sphere about the origin with pbrt's (u, v) and exact normals at the vertices.
-TriangleMesh tessellate_sphere(float radius);
+/// What the planes zmin < zmax, in [-radius, radius], and `phimax` degrees leave of a sphere about the origin, with pbrt's (u, v)
+/// and exact normals at the vertices. A whole sphere has its vertices on the sphere; what is left of one is scaled so that its area
+/// is the true one, and stays within 3 10^-4 of the radius.
+TriangleMesh tessellate_sphere(float radius, float zmin, float zmax, float phimax);
+
+/// A cylinder about the z axis, open at zmin < zmax, with pbrt's (u, v) and exact normals at the vertices. Its polygon is scaled so
+/// that the area is that of the true cylinder; it stays within 3 10^-4 of the radius. Its corners have the directions of those of a
+/// disk of the same `phimax`, so that one covers the other.
+TriangleMesh tessellate_cylinder(float radius, float zmin, float zmax, float phimax);
 
 /// Four corners per face (p00, p10, p01, p11) to triangles. A parallelogram becomes two, which is exact; any other
 /// patch a grid, and then `*curved` is set. `*faces` gets the number of the patch of every triangle.

@@ -76,15 +76,6 @@ Rgb colour_of(Context* context, const Parameter& p, const std::string& what, Tex
     return colour;
 }
 
-/// The (u, v) mapping parameters of 2D textures.
-void read_mapping(const ParameterList& parameters, TextureNode* node) {
-    parameters.one_choice("mapping", "uv", {"uv"});
-    node->su = parameters.one_float("uscale", 1);
-    node->sv = parameters.one_float("vscale", 1);
-    node->du = parameters.one_float("udelta", 0);
-    node->dv = parameters.one_float("vdelta", 0);
-}
-
 void read_encoding(const ParameterList& parameters, const std::string& fallback, ImageRequest* request) {
     const std::string encoding = parameters.one_string("encoding", fallback);
     request->srgb = encoding == "sRGB";
@@ -97,10 +88,11 @@ void read_encoding(const ParameterList& parameters, const std::string& fallback,
     request->gamma = float(gamma);
 }
 
-TextureId image_texture(Context* context, const ParameterList& parameters, TextureUse use) {
+TextureId image_texture(Context* context, const Definition& definition, TextureUse use) {
+    const ParameterList& parameters = definition.parameters;
     TextureNode node;
     node.kind = TextureKind::kImage;
-    read_mapping(parameters, &node);
+    read_mapping(context, definition, &node);
     node.scale = parameters.one_float("scale", 1);
     node.invert = parameters.one_bool("invert", false);
     const std::string wrap = parameters.one_choice("wrap", "repeat", {"repeat", "clamp", "black"});
@@ -123,43 +115,28 @@ TextureId image_texture(Context* context, const ParameterList& parameters, Textu
     return add_node(context, node);
 }
 
-TextureId operand(Context* context, const ParameterList& parameters, std::string_view name, TextureUse use, float fallback) {
-    const TextureId id = use == TextureUse::kFloat ? float_texture_parameter(context, parameters, name)
-                                                   : spectrum_texture_parameter(context, parameters, name, use);
-    return id == kNone ? constant_texture(context, Rgb(fallback)) : id;
-}
-
-TextureId checkerboard(Context* context, const ParameterList& parameters, TextureUse use) {
-    if (parameters.one_int("dimension", 2) != 2)
-        fail(parameters.where(), parameters.what() + ": only \"integer dimension\" 2 is supported");
-    TextureNode node;
-    node.kind = TextureKind::kCheckerboard;
-    read_mapping(parameters, &node);
-    node.a = operand(context, parameters, "tex1", use, 1);
-    node.b = operand(context, parameters, "tex2", use, 0);
-    return add_node(context, node);
-}
-
 TextureId make_texture(Context* context, const Definition& definition, TextureUse use) {
     const ParameterList& parameters = definition.parameters;
     TextureNode node;
-    if (definition.kind == "constant") return operand(context, parameters, "value", use, 1);
-    if (definition.kind == "imagemap") return image_texture(context, parameters, use);
-    if (definition.kind == "checkerboard") return checkerboard(context, parameters, use);
+    if (definition.kind == "constant") return texture_operand(context, parameters, "value", use, 1);
+    if (definition.kind == "imagemap") return image_texture(context, definition, use);
+    if (const auto id = procedural_texture(context, definition, use)) return *id;
     if (definition.kind == "scale") {
         node.kind = TextureKind::kScale;
-        node.a = operand(context, parameters, "tex", use, 1);
-        node.b = operand(context, parameters, "scale", TextureUse::kFloat, 1);
+        node.a = texture_operand(context, parameters, "tex", use, 1);
+        node.b = texture_operand(context, parameters, "scale", TextureUse::kFloat, 1);
         return add_node(context, node);
     }
     if (definition.kind == "mix") {
         node.kind = TextureKind::kMix;
-        node.a = operand(context, parameters, "tex1", use, 0);
-        node.b = operand(context, parameters, "tex2", use, 1);
-        node.amount = operand(context, parameters, "amount", TextureUse::kFloat, 0.5f);
+        node.a = texture_operand(context, parameters, "tex1", use, 0);
+        node.b = texture_operand(context, parameters, "tex2", use, 1);
+        node.amount = texture_operand(context, parameters, "amount", TextureUse::kFloat, 0.5f);
         return add_node(context, node);
     }
-    fail(parameters.where(), parameters.what() + " is not supported; use constant, scale, mix, checkerboard or imagemap");
+    fail(parameters.where(), parameters.what() +
+                                 " is not supported; use constant, scale, mix, imagemap, checkerboard, dots, fbm, " +
+                                 "wrinkled, windy or marble");
 }
 
 TextureRange hull(const TextureRange& a, const TextureRange& b) { return {std::fmin(a.least, b.least), std::fmax(a.most, b.most)}; }
@@ -184,7 +161,9 @@ TextureRange range_of(Context* context, const TextureNode& node) {
     const auto of = [&](TextureId id) { return context->texture_ranges[size_t(id)]; };
     switch (node.kind) {
         case TextureKind::kConstant: return {double(node.value.r), double(node.value.r)};
-        case TextureKind::kCheckerboard: return hull(of(node.a), of(node.b));
+        case TextureKind::kCheckerboard:
+        case TextureKind::kSolidCheckerboard:
+        case TextureKind::kDots: return hull(of(node.a), of(node.b));
         case TextureKind::kScale: return product(of(node.a), of(node.b));
         case TextureKind::kMix: {
             const TextureRange t = of(node.amount);
@@ -203,6 +182,10 @@ TextureRange range_of(Context* context, const TextureNode& node) {
             if (node.invert) range = {1 - range.most, 1 - range.least};
             return {std::fmax(range.least, 0.0), std::fmax(range.most, 0.0)};
         }
+        case TextureKind::kFractal:
+        case TextureKind::kWrinkled:
+        case TextureKind::kWindy:
+        case TextureKind::kMarble: return noise_range(node);
     }
     return {};
 }
@@ -246,7 +229,7 @@ TextureId named_texture(Context* context, const Location& where, const std::stri
 }
 
 TextureId add_node(Context* context, const TextureNode& node) {
-    TextureCost cost{1, 1};
+    TextureCost cost{1, 1 + noise_cost(node)};
     for (const TextureId child : {node.a, node.b, node.amount}) {
         if (child == kNone) continue;
         const TextureCost below = context->texture_costs[size_t(child)];
@@ -293,6 +276,13 @@ double kelvin_of(const Parameter& p, const std::string& what) {
     if (p.numbers.size() != 1 || !(p.numbers[0] >= 100) || !(p.numbers[0] <= 1e6))
         fail(p.where, what + ": a black body needs one temperature between 100 and 1000000 kelvin");
     return p.numbers[0];
+}
+
+TextureId texture_operand(Context* context, const ParameterList& parameters, std::string_view name, TextureUse use,
+                          float fallback) {
+    const TextureId id = use == TextureUse::kFloat ? float_texture_parameter(context, parameters, name)
+                                                   : spectrum_texture_parameter(context, parameters, name, use);
+    return id == kNone ? constant_texture(context, Rgb(fallback)) : id;
 }
 
 std::optional<Spectrum> spectrum_parameter(Context* context, const ParameterList& parameters, std::string_view name) {

@@ -64,6 +64,7 @@ struct GeometryUser {
     Accel::Opacity opacity = nullptr;
     int32_t object = -1;    // -1: the world, otherwise index into SceneDescription::objects
     uint32_t geometry = 0;  // index of the mesh in its object
+    uint32_t first_instance_id = 0;
 };
 
 struct SphereUser {
@@ -82,8 +83,10 @@ float ray_hash(float ox, float oy, float oz, float dx, float dy, float dz, uint6
 }
 
 /// `salt` tells apart the crossings of one primitive (the two of a sphere).
-bool passes_through(const GeometryUser& g, uint32_t primitive, uint32_t salt, float u, float v, const RTCRay& ray) {
-    const float opacity = g.opacity(g.opacity_user, g.object, g.geometry, primitive, u, v);
+bool passes_through(const GeometryUser& g, uint32_t instance_id, uint32_t primitive, uint32_t salt, Vec2 uv, const Vec3& outward,
+                    const RTCRay& ray) {
+    const int32_t instance = instance_id == RTC_INVALID_GEOMETRY_ID ? -1 : int32_t(instance_id - g.first_instance_id);
+    const float opacity = g.opacity(g.opacity_user, {g.object, instance, g.geometry, primitive, uv.x, uv.y, outward});
     if (opacity >= 1) return false;
     if (opacity <= 0) return true;
     // The object too: a ray that crosses two objects through identity instances meets equal geometry and primitive numbers.
@@ -96,7 +99,7 @@ void alpha_filter(const RTCFilterFunctionNArguments* args) {
     const auto& g = *static_cast<const GeometryUser*>(args->geometryUserPtr);
     const RTCRay& ray = *reinterpret_cast<const RTCRay*>(args->ray);
     const RTCHit& hit = *reinterpret_cast<const RTCHit*>(args->hit);
-    if (passes_through(g, hit.primID, 0, hit.u, hit.v, ray)) args->valid[0] = 0;
+    if (passes_through(g, args->context->instID[0], hit.primID, 0, {hit.u, hit.v}, {}, ray)) args->valid[0] = 0;
 }
 
 /// Embree asks for bounds on threads of TBB and waits for them; both come without instrumentation, so that ThreadSanitizer does not
@@ -129,13 +132,13 @@ int sphere_roots(const Sphere& s, const RTCRay& ray, double t[2]) {
     return 2;
 }
 
-bool sphere_passes(const SphereUser& user, uint32_t primitive, int crossing, double t, const RTCRay& ray) {
+bool sphere_passes(const SphereUser& user, uint32_t instance_id, uint32_t primitive, int crossing, double t, const RTCRay& ray) {
     if (user.filter.opacity == nullptr) return false;
     const Sphere& s = (*user.spheres)[primitive];
     if (s.attributes.alpha == kNone) return false;
     const Vec3 p{float(ray.org_x + t * ray.dir_x), float(ray.org_y + t * ray.dir_y), float(ray.org_z + t * ray.dir_z)};
-    const Vec2 uv = sphere_uv(s, normalize(p - s.centre));
-    return passes_through(user.filter, primitive, uint32_t(crossing), uv.x, uv.y, ray);
+    const Vec3 outward = normalize(p - s.centre);
+    return passes_through(user.filter, instance_id, primitive, uint32_t(crossing), sphere_uv(s, outward), outward, ray);
 }
 
 void sphere_intersect(const RTCIntersectFunctionNArguments* args) {
@@ -147,7 +150,7 @@ void sphere_intersect(const RTCIntersectFunctionNArguments* args) {
     for (int i = 0; i < n; ++i) {
         if (!(t[i] > rayhit.ray.tnear && t[i] < rayhit.ray.tfar)) continue;
         const float t_hit = float(t[i]);
-        if (sphere_passes(user, args->primID, i, t[i], rayhit.ray)) continue;
+        if (sphere_passes(user, args->context->instID[0], args->primID, i, t[i], rayhit.ray)) continue;
         rayhit.ray.tfar = t_hit;
         rayhit.hit.geomID = args->geomID;
         rayhit.hit.primID = args->primID;
@@ -166,7 +169,7 @@ void sphere_occluded(const RTCOccludedFunctionNArguments* args) {
     const int n = sphere_roots((*user.spheres)[args->primID], ray, t);
     for (int i = 0; i < n; ++i) {
         if (!(t[i] > ray.tnear && t[i] < ray.tfar)) continue;
-        if (sphere_passes(user, args->primID, i, t[i], ray)) continue;
+        if (sphere_passes(user, args->context->instID[0], args->primID, i, t[i], ray)) continue;
         ray.tfar = -INFINITY;
         return;
     }
@@ -209,7 +212,7 @@ struct Accel::Impl {
         rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices.data(), 0, 3 * sizeof(uint32_t),
                                    mesh.indices.size() / 3);
         if (mesh.attributes.alpha != kNone) {
-            geometry_users.push_back(std::make_unique<GeometryUser>(GeometryUser{user, opacity, object, i}));
+            geometry_users.push_back(std::make_unique<GeometryUser>(GeometryUser{user, opacity, object, i, first_instance_id}));
             rtcSetGeometryUserData(g, geometry_users.back().get());
             rtcSetGeometryIntersectFilterFunction(g, alpha_filter);
             rtcSetGeometryOccludedFilterFunction(g, alpha_filter);
@@ -246,7 +249,7 @@ struct Accel::Impl {
         for (const Sphere& s : spheres) any_alpha |= s.attributes.alpha != kNone;
         sphere_users.push_back(std::make_unique<SphereUser>());
         sphere_users.back()->spheres = &spheres;
-        if (any_alpha) sphere_users.back()->filter = GeometryUser{user, opacity, object, kSphereGeometry};
+        if (any_alpha) sphere_users.back()->filter = GeometryUser{user, opacity, object, kSphereGeometry, first_instance_id};
         RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
         rtcSetGeometryUserPrimitiveCount(g, unsigned(spheres.size()));
         rtcSetGeometryUserData(g, sphere_users.back().get());
@@ -267,6 +270,7 @@ Result<std::unique_ptr<Accel>> Accel::build(const SceneDescription& scene, Opaci
         return failed_precondition("Embree has no device with the AVX2 instruction set here; run on an x86-64-v3 machine");
     std::unique_ptr<Accel> accel(new Accel);
     Impl& impl = *accel->impl_;
+    impl.first_instance_id = uint32_t(scene.meshes.size()) + 1;
     const int64_t before = g_device_memory.load();
     for (int32_t o = 0; o < int32_t(scene.objects.size()); ++o) {
         RTCScene s = new_scene();
@@ -279,7 +283,6 @@ Result<std::unique_ptr<Accel>> Accel::build(const SceneDescription& scene, Opaci
     impl.world = new_scene();
     impl.add_meshes(impl.world, scene.meshes, -1, opacity, opacity_user);
     impl.add_spheres(impl.world, scene.spheres, uint32_t(scene.meshes.size()), -1, opacity, opacity_user);
-    impl.first_instance_id = uint32_t(scene.meshes.size()) + 1;
     for (uint32_t i = 0; i < scene.instances.size(); ++i) {
         const Instance& instance = scene.instances[i];
         RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_INSTANCE);

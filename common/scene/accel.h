@@ -25,9 +25,17 @@ class Accel {
     /// Geometry index that the opacity callback gets for spheres.
     static constexpr uint32_t kSphereGeometry = 0xfffffff0u;
 
-    /// Opacity in [0, 1] of the cut-out surface at a hit: (object definition, -1 in the world; geometry, primitive, u, v). Called
-    /// from inside the traversal for shapes with an alpha only.
-    using Opacity = float (*)(const void* user, int32_t object, uint32_t geometry, uint32_t primitive, float u, float v);
+    /// A hit whose opacity is asked for.
+    struct OpacityQuery {
+        int32_t object = -1;     ///< Index of the object definition, -1 in the world.
+        int32_t instance = -1;   ///< Index of the instance, -1 in the world.
+        uint32_t geometry = 0;   ///< Index of the mesh in its object or the world, or kSphereGeometry.
+        uint32_t primitive = 0;  ///< Triangle or sphere index.
+        float u = 0, v = 0;      ///< Barycentric as in RawHit, or the texture coordinates of a sphere.
+        Vec3 outward;            ///< Of a sphere: its unit normal there, in the space of the object.
+    };
+    /// Opacity in [0, 1] of the cut-out surface at a hit. Called from inside the traversal for shapes with an alpha only.
+    using Opacity = float (*)(const void* user, const OpacityQuery& query);
 
     ~Accel();
     /// Keeps references to the description, which must outlive it; mesh positions must carry one vertex of padding.

@@ -91,14 +91,16 @@ Frame tilted_frame(const TextureTables& tables, const Material& material, const 
     const Frame& flat = point.shading;
     Vec3 n, dpdu = flat.s;
     if (material.normal_map != kNone) {
-        const Rgb code = evaluate_texture(tables, material.normal_map, point.uv);
+        const Rgb code = evaluate_texture(tables, material.normal_map, {point.uv, point.p});
         const Vec3 t = tangents.mirrored ? -flat.t : flat.t;
         n = flat.s * (2 * code.r - 1) + t * (2 * code.g - 1) + flat.n * (2 * code.b - 1);
     } else {
         // (u, v) may be so large that the step is rounded, and in the end away.
         const float du = (point.uv.x + kStep) - point.uv.x, dv = (point.uv.y + kStep) - point.uv.y;
         const auto height = [&](float u, float v) {
-            return evaluate_texture(tables, material.displacement, {point.uv.x + u, point.uv.y + v}).r;
+            return evaluate_texture(tables, material.displacement,
+                                    {{point.uv.x + u, point.uv.y + v}, point.p + tangents.dpdu * u + tangents.dpdv * v})
+                .r;
         };
         const float h = height(0, 0);
         const float slope_u = du > 0 ? (height(du, 0) - h) / du : 0, slope_v = dv > 0 ? (height(0, dv) - h) / dv : 0;

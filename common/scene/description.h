@@ -18,21 +18,47 @@ using TextureId = int32_t;
 using MaterialId = int32_t;
 inline constexpr int32_t kNone = -1;
 
-enum class TextureKind : uint8_t { kConstant, kScale, kMix, kCheckerboard, kImage };
+enum class TextureKind : uint8_t {
+    kConstant,
+    kScale,
+    kMix,
+    kCheckerboard,
+    kImage,
+    kSolidCheckerboard,
+    kDots,
+    kFractal,
+    kWrinkled,
+    kWindy,
+    kMarble,
+};
 enum class WrapMode : uint8_t { kRepeat, kClamp, kBlack };
+
+/// What 2D textures take for (s, t). All but kUv depend on the place in space.
+enum class TextureMapping : uint8_t {
+    kUv,           ///< su u + du and sv v + dv.
+    kPlanar,       ///< The first two coordinates in the texture's space.
+    kSpherical,    ///< Polar angle over pi and azimuth over 2 pi in the texture's space.
+    kCylindrical,  ///< Azimuth over 2 pi, from the negative x axis, and z in the texture's space.
+};
 
 struct TextureNode {
     TextureKind kind = TextureKind::kConstant;
+    uint8_t octaves = 0;             ///< kFractal, kWrinkled, kMarble.
     Rgb value{0.0f};                 ///< kConstant. A float texture has three equal components.
-    TextureId a = kNone, b = kNone;  ///< kScale: a * b. kMix: (1-amount) a + amount b. kCheckerboard: the two colours.
+    TextureId a = kNone, b = kNone;  ///< kScale: a * b. kMix: (1-amount) a + amount b. Checkerboards: the two colours. kDots:
+                                     ///< inside and outside.
     TextureId amount = kNone;        ///< kMix only.
     int32_t image = kNone;           ///< kImage: index into SceneDescription::images.
     WrapMode wrap = WrapMode::kRepeat;
-    bool nearest = false;  ///< kImage: point lookup; bilinear otherwise.
-    float scale = 1;       ///< kImage: multiplies the looked-up value.
-    bool invert = false;   ///< kImage: 1 - the scaled value (pbrt's order); below zero is zero.
-    // (u, v) mapping: s = su * u + du, t = sv * v + dv.
-    float su = 1, sv = 1, du = 0, dv = 0;
+    bool nearest = false;                          ///< kImage: point lookup; bilinear otherwise.
+    bool invert = false;                           ///< kImage: 1 - the scaled value (pbrt's order); below zero is zero.
+    TextureMapping mapping = TextureMapping::kUv;  ///< kCheckerboard, kImage, kDots.
+    float scale = 1;                               ///< kImage: multiplies the looked-up value. kMarble: multiplies the place.
+    float su = 1, sv = 1, du = 0, dv = 0;          ///< TextureMapping::kUv.
+    int32_t space = kNone;                         ///< Index into SceneDescription::texture_spaces: other mappings, and the kinds
+                                                   ///< that are functions of the place (kSolidCheckerboard, kFractal and below).
+    float omega = 0;                               ///< kFractal, kWrinkled, kMarble: amplitude of an octave over that of the last.
+    float variation = 0;                           ///< kMarble: how far noise bends its layers.
 };
 
 enum class MaterialKind : uint8_t {
@@ -170,6 +196,7 @@ struct SceneDescription {
     std::vector<Instance> instances;
     std::vector<Material> materials;
     std::vector<TextureNode> textures;
+    std::vector<Mat4> texture_spaces;  ///< World space to the space that a texture is defined in.
     std::vector<Image> images;
     std::vector<AreaEmission> emissions;
     std::vector<PointLight> point_lights;

@@ -123,7 +123,7 @@ void Scene::surface_point(const Vec3& o, const Vec3& d, const RawHit& hit, Surfa
 }
 
 void Scene::tilt(const RawHit& hit, SurfacePoint* point) const {
-    point->material = choose_material(tables_, point->material, point->uv, position_hash(point->p));
+    point->material = choose_material(tables_, point->material, {point->uv, point->p}, position_hash(point->p));
     if (point->material == kNone) return;
     const Material& material = description_.materials[size_t(point->material)];
     if (material.displacement == kNone && material.normal_map == kNone) return;
@@ -143,7 +143,7 @@ void Scene::tilt(const RawHit& hit, SurfacePoint* point) const {
 }
 
 Bsdf Scene::bsdf_at(const SurfacePoint& point) const {
-    return resolve_material(tables_, point.material, point.uv, position_hash(point.p));
+    return resolve_material(tables_, point.material, {point.uv, point.p}, position_hash(point.p));
 }
 
 bool Scene::occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3& q, const Vec3& ng_q, float reach_q) const {
@@ -159,22 +159,31 @@ bool Scene::occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3&
     return !(t_max > 0) || accel_->occluded(from, d, t_max);
 }
 
-float Scene::opacity(const void* user, int32_t object, uint32_t geometry, uint32_t primitive, float u, float v) {
+float Scene::opacity(const void* user, const Accel::OpacityQuery& query) {
     const Scene& scene = *static_cast<const Scene*>(user);
     const SceneDescription& d = scene.description_;
-    if (geometry == Accel::kSphereGeometry) {
-        const Sphere& s = (object < 0 ? d.spheres : d.objects[size_t(object)].spheres)[primitive];
-        return s.attributes.alpha == kNone ? 1 : evaluate_texture(scene.tables_, s.attributes.alpha, {u, v}).r;
+    const bool needs_place = !d.texture_spaces.empty();
+    TexturePoint at{{query.u, query.v}, {}};
+    TextureId alpha;
+    if (query.geometry == Accel::kSphereGeometry) {
+        const Sphere& s = (query.object < 0 ? d.spheres : d.objects[size_t(query.object)].spheres)[query.primitive];
+        alpha = s.attributes.alpha;
+        if (alpha == kNone) return 1;
+        if (needs_place) at.p = s.centre + query.outward * s.radius;
+    } else {
+        const TriangleMesh& mesh = (query.object < 0 ? d.meshes : d.objects[size_t(query.object)].meshes)[query.geometry];
+        alpha = mesh.attributes.alpha;
+        const uint32_t* index = &mesh.indices[size_t(query.primitive) * 3];
+        Vec2 uv[3] = {{0, 0}, {1, 0}, {1, 1}};
+        if (!mesh.uvs.empty())
+            for (int i = 0; i < 3; ++i) uv[i] = mesh.uvs[index[i]];
+        const float u = query.u, v = query.v, w = 1 - u - v;
+        at.uv = {w * uv[0].x + u * uv[1].x + v * uv[2].x, w * uv[0].y + u * uv[1].y + v * uv[2].y};
+        const Vec3& p0 = mesh.positions[index[0]];
+        if (needs_place) at.p = p0 + (mesh.positions[index[1]] - p0) * u + (mesh.positions[index[2]] - p0) * v;
     }
-    const TriangleMesh& mesh = (object < 0 ? d.meshes : d.objects[size_t(object)].meshes)[geometry];
-    const uint32_t* index = &mesh.indices[size_t(primitive) * 3];
-    Vec2 uv[3] = {{0, 0}, {1, 0}, {1, 1}};
-    if (!mesh.uvs.empty())
-        for (int i = 0; i < 3; ++i) uv[i] = mesh.uvs[index[i]];
-    const float w = 1 - u - v;
-    return evaluate_texture(scene.tables_, mesh.attributes.alpha,
-                            {w * uv[0].x + u * uv[1].x + v * uv[2].x, w * uv[0].y + u * uv[1].y + v * uv[2].y})
-        .r;
+    if (needs_place && query.instance >= 0) at.p = d.instances[size_t(query.instance)].object_to_world.point(at.p);
+    return evaluate_texture(scene.tables_, alpha, at).r;
 }
 
 }  // namespace lightloom

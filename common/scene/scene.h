@@ -95,7 +95,7 @@ class Scene {
     void tilt(const RawHit& hit, SurfacePoint* point) const;
     void summarise();
     void triangle_point(const TriangleMesh& mesh, const RawHit& hit, SurfacePoint* out) const;
-    static float opacity(const void* user, int32_t object, uint32_t geometry, uint32_t primitive, float u, float v);
+    static float opacity(const void* user, const Accel::OpacityQuery& query);
 
     SceneDescription description_;
     TextureTables tables_;

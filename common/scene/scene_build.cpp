@@ -193,7 +193,7 @@ Result<std::unique_ptr<Scene>> Scene::build(SceneDescription description, const 
     };
     prepare(d.meshes);
     for (ObjectDefinition& o : d.objects) prepare(o.meshes);
-    scene->tables_ = {d.textures, d.images, d.materials};
+    scene->tables_ = {d.textures, d.images, d.materials, d.texture_spaces};
     scene->tilts_ = tilting_materials(d.materials);
     for (const Instance& i : d.instances) scene->instance_inverse_.push_back(*inverse(i.object_to_world));
 

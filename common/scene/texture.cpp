@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/core/math.h"
+#include "common/scene/noise.h"
+
 namespace lightloom {
 namespace {
 
@@ -42,28 +45,60 @@ Rgb image_value(const TextureNode& node, const Image& image, Vec2 st) {
     return {std::max(v.r, 0.0f), std::max(v.g, 0.0f), std::max(v.b, 0.0f)};
 }
 
+/// Beyond, the parity of a cell is no information any more, and a sum of three still is an integer.
+bool has_cells(float x) { return std::fabs(x) < 1e9f; }
+
+int64_t cell(float x) { return int64_t(std::floor(x)); }
+
+Vec3 in_space(const TextureTables& tables, const TextureNode& node, const TexturePoint& at) {
+    return tables.spaces[size_t(node.space)].point(at.p);
+}
+
+Vec2 mapped(const TextureTables& tables, const TextureNode& node, const TexturePoint& at) {
+    if (node.mapping == TextureMapping::kUv) return {node.su * at.uv.x + node.du, node.sv * at.uv.y + node.dv};
+    const Vec3 p = in_space(tables, node, at);
+    if (node.mapping == TextureMapping::kPlanar) return {p.x, p.y};
+    const double azimuth = math::atan2(p.y, p.x) / (2 * kPiD);
+    if (node.mapping == TextureMapping::kCylindrical) return {float(0.5 + azimuth), p.z};
+    const double across = std::sqrt(double(p.x) * p.x + double(p.y) * p.y);
+    return {float(math::atan2(across, p.z) / kPiD), float(azimuth < 0 ? azimuth + 1 : azimuth)};
+}
+
 }  // namespace
 
-Rgb evaluate_texture(const TextureTables& tables, TextureId id, Vec2 uv, TextureUse use) {
+Rgb evaluate_texture(const TextureTables& tables, TextureId id, const TexturePoint& at, TextureUse use) {
     const TextureNode& node = tables.nodes[size_t(id)];
-    const Vec2 st{node.su * uv.x + node.du, node.sv * uv.y + node.dv};
     switch (node.kind) {
         case TextureKind::kConstant: return node.value;
-        case TextureKind::kScale: return evaluate_texture(tables, node.a, uv, use) * evaluate_texture(tables, node.b, uv);
+        case TextureKind::kScale: return evaluate_texture(tables, node.a, at, use) * evaluate_texture(tables, node.b, at);
         case TextureKind::kMix: {
-            const Rgb t = evaluate_texture(tables, node.amount, uv);
-            return evaluate_texture(tables, node.a, uv, use) * (Rgb(1.0f) - t) + evaluate_texture(tables, node.b, uv, use) * t;
+            const Rgb t = evaluate_texture(tables, node.amount, at);
+            return evaluate_texture(tables, node.a, at, use) * (Rgb(1.0f) - t) + evaluate_texture(tables, node.b, at, use) * t;
         }
         case TextureKind::kCheckerboard: {
-            if (!(std::fabs(st.x) < 1e9f && std::fabs(st.y) < 1e9f)) return evaluate_texture(tables, node.a, uv, use);
-            const int64_t cells = int64_t(std::floor(st.x)) + int64_t(std::floor(st.y));
-            return evaluate_texture(tables, (cells & 1) == 0 ? node.a : node.b, uv, use);
+            const Vec2 st = mapped(tables, node, at);
+            if (!(has_cells(st.x) && has_cells(st.y))) return evaluate_texture(tables, node.a, at, use);
+            const int64_t cells = cell(st.x) + cell(st.y);
+            return evaluate_texture(tables, (cells & 1) == 0 ? node.a : node.b, at, use);
         }
         case TextureKind::kImage: {
-            const Rgb v = image_value(node, tables.images[size_t(node.image)], st);
+            const Rgb v = image_value(node, tables.images[size_t(node.image)], mapped(tables, node, at));
             if (use == TextureUse::kUnbounded) return v;
             return {std::min(v.r, 1.0f), std::min(v.g, 1.0f), std::min(v.b, 1.0f)};
         }
+        case TextureKind::kSolidCheckerboard: {
+            const Vec3 p = in_space(tables, node, at);
+            const bool odd = has_cells(p.x) && has_cells(p.y) && has_cells(p.z) && ((cell(p.x) + cell(p.y) + cell(p.z)) & 1) != 0;
+            return evaluate_texture(tables, odd ? node.b : node.a, at, use);
+        }
+        case TextureKind::kDots: return evaluate_texture(tables, inside_dot(mapped(tables, node, at)) ? node.a : node.b, at, use);
+        case TextureKind::kFractal: return Rgb(fractal_noise(in_space(tables, node, at), node.omega, node.octaves));
+        case TextureKind::kWrinkled: return Rgb(turbulence(in_space(tables, node, at), node.omega, node.octaves));
+        case TextureKind::kWindy: {
+            const Vec3 p = in_space(tables, node, at);
+            return Rgb(std::fabs(fractal_noise(p * 0.1f, 0.5f, 3)) * fractal_noise(p, 0.5f, 6));
+        }
+        case TextureKind::kMarble: return marble(in_space(tables, node, at) * node.scale, node.omega, node.octaves, node.variation);
     }
     return {};
 }

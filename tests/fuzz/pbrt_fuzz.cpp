@@ -37,6 +37,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const auto is_line = [](const std::string& line) { return !line.empty() && line.find('\n') == std::string::npos; };
     lightloom::ImportOptions options;
     options.max_file_bytes = 16 << 20;
+    options.max_subdivided_triangles = 1 << 14;
     auto files = source();
     const auto scene = lightloom::import::import_from(&files, "scene.pbrt", options);
     // An error is one line that names the file.

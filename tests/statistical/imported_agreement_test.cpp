@@ -27,6 +27,8 @@ constexpr File kFiles[] = {
     {"furnace-sphere", "path light bdpt"},
     {"instances", "path light bdpt"},
     {"point-spot", "path light bdpt"},
+    {"procedural", "path light bdpt"},
+    {"shapes", "path light bdpt"},
     {"smooth-normals", "path light bdpt"},
     {"bumped", "path light bdpt"},
     {"textures", "path light bdpt"},

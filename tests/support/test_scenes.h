@@ -192,6 +192,66 @@ inline std::shared_ptr<const Scene> instances_and_cutouts() {
     return b.build();
 }
 
+/// Textures of the place in space: marble, a solid checkerboard as a colour and as the cut-outs of an object shown twice (turned
+/// and mirrored), noise in a mix of materials and of opacities that are 0 or 1, a planar mapping.
+inline std::shared_ptr<const Scene> textures_in_space() {
+    SceneBuilder b = cornell_builder();
+    auto& d = b.description();
+    d.texture_spaces = {scaling(9, 9, 9) * rotation(40, 1, 0, 1), scaling(5, 5, 5) * translation(0.03, 0.02, 0.01)};
+    const auto texture = [&](TextureKind kind, int32_t space) {
+        TextureNode node;
+        node.kind = kind;
+        node.space = space;
+        node.octaves = 2;
+        node.omega = 0.5f;
+        node.variation = 0.7f;
+        return node;
+    };
+    const auto add = [&](const TextureNode& node) {
+        d.textures.push_back(node);
+        return TextureId(d.textures.size()) - 1;
+    };
+    const auto painted = [&](TextureId reflectance) {
+        Material m;
+        m.reflectance = reflectance;
+        return b.add(m);
+    };
+    TextureNode blocks = texture(TextureKind::kSolidCheckerboard, 1), holes = blocks;
+    blocks.a = b.constant({0.7f, 0.6f, 0.2f}), blocks.b = b.constant({0.1f, 0.3f, 0.6f});
+    holes.a = b.constant(Rgb(1.0f)), holes.b = b.constant(Rgb(0.0f));
+    TextureNode dots = texture(TextureKind::kDots, 1);
+    dots.mapping = TextureMapping::kPlanar;
+    dots.a = blocks.a, dots.b = b.constant({0.3f, 0.1f, 0.1f});
+    const MaterialId marble = painted(add(texture(TextureKind::kMarble, 0))), block = painted(add(blocks));
+    Material metal, mixed;
+    metal.kind = MaterialKind::kConductor;
+    metal.reflectance = b.constant({0.9f, 0.7f, 0.4f});
+    metal.roughness_u = metal.roughness_v = b.constant(Rgb(0.3f));
+    metal.remap_roughness = false;
+    mixed.kind = MaterialKind::kMix;
+    mixed.mix_a = b.add(metal), mixed.mix_b = marble;
+    mixed.mix_amount = add(texture(TextureKind::kWrinkled, 0));
+    d.meshes[0].attributes.material = marble;
+    d.meshes[5].attributes.material = painted(add(dots));
+    d.spheres[0].attributes.material = b.add(mixed);
+
+    ObjectDefinition object;
+    TriangleMesh mesh;
+    mesh.positions = {{-0.3f, 0, -0.2f}, {0.3f, 0, -0.2f}, {0.1f, 0, 0.3f}, {0, 0.5f, 0}};
+    mesh.indices = {0, 1, 2, 1, 0, 3, 2, 1, 3, 0, 2, 3};
+    mesh.attributes = {block, kNone, add(holes), false, "test object"};
+    object.meshes.push_back(std::move(mesh));
+    Sphere ball;
+    ball.centre = {0, 0.7f, 0};
+    ball.radius = 0.2f;
+    ball.attributes = object.meshes[0].attributes;
+    object.spheres.push_back(std::move(ball));
+    d.objects.push_back(std::move(object));
+    d.instances.push_back({0, translation(-0.5, 0.2, 0.5), "first"});
+    d.instances.push_back({0, translation(0.2, 1.0, 0.4) * rotation(30, 1, 1, 0) * scaling(-0.8f, 1.2f, 0.6f), "mirrored"});
+    return b.build();
+}
+
 /// Spheres as lights: one seen from outside (next event by its cone), and the room itself, a sphere
 /// that shines inwards.
 inline std::shared_ptr<const Scene> spherical_lights() {
@@ -340,6 +400,7 @@ inline constexpr NamedScene kScenes[] = {
     {"glossy", glossy, "path light bdpt"},
     {"textured_and_two_sided", textured_and_two_sided, "path light bdpt"},
     {"instances_and_cutouts", instances_and_cutouts, "path light bdpt"},
+    {"textures_in_space", textures_in_space, "path light bdpt"},
     {"smooth_normals_and_lens", smooth_normals_and_lens, "path light bdpt"},
     {"spherical_lights", spherical_lights, "path light bdpt"},
     {"environment_lit", environment_lit, "path light bdpt"},

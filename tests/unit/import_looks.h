@@ -13,8 +13,8 @@ inline const std::string kShape = " Shape \"sphere\" ";
 /// The material of the first shape.
 inline Material material_of(const SceneDescription& d) { return d.materials.at(size_t(d.spheres.at(0).attributes.material)); }
 
-inline Rgb value(const SceneDescription& d, TextureId id, Vec2 uv = {0.3f, 0.3f}) {
-    return evaluate_texture({d.textures, d.images, d.materials}, id, uv);
+inline Rgb value(const SceneDescription& d, TextureId id, Vec2 uv = {0.3f, 0.3f}, const Vec3& p = {}) {
+    return evaluate_texture({d.textures, d.images, d.materials, d.texture_spaces}, id, {uv, p});
 }
 
 /// An uncompressed 24-bit TGA; `bgr` holds rows from the bottom.

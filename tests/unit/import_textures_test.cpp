@@ -220,9 +220,7 @@ TEST(ImportTexture, Errors) {
     std::string huge = tga(1, 1, "");
     huge[12] = huge[13] = huge[14] = huge[15] = '\x3f';
     expect_error("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.tga\"", {"cannot hold"}, {{"a.tga", huge}});
-    expect_error("Texture \"t\" \"spectrum\" \"marble\"", {"marble", "not supported"});
-    expect_error("Texture \"t\" \"spectrum\" \"checkerboard\" \"string mapping\" \"planar\"", {"mapping", "uv"});
-    expect_error("Texture \"t\" \"spectrum\" \"checkerboard\" \"integer dimension\" 3", {"dimension"});
+    expect_error("Texture \"t\" \"spectrum\" \"ptex\"", {"ptex", "not supported"});
     expect_error("Texture \"t\" \"spectrum\" \"scale\" \"texture tex\" \"t\"", {"itself"});
     expect_error("Texture \"t\" \"colour\" \"constant\"", {"float or spectrum"});
     expect_error("Texture \"t\" \"float\" \"constant\" Texture \"t\" \"float\" \"constant\"", {"twice"});

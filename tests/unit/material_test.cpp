@@ -27,7 +27,7 @@ class Tables {
         return MaterialId(materials_.size() - 1);
     }
     Bsdf resolve(MaterialId id, float choice = 0.5f) const {
-        return resolve_material({nodes_, images_, materials_}, id, {0.3f, 0.7f}, choice);
+        return resolve_material({nodes_, images_, materials_}, id, {{0.3f, 0.7f}, {}}, choice);
     }
     /// An image of one texel.
     TextureId image(const Rgb& texel) {
