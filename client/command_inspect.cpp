@@ -62,7 +62,10 @@ nlohmann::json describe(const SceneDescription& d, const SceneSummary& s, const 
     out["spheres"] = s.sphere_count;
     out["instances"] = s.instance_count;
     out["camera"] = {{"kind", "perspective"}, {"fov_degrees", d.camera.fov_degrees}, {"lens_radius", d.camera.lens_radius}};
-    out["film"] = {{"width", d.film.width}, {"height", d.film.height}, {"exposure_scale", d.film.exposure_scale}};
+    out["film"] = {{"width", d.film.width},
+                   {"height", d.film.height},
+                   {"exposure_scale", d.film.response.exposure},
+                   {"colour_matrix", d.film.response.colour}};
     out["max_depth"] = d.max_depth;
     out["samples_per_pixel"] = d.samples_per_pixel;
     out["lights"] = nlohmann::json::array();

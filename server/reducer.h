@@ -17,7 +17,7 @@ namespace lightloom {
 
 class Reducer {
   public:
-    Reducer(const FrameLayout& frame, uint32_t tile_count);
+    Reducer(const FrameLayout& frame, uint32_t tile_count, const FilmResponse& response = {});
 
     /// A unit whose partial is not part of the sums after all: it has to be rendered again.
     struct Refusal {
@@ -45,8 +45,8 @@ class Reducer {
     static constexpr size_t kMaxDropped = 64;
     std::vector<Dropped> first_dropped() const;
     /// Developed complete groups; kFailedPrecondition before the first.
-    Result<RgbImage> image(float scale) const;
-    Result<RgbImage> variance(float scale) const;
+    Result<RgbImage> image() const;
+    Result<RgbImage> variance() const;
 
   private:
     struct Sums {
@@ -59,6 +59,7 @@ class Reducer {
 
     const FrameLayout frame_;
     const uint32_t tile_count_;
+    const FilmResponse response_;
     mutable std::mutex mutex_;
     std::unique_ptr<Sums> sums_;
     uint32_t current_units_ = 0;

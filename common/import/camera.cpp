@@ -112,7 +112,14 @@ void set_camera(Context* context, const std::string& kind, const ParameterList& 
 }
 
 void set_film(Context* context, const std::string& kind, const ParameterList& p) {
-    if (kind != "rgb") fail(p.where(), p.what() + " is not supported; use \"rgb\"");
+    if (kind == "gbuffer") {
+        p.accept("string", "coordinatesystem");
+        context->diagnostics.warn(p.where(), p.what() +
+                                                 " becomes \"rgb\": of its further channels, the option --layers writes "
+                                                 "albedo, normal and depth of the first hit");
+    } else if (kind != "rgb") {
+        fail(p.where(), p.what() + " is not supported; use \"rgb\" or \"gbuffer\"");
+    }
     FilmDescription film;
     film.width = p.one_int("xresolution", 1280);
     film.height = p.one_int("yresolution", 720);
@@ -128,10 +135,11 @@ void set_film(Context* context, const std::string& kind, const ParameterList& p)
     p.ignore(&context->diagnostics, "maxcomponentvalue", "samples are not clamped, because that changes the mean");
     context->iso = p.one_float("iso", 100);
     if (!(context->iso > 0)) fail(p.where(), p.what() + ": iso must be positive");
-    const std::string sensor = p.one_string("sensor", "cie1931");
-    if (sensor != "cie1931")
-        fail(p.where(), p.what() + ": the sensor " + quoted(sensor) + " is not supported; use \"cie1931\" or remove it");
-    if (p.one_float("whitebalance", 0) != 0) fail(p.where(), p.what() + ": whitebalance is not supported; remove it");
+    if (p.find("float", "exposuretime")) {
+        context->film_exposure_time = p.one_float("exposuretime", 1);
+        if (!(*context->film_exposure_time > 0)) fail(p.where(), p.what() + ": exposuretime must be positive");
+    }
+    context->film_colour = sensor_colour(context, p);
     p.ignore(&context->diagnostics, "diagonal", "it matters only for cameras with real lenses");
     p.ignore(&context->diagnostics, "savefp16", "the output's precision is the command line's business");
     context->scene.film = film;

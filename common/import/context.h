@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -104,7 +105,9 @@ struct Context {
     std::map<MaterialId, int> mix_levels;          ///< Of mix materials; others have none.
     int texture_depth = 0, material_depth = 0;     ///< Of the definitions being resolved.
 
-    float exposure_time = 1, iso = 100;
+    float exposure_time = 1, iso = 100;       ///< Of the camera's shutter; of the film.
+    std::optional<float> film_exposure_time;  ///< Of a film that says it itself, as pbrt-v4's did at first.
+    FilmResponse::Matrix film_colour = FilmResponse::kNeutral;
     bool has_pixel_filter = false;
 
     /// Reads a file that a parameter names. Fails at `where`.
@@ -145,6 +148,8 @@ bool area_light_uses_power(const AreaLightDefinition& definition);
 // camera.cpp
 void set_camera(Context* context, const std::string& kind, const ParameterList& parameters, const Mat4& camera_to_world);
 void set_film(Context* context, const std::string& kind, const ParameterList& parameters);
+/// What the sensor and the white balance of a film do to colours (sensor.cpp).
+FilmResponse::Matrix sensor_colour(Context* context, const ParameterList& parameters);
 void set_pixel_filter(Context* context, const std::string& kind, const ParameterList& parameters);
 void set_sampler(Context* context, const std::string& kind, const ParameterList& parameters);
 void set_integrator(Context* context, const std::string& kind, const ParameterList& parameters);

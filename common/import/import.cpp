@@ -17,9 +17,10 @@ Result<ImportedScene> import_from(FileSource* files, const std::string& name, co
                                  "there is no PixelFilter, so pbrt would use a gaussian; a box of radius 0.5 is used, "
                                  "the picture is a little sharper");
     resolve_shapes(&context);
-    context.scene.film.exposure_scale = context.exposure_time * context.iso / 100;
-    if (!(context.scene.film.exposure_scale >= 0 && context.scene.film.exposure_scale <= kMaxCoordinate))
-        fail(main, "iso and the shutter's time multiply the picture by more than 1e15; lower them");
+    const float exposure = context.film_exposure_time.value_or(context.exposure_time) * context.iso / 100;
+    if (!(exposure >= 0 && exposure <= kMaxCoordinate))
+        fail(main, "iso and the exposure time multiply the picture by more than 1e15; lower them");
+    context.scene.film.response = {double(exposure), context.film_colour};
     LL_RETURN_IF_ERROR(validate(context.scene));
     context.scene.warnings = context.diagnostics.messages();
     return ImportedScene{std::move(context.scene), files->files()};

@@ -38,6 +38,12 @@ double evaluate(const Spectrum& spectrum, double nanometres);
 Rgb unit_luminance_rgb(double x, double y, double z, bool* clipped);
 /// RGB of luminance 1; nothing if the spectrum has no luminance.
 std::optional<Rgb> illuminant_rgb(const Spectrum& spectrum, bool* clipped);
+/// CIE 1931 2 degree tristimulus values.
+struct Xyz {
+    double x, y, z;
+};
+/// Of a black body, on any scale. `kelvin` is positive.
+Xyz blackbody_xyz(double kelvin);
 /// A black body's colour, luminance 1. `kelvin` is positive.
 Rgb blackbody_rgb(double kelvin, bool* clipped);
 /// The colour of a named light spectrum (stdillum-..., illum-acesD60); nothing for an unknown name.

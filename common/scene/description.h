@@ -9,6 +9,7 @@
 #include "common/core/result.h"
 #include "common/core/transform.h"
 #include "common/core/vec.h"
+#include "common/film/response.h"
 #include "common/scene/image.h"
 
 namespace lightloom {
@@ -154,8 +155,8 @@ struct FilmDescription {
     int width = 1280, height = 720;
     /// Crop window in pixels, half open: x0, x1, y0, y1; all -1 means the whole frame.
     int crop[4] = {-1, -1, -1, -1};
-    float exposure_scale = 1;  ///< iso * exposure time / 100: multiplies the image.
-    std::string file_name;     ///< As in the scene file; where pictures go is the command line's to say.
+    FilmResponse response;
+    std::string file_name;  ///< As in the scene file; where pictures go is the command line's to say.
 };
 
 struct SceneDescription {

@@ -21,8 +21,8 @@ Result<Rendering> render_groups(const Scene& scene, const RenderGroup& render, d
                                 const std::function<bool(const Rendering&)>& settled) {
     constexpr uint32_t kIterations = 2, kLeastGroups = 16;
     const FrameLayout frame = scene.frame();
-    const float exposure = scene.description().film.exposure_scale;
-    Accumulation total(frame);
+    const FilmResponse response = scene.description().film.response;
+    Accumulation total(frame, response);
     Rendering result;
     const auto start = std::chrono::steady_clock::now();
     for (uint32_t group = 0;; ++group) {
@@ -31,18 +31,18 @@ Result<Rendering> render_groups(const Scene& scene, const RenderGroup& render, d
         auto partial = render(work);
         if (!partial.ok()) return partial.status();
         GroupSum sum(frame);
-        Accumulation alone(frame);
+        Accumulation alone(frame, response);
         LL_RETURN_IF_ERROR(sum.add(*partial));
         LL_RETURN_IF_ERROR(alone.fold(sum, kIterations));
         LL_RETURN_IF_ERROR(total.fold(sum, kIterations));
-        const PartMeans means = part_means(alone.develop(exposure));
+        const PartMeans means = part_means(alone.develop());
         for (size_t part = 0; part < means.size(); ++part) result.parts[part].add(means[part], kIterations);
         result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         if (group + 1 >= kLeastGroups && (result.seconds >= seconds || settled(result))) break;
     }
     result.iterations = total.iterations();
     result.dropped = total.dropped();
-    result.picture = total.develop(exposure);
+    result.picture = total.develop();
     return result;
 }
 
