@@ -103,9 +103,7 @@ ReportedPath report_path(const Scene& scene, const SeenContribution& seen) {
         }
         path.vertices.push_back(v);
     }
-    path.source_measure = emitter->is_infinite() ? (emitter->is_delta() ? "discrete" : "solid angle")
-                          : emitter->is_delta()  ? "discrete"
-                                                 : "area";
+    path.source_measure = emitter->is_discrete() ? "discrete" : emitter->is_infinite() ? "solid angle" : "area";
     const Rgb camera = found.t > 1 ? found.z[found.t - 1].alpha : Rgb(1);
     const Rgb light = s >= 2 || merged ? found.y[merged ? s : s - 1].alpha : Rgb(1);
     path.throughput = camera * light;

@@ -35,6 +35,12 @@ int32_t Context::load_image(const Location& where, const std::string& reference,
     return it->second;
 }
 
+const Rgb& Context::image_mean(int32_t image) {
+    const auto [it, inserted] = image_means.try_emplace(image);
+    if (inserted) it->second = scene.images[size_t(image)].mean();
+    return it->second;
+}
+
 const std::string* Context::intern_file_name(const std::string& name) {
     for (const auto& known : file_names)
         if (*known == name) return known.get();

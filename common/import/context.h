@@ -98,9 +98,10 @@ struct Context {
     std::map<int, MaterialId> resolved_anonymous_materials;
     std::map<std::tuple<float, float, float>, TextureId> constants;
     std::map<std::string, int32_t> image_index;  ///< By file, encoding and channel choice.
-    std::map<std::tuple<float, float, float, bool>, int32_t> emission_index;
+    std::map<std::tuple<float, float, float, bool, int32_t>, int32_t> emission_index;
     std::vector<TextureCost> texture_costs;        ///< One per scene texture.
     std::vector<TextureRange> texture_ranges;      ///< The same.
+    std::map<int32_t, Rgb> image_means;            ///< Of the images of area lights.
     std::map<int32_t, TextureRange> image_ranges;  ///< Of the one-channel images of textures, by their index.
     std::map<MaterialId, int> mix_levels;          ///< Of mix materials; others have none.
     int texture_depth = 0, material_depth = 0;     ///< Of the definitions being resolved.
@@ -114,6 +115,8 @@ struct Context {
     std::string read_file(const Location& where, const std::string& reference, std::string* normalised = nullptr);
     /// Index of the decoded image in the scene; every file is decoded once per way of using it.
     int32_t load_image(const Location& where, const std::string& reference, const ImageRequest& request);
+    /// Mean of an image of the scene, which many shapes may ask for.
+    const Rgb& image_mean(int32_t image);
     /// The Location::file for a normalised name.
     const std::string* intern_file_name(const std::string& name);
 };
@@ -141,7 +144,8 @@ void add_light(Context* context, const std::string& kind, const ParameterList& p
 bool within_bounds(const Vec3& position);
 
 /// Radiance of an area light on a surface of `area`, in world space: its "power" is what each primitive emits, however that is
-/// scaled. (pbrt-v4 divides by the area that a sphere or disk has before its transformation.)
+/// scaled. (pbrt-v4 divides by the area that a sphere or disk has before its transformation.) Where an image gives the light, the
+/// power is that of a primitive that shows all of the image evenly, as in pbrt-v4.
 AreaEmission area_emission(Context* context, const AreaLightDefinition& definition, double area);
 bool area_light_uses_power(const AreaLightDefinition& definition);
 

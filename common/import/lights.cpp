@@ -200,15 +200,25 @@ bool area_light_uses_power(const AreaLightDefinition& definition) { return magni
 
 AreaEmission area_emission(Context* context, const AreaLightDefinition& definition, double area) {
     const ParameterList& p = definition.parameters;
-    p.refuse("filename", "images on area lights are not supported; give the light a constant L");
     AreaEmission emission;
+    Rgb colour(1.0f);
+    double luminance = 1;
+    if (const std::string reference = p.one_string("filename", ""); !reference.empty()) {
+        if (p.find_any("L")) fail(p.where(), p.what() + ": give either L or filename, not both");
+        emission.image = context->load_image(p.where(), reference, ImageRequest{});
+        luminance = double(context->image_mean(emission.image).luminance());
+    } else {
+        colour = light_colour(context, p, "L");
+    }
     emission.two_sided = p.one_bool("twosided", false);
     double scale = light_scale(p);
     if (const double power = magnitude(p, "power"); power > 0) {
         if (!(area > 0)) fail(p.where(), p.what() + ": power needs a shape with an area");
-        scale *= power / ((emission.two_sided ? 2 : 1) * kPiD * area);
+        if (!(luminance > 0)) fail(p.where(), p.what() + ": the image is black, so power cannot scale it");
+        scale *= power / ((emission.two_sided ? 2 : 1) * kPiD * area * luminance);
     }
-    emission.radiance = checked(p, light_colour(context, p, "L"), scale);
+    if (luminance == 0) scale = 0;  // A black image makes no light.
+    emission.radiance = checked(p, colour, scale);
     p.finish();
     return emission;
 }

@@ -67,8 +67,9 @@ struct Material {
 
 /// Emission of an area light, attached to shapes. Radiance, W / (m^2 sr) per colour channel, scene units.
 struct AreaEmission {
-    Rgb radiance;
+    Rgb radiance;  ///< Multiplies the image, or is the radiance when there is none.
     bool two_sided = false;
+    int32_t image = kNone;  ///< Index into images; looked up by the shape's (u, v), see SurfaceMap.
 };
 
 /// What all shapes share.
@@ -162,6 +163,9 @@ struct FilmDescription {
 struct SceneDescription {
     std::vector<TriangleMesh> meshes;
     std::vector<Sphere> spheres;
+    /// Surfaces that emit and are nothing else: no ray meets them (pbrt: area lights with alpha 0).
+    std::vector<TriangleMesh> hidden_meshes;
+    std::vector<Sphere> hidden_spheres;
     std::vector<ObjectDefinition> objects;
     std::vector<Instance> instances;
     std::vector<Material> materials;

@@ -26,14 +26,19 @@ float cone_height(float radius, float d2) {
     return sin2 / (1 + safe_sqrt(1 - sin2));
 }
 
-/// Whether next event samples the sphere by the cone that it subtends (otherwise by area).
-bool samples_cone(const Emitter& e, float d2) { return !e.inward && d2 > e.radius * e.radius * 1.0001f; }
+/// Whether next event samples the sphere by the cone that it subtends (otherwise by area): from outside, if nothing but the near
+/// side can shine there. The far side's inner face shines through a near side that no ray meets.
+bool samples_cone(const Emitter& e, float d2) {
+    return !e.inward && !(e.hidden && e.two_sided) && d2 > e.radius * e.radius * 1.0001f;
+}
 
 }  // namespace
 
-EmitterSet::EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius)
+EmitterSet::EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius,
+                       std::vector<SurfaceMap> surface_maps)
     : emitters_(std::move(emitters)),
       environment_(std::move(environment)),
+      surface_maps_(std::move(surface_maps)),
       centre_(centre),
       scene_radius_(radius) {
     disc_pdf_ = 1 / (kPi * radius * radius);
@@ -50,7 +55,10 @@ double EmitterSet::power(const Emitter& e) const {
     const double disc = kPiD * double(scene_radius_) * scene_radius_;
     switch (e.kind) {
         case EmitterKind::kTriangle:
-        case EmitterKind::kSphere: return kPiD * scalar_of(e.radiance) / e.inv_area * (e.two_sided ? 2 : 1);
+        case EmitterKind::kSphere: {
+            const Rgb mean = e.map == kNone ? e.radiance : e.radiance * surface_maps_[size_t(e.map)].mean();
+            return kPiD * scalar_of(mean) / e.inv_area * (e.two_sided ? 2 : 1);
+        }
         case EmitterKind::kPoint: return 4 * kPiD * scalar_of(e.radiance);
         case EmitterKind::kSpot: return kPiD * scalar_of(e.radiance) * (double(e.falloff_height) + double(e.total_height));
         case EmitterKind::kDistant: return scalar_of(e.radiance) * disc;
@@ -59,10 +67,10 @@ double EmitterSet::power(const Emitter& e) const {
     return 0;
 }
 
-Rgb EmitterSet::emitted(const Emitter& e, const Vec3& normal, const Vec3& w) const {
+Rgb EmitterSet::emitted(const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w) const {
     switch (e.kind) {
         case EmitterKind::kTriangle:
-        case EmitterKind::kSphere: return e.two_sided || dot(normal, w) > 0 ? e.radiance : Rgb{};
+        case EmitterKind::kSphere: return e.two_sided || dot(normal, w) > 0 ? radiance_at(e, position) : Rgb{};
         case EmitterKind::kPoint: return e.radiance;
         case EmitterKind::kSpot: return e.radiance * spot_falloff(e, w);
         case EmitterKind::kDistant: return e.radiance;
@@ -141,7 +149,7 @@ bool EmitterSet::sample_emission(double pick, Vec2 u_position, Vec2 u_direction,
     out->pdf_direction = pdf_direction(e, out->normal, out->direction);
     if (!(out->pdf_position > 0 && out->pdf_direction > 0)) return false;
     const float cosine = e.is_area() ? abs_dot(out->normal, out->direction) : 1;
-    out->alpha = emitted(e, out->normal, out->direction) * (cosine / (out->pdf_position * out->pdf_direction));
+    out->alpha = emitted(e, out->position, out->normal, out->direction) * (cosine / (out->pdf_position * out->pdf_direction));
     return !out->alpha.is_black();
 }
 
@@ -188,7 +196,7 @@ bool EmitterSet::sample_next_event(const Vec3& reference, double pick, Vec2 u, N
         out->pdf = pdf_next_event(e, reference, out->position, out->normal, out->wi);
         return out->pdf > 0;
     }
-    out->radiance = emitted(e, out->normal, -out->wi);
+    out->radiance = emitted(e, out->position, out->normal, -out->wi);
     return out->pdf > 0 && !out->radiance.is_black();
 }
 
@@ -209,7 +217,7 @@ bool EmitterSet::connect_point(const Vec3& reference, const Vec3& position, cons
         if (!e.is_area()) out->normal = -out->wi;
         out->geometry = (e.is_area() ? abs_dot(out->normal, out->wi) : 1.0f) / d2;
     }
-    out->radiance = emitted(e, out->normal, -out->wi);
+    out->radiance = emitted(e, out->position, out->normal, -out->wi);
     return out->geometry > 0 && !out->radiance.is_black();
 }
 

@@ -10,6 +10,7 @@
 
 #include "common/scene/description.h"
 #include "common/scene/environment.h"
+#include "common/scene/light_map.h"
 #include "common/scene/sampling.h"
 
 namespace lightloom {
@@ -19,22 +20,26 @@ enum class EmitterKind : uint8_t { kTriangle, kSphere, kPoint, kSpot, kDistant, 
 struct Emitter {
     EmitterKind kind = EmitterKind::kTriangle;
     bool two_sided = false;
-    float pmf = 0;      ///< Of being selected, for light sub-paths and for next event alike (by power).
-    Rgb radiance;       ///< Radiance; intensity for point and spot; irradiance for distant; unused for environment.
-    Vec3 position;      ///< First corner, centre, or light position.
-    Vec3 edge1, edge2;  ///< kTriangle.
-    Vec3 normal;        ///< Unit; side that emits. Spot: axis. Distant: direction of travel.
-    float radius = 0;   ///< kSphere; negative-free. `inward` flips its emitting side.
+    float pmf = 0;        ///< Of being selected, for light sub-paths and for next event alike (by power).
+    int32_t map = kNone;  ///< kTriangle, kSphere: index of the SurfaceMap that multiplies `radiance`.
+    Rgb radiance;         ///< Radiance; intensity for point and spot; irradiance for distant; unused for environment.
+    Vec3 position;        ///< First corner, centre, or light position.
+    Vec3 edge1, edge2;    ///< kTriangle.
+    Vec3 normal;          ///< Unit; side that emits. Spot: axis. Distant: direction of travel.
+    float radius = 0;     ///< kSphere; negative-free. `inward` flips its emitting side.
     bool inward = false;
     float inv_area = 0;
     float total_height = 0, falloff_height = 0;  ///< kSpot; see SpotLight.
     float reach = 0;                             ///< Area lights: largest coordinate magnitude; see offset_origin().
+    bool hidden = false;                         ///< Area lights: no ray meets the surface, which only emits.
     int32_t light = 0;                           ///< Group for reports: the area-light shape or light source it came from.
 
     bool is_area() const { return kind == EmitterKind::kTriangle || kind == EmitterKind::kSphere; }
     bool is_infinite() const { return kind == EmitterKind::kDistant || kind == EmitterKind::kEnvironment; }
-    /// x_0 cannot be hit by chance: no technique with s = 0.
-    bool is_delta() const { return !is_area() && kind != EmitterKind::kEnvironment; }
+    /// x_0 is measured by counting: a point, or a single direction.
+    bool is_discrete() const { return !is_area() && kind != EmitterKind::kEnvironment; }
+    /// Whether a camera sub-path can find x_0 by itself. If not, there is no technique with s = 0.
+    bool can_be_hit() const { return is_area() ? !hidden : kind == EmitterKind::kEnvironment; }
 };
 
 /// Start of a light sub-path: x_0 and the ray towards x_1.
@@ -64,7 +69,8 @@ class EmitterSet {
   public:
     EmitterSet() = default;
     /// `emitters` without their pmf; `centre` and `radius` of the sphere around the scene, for infinite lights.
-    EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius);
+    EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius,
+               std::vector<SurfaceMap> surface_maps = {});
 
     bool empty() const { return emitters_.empty(); }
     const std::vector<Emitter>& all() const { return emitters_; }
@@ -87,13 +93,13 @@ class EmitterSet {
     /// Connects `reference` to a given x_0 of emitter `out->emitter`: `position` on a finite light, `travel` the direction of
     /// travel of an infinite one, `normal` that of an area light. Fills in the rest of `out` but for pdf. False as above.
     bool connect_point(const Vec3& reference, const Vec3& position, const Vec3& normal_or_travel, NextEventSample* out) const;
-    /// Radiance (or intensity, irradiance) leaving x_0 of emitter `e` along `w` (unit, away from the light); `normal` is the
-    /// geometric normal at x_0 on the emitting side. The environment looks its map up in -w.
-    Rgb emitted(const Emitter& e, const Vec3& normal, const Vec3& w) const;
+    /// Radiance (or intensity, irradiance) leaving x_0 of emitter `e` along `w` (unit, away from the light); `position` is x_0, and
+    /// `normal` the geometric normal there on the emitting side. The environment looks its map up in -w.
+    Rgb emitted(const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w) const;
     /// The part of emitted() that belongs to x_0 alone, F(1) of a light prefix: radiance of area lights and of the environment
     /// along `w`, intensity on a spot's axis.
-    Rgb strength(const Emitter& e, const Vec3& w) const {
-        return e.kind == EmitterKind::kEnvironment ? environment_.radiance(-w) : e.radiance;
+    Rgb strength(const Emitter& e, const Vec3& position, const Vec3& w) const {
+        return e.kind == EmitterKind::kEnvironment ? environment_.radiance(-w) : radiance_at(e, position);
     }
     /// pL of x_0: density of sample_emission() for the point, native measure, pmf included. `w` as above (environment).
     float pdf_position(const Emitter& e, const Vec3& w) const;
@@ -104,9 +110,14 @@ class EmitterSet {
     float pdf_next_event(const Emitter& e, const Vec3& reference, const Vec3& position, const Vec3& normal, const Vec3& wi) const;
 
   private:
+    Rgb radiance_at(const Emitter& e, const Vec3& position) const {
+        return e.map == kNone ? e.radiance : e.radiance * surface_maps_[size_t(e.map)].at(e, position);
+    }
+
     std::vector<Emitter> emitters_;
     AliasTable pick_;
     Environment environment_;
+    std::vector<SurfaceMap> surface_maps_;
     int32_t environment_index_ = kNone;
     Vec3 centre_;
     float scene_radius_ = 1, disc_pdf_ = 0;

@@ -76,7 +76,7 @@ class Scene {
 
   private:
     Scene() = default;
-    void collect_emitters(std::vector<Emitter>* emitters);
+    void collect_emitters(std::vector<Emitter>* emitters, std::vector<SurfaceMap>* surface_maps);
     float smallest_reach(const Bounds3& bounds) const;
     void summarise();
     void triangle_point(const TriangleMesh& mesh, const RawHit& hit, SurfacePoint* out) const;

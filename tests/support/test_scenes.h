@@ -205,6 +205,36 @@ inline std::shared_ptr<const Scene> spherical_lights() {
     return b.build();
 }
 
+/// Lamps that no ray meets, hanging in front of the camera: a square that shines down, and a sphere that shines to both sides and
+/// has a ball inside of it. Lamps whose light an image gives: a screen on the wall, a sphere, and a square that no ray meets.
+inline std::shared_ptr<const Scene> hidden_and_pictured_lamps() {
+    SceneBuilder b = cornell_builder();
+    b.description().emissions[0].radiance = {2, 2, 3};
+    const MaterialId white = b.diffuse(Rgb(0.5f));
+    b.quad({-0.2f, 1.3f, -0.5f}, {0.5f, 0, 0}, {0, 0.1f, 0.5f}, white, b.emission({4, 3, 2}));
+    b.hide_quad();
+    b.sphere({0.4f, 1.2f, 0.3f}, 0.3f, white, b.emission({2, 3, 1}, true));
+    b.hide_sphere();
+    b.sphere({0.4f, 1.15f, 0.3f}, 0.12f, b.diffuse({0.6f, 0.3f, 0.4f}));
+
+    Image picture;
+    picture.width = 5, picture.height = 4;
+    for (int i = 0; i < 20; ++i)
+        picture.floats.insert(picture.floats.end(), {0.5f * float(i % 3), 0.2f + 0.2f * float(i / 5), float(i == 7) * 4});
+    b.description().images.push_back(picture);
+    const auto emission = [&](const Rgb& radiance, bool two_sided) {
+        const int32_t id = b.emission(radiance, two_sided);
+        b.description().emissions[size_t(id)].image = 0;
+        return id;
+    };
+    b.quad({-0.9f, 0.4f, 0.9f}, {0, 0.9f, 0.05f}, {0.8f, 0, 0}, white, emission({3, 4, 5}, false)).uvs = {
+        {0, 0}, {0, 1}, {1, 1}, {1, 0}};
+    b.sphere({-0.5f, 1.1f, 0.2f}, 0.2f, white, emission({4, 3, 5}, false)).orientation = Frame(normalize(Vec3{1, 2, -1}));
+    b.quad({0.1f, 0.7f, -0.3f}, {0.5f, 0, 0}, {0, 0.2f, 0.5f}, white, emission({3, 2, 3}, true));
+    b.hide_quad();
+    return b.build();
+}
+
 /// The Cornell box without what stands in it.
 inline SceneBuilder empty_box_builder() {
     SceneBuilder b = cornell_builder();
@@ -342,6 +372,7 @@ inline constexpr NamedScene kScenes[] = {
     {"instances_and_cutouts", instances_and_cutouts, "path light bdpt"},
     {"smooth_normals_and_lens", smooth_normals_and_lens, "path light bdpt"},
     {"spherical_lights", spherical_lights, "path light bdpt"},
+    {"hidden_and_pictured_lamps", hidden_and_pictured_lamps, "path light bdpt"},
     {"environment_lit", environment_lit, "path light bdpt"},
     {"delta_lights", delta_lights, "path light bdpt"},
     {"glass_and_mirror", glass_and_mirror, "path bdpt"},        // light: what is seen through glass is missing

@@ -41,6 +41,11 @@ Emitter sphere(bool inward, bool two_sided = false) {
     return e;
 }
 
+Emitter hidden(Emitter e) {
+    e.hidden = true;
+    return e;
+}
+
 Emitter point() {
     Emitter e;
     e.kind = EmitterKind::kPoint;
@@ -102,7 +107,28 @@ struct Case {
     std::string name;
     Emitter emitter;
     int environment;
+    std::vector<SurfaceMap> maps = {};
 };
+
+/// Shows two fifths of an image on a triangle, or all of it on a sphere.
+Case pictured(std::string name, Emitter e) {
+    static const Image image = [] {
+        Image picture;
+        picture.width = 5, picture.height = 4;
+        for (int i = 0; i < 20; ++i)
+            picture.floats.insert(picture.floats.end(),
+                                  {0.2f + float(i % 3), 0.5f + 0.2f * float(i / 5), float(i == 7) * 4 + 0.1f});
+        return picture;
+    }();
+    const Vec2 uv[3] = {{0.1f, 0.2f}, {0.9f, 0.1f}, {0.3f, 1.2f}};
+    e.map = 0;
+    Case c{std::move(name), e, 0};
+    if (e.kind == EmitterKind::kSphere)
+        c.maps.emplace_back(image, image.mean(), Frame(normalize(Vec3{0.3f, 0.5f, -0.2f})));
+    else
+        c.maps.emplace_back(image, image.mean(), uv);
+    return c;
+}
 
 std::vector<Case> cases() {
     return {{"triangle", triangle(false), 0},
@@ -110,6 +136,10 @@ std::vector<Case> cases() {
             {"sphere", sphere(false), 0},
             {"two-sided sphere", sphere(false, true), 0},
             {"inward sphere", sphere(true), 0},
+            {"hidden sphere", hidden(sphere(false)), 0},
+            {"hidden two-sided sphere", hidden(sphere(false, true)), 0},
+            pictured("pictured two-sided triangle", triangle(true)),
+            pictured("pictured sphere", sphere(false)),
             {"point", point(), 0},
             {"spot", spot(), 0},
             {"distant", distant(), 0},
@@ -122,6 +152,19 @@ std::vector<Case> cases() {
 Rgb flux(const Case& c) {
     const Emitter& e = c.emitter;
     const float disc = kPi * kRadius * kRadius;
+    if (!c.maps.empty()) {  // the mean of many points, whose radiance is that of emitted()
+        const EmitterSet set({e}, Environment(), kCentre, kRadius, c.maps);
+        double sum[3] = {};
+        constexpr int kSide = 600;
+        for (int i = 0; i < kSide * kSide; ++i) {
+            const Vec2 u{(float(i % kSide) + 0.5f) / kSide, (float(i / kSide) + 0.5f) / kSide}, b = sample_triangle(u);
+            const Vec3 n = e.kind == EmitterKind::kSphere ? sample_sphere(u) : e.normal;
+            const Vec3 p = e.kind == EmitterKind::kSphere ? e.position + n * e.radius : e.position + e.edge1 * b.x + e.edge2 * b.y;
+            const Rgb radiance = set.emitted(e, p, n, n);
+            for (int k = 0; k < 3; ++k) sum[k] += double(radiance[k]) / (kSide * kSide);
+        }
+        return Rgb{float(sum[0]), float(sum[1]), float(sum[2])} * (kPi / e.inv_area * (e.two_sided ? 2.0f : 1.0f));
+    }
     switch (e.kind) {
         case EmitterKind::kTriangle:
         case EmitterKind::kSphere: return e.radiance * (kPi / e.inv_area * (e.two_sided ? 2.0f : 1.0f));
@@ -166,7 +209,7 @@ int quarter_of(const Emitter& e, const Vec3& p) {
 EmitterSet set_of(const Case& c, const EnvironmentCase& source) {
     Emitter other = point();
     other.radiance = Rgb(40.0f);
-    return EmitterSet({c.emitter, other}, c.environment != 0 ? source.make() : Environment(), kCentre, kRadius);
+    return EmitterSet({c.emitter, other}, c.environment != 0 ? source.make() : Environment(), kCentre, kRadius, c.maps);
 }
 
 TEST(Emission, IsDrawnWithItsDensities) {
@@ -269,9 +312,10 @@ TEST(Emission, CarriesTheAnalyticPower) {
     testing::TestFamily family;
     for (const Case& c : cases()) {
         const EnvironmentCase source(c.environment);
-        const EmitterSet set({c.emitter}, c.environment != 0 ? source.make() : Environment(), kCentre, kRadius);
+        const EmitterSet set({c.emitter}, c.environment != 0 ? source.make() : Environment(), kCentre, kRadius, c.maps);
         const Rgb expected = flux(c);
-        EXPECT_NEAR(set.power(set[0]) / scalar_of(expected), 1, 1e-4) << c.name;
+        // That of images is the sum of a rule.
+        EXPECT_NEAR(set.power(set[0]) / scalar_of(expected), 1, c.maps.empty() ? 1e-4 : 1e-2) << c.name;
         std::vector<double> groups[3];
         Rng rng({2, Stage::kTraining, 0, 0});
         for (int g = 0; g < 20; ++g) {
@@ -325,6 +369,14 @@ TEST(Emission, NarrowSpotsKeepTheirPower) {
     }
 }
 
+/// A camera may find by itself what has an extent and can be met; x_0 of the others has a density all the same.
+TEST(Emission, WhatCanBeHit) {
+    for (const Case& c : cases()) {
+        const bool named = c.name.find("hidden") != std::string::npos;
+        EXPECT_EQ(c.emitter.can_be_hit(), !c.emitter.is_discrete() && !named) << c.name;
+    }
+}
+
 /// Irradiance of a sphere, facing it: pi L (r / d)^2, down to a lamp of a millimetre seen from ten kilometres.
 TEST(NextEvent, FindsASphereHoweverSmallItLooks) {
     for (const double ratio : {2.0, 1e3, 1e5, 1e6, 1e7}) {
@@ -364,7 +416,7 @@ TEST(NextEvent, IsDrawnWithItsDensity) {
             // reference; texels.
             const Vec3 axis = round ? normalize(reference - e.position) : Vec3{0, 0, 1};
             const double distance = length(reference - e.position);
-            const bool cone = round && !e.inward && distance > e.radius;
+            const bool cone = round && !e.inward && !(e.hidden && e.two_sided) && distance > e.radius;
             // A cap from outside, all of the sphere from inside.
             const double lowest = cone ? e.radius / distance : -1;
             const Cells cap{12, 8};
@@ -405,7 +457,7 @@ TEST(NextEvent, IsDrawnWithItsDensity) {
             // refused.
             const auto density = [&](const Vec3& p, const Vec3& n) {
                 const Vec3 wi = normalize(p - reference);
-                return set.emitted(e, n, -wi).is_black() ? 0.0 : double(set.pdf_next_event(e, reference, p, n, wi));
+                return set.emitted(e, p, n, -wi).is_black() ? 0.0 : double(set.pdf_next_event(e, reference, p, n, wi));
             };
             for (int b = 0; b < bins; ++b) {
                 double sum = 0;
@@ -428,7 +480,7 @@ TEST(NextEvent, IsDrawnWithItsDensity) {
                         sum += double(set.pdf_next_event(e, reference, {}, {}, d)) * 4 * kPiD / (square * square * n * n);
                     }
                 } else {
-                    const bool lit = !set.emitted(e, {}, normalize(reference - e.position)).is_black();
+                    const bool lit = !set.emitted(e, e.position, {}, normalize(reference - e.position)).is_black();
                     sum = lit ? double(set.pdf_next_event(e, reference, e.position, {}, {})) : 0;
                 }
                 total += expected[size_t(b)] = sum * kSamples;
