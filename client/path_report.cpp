@@ -35,6 +35,8 @@ std::string_view name_of(EmitterKind kind) {
         case EmitterKind::kSpot: return "spot light";
         case EmitterKind::kDistant: return "distant light";
         case EmitterKind::kEnvironment: return "environment";
+        case EmitterKind::kProjection: return "projection light";
+        case EmitterKind::kGoniometric: return "goniometric light";
     }
     return "";
 }

@@ -101,7 +101,7 @@ struct Context {
     std::map<std::tuple<float, float, float, bool, int32_t>, int32_t> emission_index;
     std::vector<TextureCost> texture_costs;        ///< One per scene texture.
     std::vector<TextureRange> texture_ranges;      ///< The same.
-    std::map<int32_t, Rgb> image_means;            ///< Of the images of area lights.
+    std::map<int32_t, Rgb> image_means;            ///< Of the images of area and goniometric lights.
     std::map<int32_t, TextureRange> image_ranges;  ///< Of the one-channel images of textures, by their index.
     std::map<MaterialId, int> mix_levels;          ///< Of mix materials; others have none.
     int texture_depth = 0, material_depth = 0;     ///< Of the definitions being resolved.

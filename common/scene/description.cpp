@@ -11,6 +11,8 @@ std::string at(const ShapeAttributes& a) { return a.source.empty() ? std::string
 
 std::string at(const InfiniteLight& l) { return l.source.empty() ? std::string("infinite light") : l.source; }
 
+std::string at(const ImageLight& l) { return l.source.empty() ? std::string("image light") : l.source; }
+
 bool rgb_ok(const Rgb& c) { return is_finite(c) && c.r >= 0 && c.g >= 0 && c.b >= 0; }
 
 struct Checker {
@@ -99,6 +101,12 @@ Status validate(const SceneDescription& description) {
         if (!rgb_ok(e.radiance)) return invalid_argument("an area light's radiance is negative or not finite");
         if (e.image != kNone && (size_t(e.image) >= description.images.size() || description.images[size_t(e.image)].empty()))
             return invalid_argument("an area light's image is missing or empty");
+    }
+    for (const ImageLight& l : description.image_lights) {
+        if (!rgb_ok(l.intensity)) return invalid_argument(at(l) + ": the light's intensity is negative or not finite");
+        if (!inverse(l.light_to_world)) return invalid_argument(at(l) + ": the light's transformation is singular");
+        if (l.image < 0 || size_t(l.image) >= description.images.size() || description.images[size_t(l.image)].empty())
+            return invalid_argument(at(l) + ": the light's image is missing or empty");
     }
     for (const InfiniteLight& l : description.infinite_lights) {
         if (!rgb_ok(l.radiance)) return invalid_argument(at(l) + ": the light's radiance is negative or not finite");

@@ -128,6 +128,18 @@ struct SpotLight {
     std::string source = {};
 };
 
+/// A light at a point whose intensity an image gives by direction; see DirectionMap.
+struct ImageLight {
+    enum class Kind : uint8_t { kProjection, kGoniometric };
+    Kind kind = Kind::kProjection;
+    Vec3 position;
+    Mat4 light_to_world;                    ///< Rotation (and reflection) part is used.
+    float half_width = 1, half_height = 1;  ///< kProjection: of the picture at distance 1.
+    Rgb intensity{1.0f};                    ///< Multiplies the image, W / sr.
+    int32_t image = kNone;                  ///< Index into images; square for kGoniometric.
+    std::string source = {};
+};
+
 struct DistantLight {
     Vec3 direction;  ///< Unit vector in which the light travels.
     Rgb irradiance;  ///< On a surface facing it, W / m^2.
@@ -174,6 +186,7 @@ struct SceneDescription {
     std::vector<AreaEmission> emissions;
     std::vector<PointLight> point_lights;
     std::vector<SpotLight> spot_lights;
+    std::vector<ImageLight> image_lights;
     std::vector<DistantLight> distant_lights;
     std::vector<InfiniteLight> infinite_lights;
     PerspectiveCamera camera;
@@ -184,9 +197,9 @@ struct SceneDescription {
     std::vector<std::string> warnings;  ///< Named warnings: "file:line: what was ignored and why that matters".
 };
 
-/// What rendering relies on in shapes, instances, and the strength of area and infinite lights: indices in range, finite numbers,
-/// areas within single precision, invertible matrices. kInvalidArgument names the first that breaks it, a shape with its place in
-/// the scene file. import_pbrt() and Scene::build() check it; everything else is the importer's to guarantee.
+/// What rendering relies on in shapes, instances, and the strength of area, image and infinite lights: indices in range, finite
+/// numbers, areas within single precision, invertible matrices. kInvalidArgument names the first that breaks it, a shape with its
+/// place in the scene file. import_pbrt() and Scene::build() check it; everything else is the importer's to guarantee.
 Status validate(const SceneDescription& description);
 
 /// Whether a transformation is made of rotations, translations, reflections and one scale for all axes, as a camera's must be.

@@ -34,11 +34,10 @@ bool samples_cone(const Emitter& e, float d2) {
 
 }  // namespace
 
-EmitterSet::EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius,
-                       std::vector<SurfaceMap> surface_maps)
+EmitterSet::EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius, LightMaps maps)
     : emitters_(std::move(emitters)),
       environment_(std::move(environment)),
-      surface_maps_(std::move(surface_maps)),
+      maps_(std::move(maps)),
       centre_(centre),
       scene_radius_(radius) {
     disc_pdf_ = 1 / (kPi * radius * radius);
@@ -56,13 +55,15 @@ double EmitterSet::power(const Emitter& e) const {
     switch (e.kind) {
         case EmitterKind::kTriangle:
         case EmitterKind::kSphere: {
-            const Rgb mean = e.map == kNone ? e.radiance : e.radiance * surface_maps_[size_t(e.map)].mean();
+            const Rgb mean = e.map == kNone ? e.radiance : e.radiance * maps_.surfaces[size_t(e.map)].mean();
             return kPiD * scalar_of(mean) / e.inv_area * (e.two_sided ? 2 : 1);
         }
         case EmitterKind::kPoint: return 4 * kPiD * scalar_of(e.radiance);
         case EmitterKind::kSpot: return kPiD * scalar_of(e.radiance) * (double(e.falloff_height) + double(e.total_height));
         case EmitterKind::kDistant: return scalar_of(e.radiance) * disc;
         case EmitterKind::kEnvironment: return environment_.integrated_radiance() * disc;
+        case EmitterKind::kProjection:
+        case EmitterKind::kGoniometric: return scalar_of(e.radiance * direction_map(e).integral());
     }
     return 0;
 }
@@ -75,6 +76,8 @@ Rgb EmitterSet::emitted(const Emitter& e, const Vec3& position, const Vec3& norm
         case EmitterKind::kSpot: return e.radiance * spot_falloff(e, w);
         case EmitterKind::kDistant: return e.radiance;
         case EmitterKind::kEnvironment: return environment_.radiance(-w);
+        case EmitterKind::kProjection:
+        case EmitterKind::kGoniometric: return e.radiance * direction_map(e).intensity(w);
     }
     return {};
 }
@@ -97,6 +100,8 @@ float EmitterSet::pdf_direction(const Emitter& e, const Vec3& normal, const Vec3
         case EmitterKind::kSpot: return height_between(e.normal, w) <= e.total_height ? 1 / (kTwoPi * e.total_height) : 0;
         case EmitterKind::kDistant:
         case EmitterKind::kEnvironment: return disc_pdf_;
+        case EmitterKind::kProjection:
+        case EmitterKind::kGoniometric: return direction_map(e).pdf_solid_angle(w);
     }
     return 0;
 }
@@ -135,6 +140,11 @@ bool EmitterSet::sample_emission(double pick, Vec2 u_position, Vec2 u_direction,
             out->direction = out->normal = Frame(e.normal).to_world({r * float(sc.cos), r * float(sc.sin), z});
             break;
         }
+        case EmitterKind::kProjection:
+        case EmitterKind::kGoniometric:
+            out->position = e.position;
+            out->direction = out->normal = direction_map(e).sample(rest, u_direction);
+            break;
         case EmitterKind::kDistant:
         case EmitterKind::kEnvironment: {
             out->direction = e.kind == EmitterKind::kDistant ? e.normal : -environment_.sample(rest, u_position);

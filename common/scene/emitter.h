@@ -3,7 +3,7 @@
 // triangle is one emitter, all infinite lights together are one.
 //
 // The "native measure" of a point x_0 on an emitter: area (m^-2) for triangles and spheres, solid angle (sr^-1) of the
-// direction towards it for the environment, counting measure for point, spot and distant lights.
+// direction towards it for the environment, counting measure for all others.
 
 #include <cstdint>
 #include <vector>
@@ -15,14 +15,15 @@
 
 namespace lightloom {
 
-enum class EmitterKind : uint8_t { kTriangle, kSphere, kPoint, kSpot, kDistant, kEnvironment };
+enum class EmitterKind : uint8_t { kTriangle, kSphere, kPoint, kSpot, kDistant, kEnvironment, kProjection, kGoniometric };
 
 struct Emitter {
     EmitterKind kind = EmitterKind::kTriangle;
     bool two_sided = false;
     float pmf = 0;        ///< Of being selected, for light sub-paths and for next event alike (by power).
-    int32_t map = kNone;  ///< kTriangle, kSphere: index of the SurfaceMap that multiplies `radiance`.
-    Rgb radiance;         ///< Radiance; intensity for point and spot; irradiance for distant; unused for environment.
+    int32_t map = kNone;  ///< Index of the map that multiplies `radiance`: SurfaceMap of area lights, DirectionMap of kProjection
+                          ///< and kGoniometric, which have one.
+    Rgb radiance;         ///< Radiance; intensity of lights at a point; irradiance for distant; unused for environment.
     Vec3 position;        ///< First corner, centre, or light position.
     Vec3 edge1, edge2;    ///< kTriangle.
     Vec3 normal;          ///< Unit; side that emits. Spot: axis. Distant: direction of travel.
@@ -36,6 +37,7 @@ struct Emitter {
 
     bool is_area() const { return kind == EmitterKind::kTriangle || kind == EmitterKind::kSphere; }
     bool is_infinite() const { return kind == EmitterKind::kDistant || kind == EmitterKind::kEnvironment; }
+    bool has_direction_map() const { return kind == EmitterKind::kProjection || kind == EmitterKind::kGoniometric; }
     /// x_0 is measured by counting: a point, or a single direction.
     bool is_discrete() const { return !is_area() && kind != EmitterKind::kEnvironment; }
     /// Whether a camera sub-path can find x_0 by itself. If not, there is no technique with s = 0.
@@ -59,18 +61,23 @@ struct NextEventSample {
     Vec3 position;       ///< Point on a finite light; for infinite ones a point beyond the scene to test visibility to.
     Vec3 normal;         ///< At x_0, geometric; for infinite lights the direction of travel.
     Vec3 wi;             ///< Unit, from the reference point to the light.
-    Rgb radiance;        ///< Emitted towards the reference point (intensity for point and spot, irradiance for distant).
+    Rgb radiance;        ///< Emitted towards the reference point (intensity for lights at a point, irradiance for distant).
     float geometry = 0;  ///< Converts a solid-angle density at the reference point to the native measure: |cos| / d^2 for
-                         ///< area lights, 1 / d^2 for point and spot, 1 for infinite.
+                         ///< area lights, 1 / d^2 for lights at a point, 1 for infinite.
     float pdf = 0;       ///< Native measure, pmf included.
+};
+
+/// What Emitter::map stands for.
+struct LightMaps {
+    std::vector<SurfaceMap> surfaces;
+    std::vector<DirectionMap> directions;
 };
 
 class EmitterSet {
   public:
     EmitterSet() = default;
     /// `emitters` without their pmf; `centre` and `radius` of the sphere around the scene, for infinite lights.
-    EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius,
-               std::vector<SurfaceMap> surface_maps = {});
+    EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius, LightMaps maps = {});
 
     bool empty() const { return emitters_.empty(); }
     const std::vector<Emitter>& all() const { return emitters_; }
@@ -97,9 +104,10 @@ class EmitterSet {
     /// `normal` the geometric normal there on the emitting side. The environment looks its map up in -w.
     Rgb emitted(const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w) const;
     /// The part of emitted() that belongs to x_0 alone, F(1) of a light prefix: radiance of area lights and of the environment
-    /// along `w`, intensity on a spot's axis.
+    /// along `w`, intensity on a spot's axis, or the mean over an image.
     Rgb strength(const Emitter& e, const Vec3& position, const Vec3& w) const {
-        return e.kind == EmitterKind::kEnvironment ? environment_.radiance(-w) : radiance_at(e, position);
+        if (e.kind == EmitterKind::kEnvironment) return environment_.radiance(-w);
+        return e.has_direction_map() ? e.radiance * direction_map(e).mean() : radiance_at(e, position);
     }
     /// pL of x_0: density of sample_emission() for the point, native measure, pmf included. `w` as above (environment).
     float pdf_position(const Emitter& e, const Vec3& w) const;
@@ -110,14 +118,15 @@ class EmitterSet {
     float pdf_next_event(const Emitter& e, const Vec3& reference, const Vec3& position, const Vec3& normal, const Vec3& wi) const;
 
   private:
+    const DirectionMap& direction_map(const Emitter& e) const { return maps_.directions[size_t(e.map)]; }
     Rgb radiance_at(const Emitter& e, const Vec3& position) const {
-        return e.map == kNone ? e.radiance : e.radiance * surface_maps_[size_t(e.map)].at(e, position);
+        return e.map == kNone ? e.radiance : e.radiance * maps_.surfaces[size_t(e.map)].at(e, position);
     }
 
     std::vector<Emitter> emitters_;
     AliasTable pick_;
     Environment environment_;
-    std::vector<SurfaceMap> surface_maps_;
+    LightMaps maps_;
     int32_t environment_index_ = kNone;
     Vec3 centre_;
     float scene_radius_ = 1, disc_pdf_ = 0;

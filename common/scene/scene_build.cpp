@@ -26,7 +26,7 @@ void drop_degenerate_triangles(TriangleMesh* mesh) {
 
 }  // namespace
 
-void Scene::collect_emitters(std::vector<Emitter>* emitters, std::vector<SurfaceMap>* surface_maps) {
+void Scene::collect_emitters(std::vector<Emitter>* emitters, LightMaps* maps) {
     const auto new_light = [&](const std::string& source, const char* fallback = "") {
         light_sources_.push_back(source.empty() ? fallback : source);
         return int32_t(light_sources_.size()) - 1;
@@ -58,8 +58,8 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters, std::vector<Surface
         const Image& source = description_.images[size_t(image)];
         const auto [mean, inserted] = image_means.try_emplace(image);
         if (inserted) mean->second = source.mean();
-        surface_maps->push_back({source, mean->second, place});
-        return int32_t(surface_maps->size()) - 1;
+        maps->surfaces.push_back({source, mean->second, place});
+        return int32_t(maps->surfaces.size()) - 1;
     };
     const auto add_mesh = [&](const TriangleMesh& mesh, bool hidden) {
         const AreaEmission* emission = area_emission(mesh.attributes, hidden ? nullptr : &mesh_first_emitter_);
@@ -120,6 +120,18 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters, std::vector<Surface
         e.falloff_height = l.falloff_height;
         emitters->push_back(e);
     }
+    for (const ImageLight& l : description_.image_lights) {
+        const bool projection = l.kind == ImageLight::Kind::kProjection;
+        const Image& image = description_.images[size_t(l.image)];
+        Emitter e = new_emitter(projection ? EmitterKind::kProjection : EmitterKind::kGoniometric, l.source,
+                                projection ? "projection light" : "goniometric light");
+        e.position = l.position;
+        e.radiance = l.intensity;
+        e.map = int32_t(maps->directions.size());
+        maps->directions.push_back(projection ? DirectionMap::projection(image, l.light_to_world, l.half_width, l.half_height)
+                                              : DirectionMap::goniometric(image, l.light_to_world));
+        emitters->push_back(e);
+    }
     for (const DistantLight& l : description_.distant_lights) {
         Emitter e = new_emitter(EmitterKind::kDistant, l.source, "distant light");
         e.normal = l.direction;
@@ -143,6 +155,7 @@ float Scene::smallest_reach(const Bounds3& bounds) const {
     for (const Sphere& s : description_.hidden_spheres) reach = std::max(reach, largest_coordinate(s.centre) + s.radius);
     for (const PointLight& l : description_.point_lights) reach = std::max(reach, largest_coordinate(l.position));
     for (const SpotLight& l : description_.spot_lights) reach = std::max(reach, largest_coordinate(l.position));
+    for (const ImageLight& l : description_.image_lights) reach = std::max(reach, largest_coordinate(l.position));
     return std::min(reach, 0.25f);
 }
 
@@ -203,14 +216,13 @@ Result<std::unique_ptr<Scene>> Scene::build(SceneDescription description, const 
     const Bounds3 bounds = scene->accel_->bounds();
     scene->least_reach_ = scene->smallest_reach(bounds);
     std::vector<Emitter> emitters;
-    std::vector<SurfaceMap> surface_maps;
-    scene->collect_emitters(&emitters, &surface_maps);
+    LightMaps maps;
+    scene->collect_emitters(&emitters, &maps);
     for (Emitter& e : emitters) e.reach = std::max(e.reach, scene->least_reach_);
     const Vec3 centre = bounds.empty() ? Vec3{} : bounds.centre();
     // A little larger than the bounding sphere, so that rounding never starts a light sub-path inside of the scene.
     const float radius = bounds.empty() ? 1.0f : length(bounds.hi - centre) * 1.0001f + 1e-6f;
-    scene->emitters_ =
-        EmitterSet(std::move(emitters), Environment(d.infinite_lights, d.images), centre, radius, std::move(surface_maps));
+    scene->emitters_ = EmitterSet(std::move(emitters), Environment(d.infinite_lights, d.images), centre, radius, std::move(maps));
 
     scene->summarise();
     scene->summary_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -241,7 +253,7 @@ void Scene::summarise() {
     s.texture_count = description_.textures.size();
     for (const Image& image : description_.images) s.image_bytes += image.memory_bytes();
     s.acceleration_bytes = accel_->memory_bytes();
-    static constexpr const char* kKinds[] = {"area", "area", "point", "spot", "distant", "infinite"};
+    static constexpr const char* kKinds[] = {"area", "area", "point", "spot", "distant", "infinite", "projection", "goniometric"};
     s.lights.resize(light_sources_.size());
     for (const Emitter& e : emitters_.all()) {
         SceneSummary::Light& light = s.lights[size_t(e.light)];

@@ -25,6 +25,7 @@ constexpr File kFiles[] = {
     {"env-image", "path light bdpt"},
     {"furnace-box", "path light bdpt"},
     {"furnace-sphere", "path light bdpt"},
+    {"image-lights", "path light bdpt"},
     {"instances", "path light bdpt"},
     {"point-spot", "path light bdpt"},
     {"smooth-normals", "path light bdpt"},

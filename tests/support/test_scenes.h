@@ -59,6 +59,22 @@ inline std::shared_ptr<const Scene> delta_lights() {
     spot.total_height = 0.3f, spot.falloff_height = 0.1f;
     b.description().spot_lights.push_back(spot);
     b.description().distant_lights.push_back({normalize(Vec3{0.2f, -1, 0.1f}), {2, 2, 2}});
+    Image picture;
+    picture.width = picture.height = 4;
+    for (int i = 0; i < 16; ++i)
+        picture.floats.insert(picture.floats.end(), {float(i % 3), 0.5f + 0.5f * float(i % 2), i == 5 ? 6.0f : 0.5f});
+    b.description().images.push_back(picture);
+    ImageLight projector, lamp;
+    projector.position = {-0.7f, 1.5f, -0.6f};
+    projector.light_to_world = *inverse(*look_at(projector.position, {0.3f, 0.5f, 0.8f}, {0, 1, 0}));
+    projector.half_width = 0.4f, projector.half_height = 0.5f;
+    projector.intensity = {4, 4, 3};
+    lamp.kind = ImageLight::Kind::kGoniometric;
+    lamp.position = {-0.2f, 1.2f, 0.5f};
+    lamp.light_to_world = rotation(40, 1, 1, 0);
+    lamp.intensity = {0.5f, 0.4f, 0.6f};
+    projector.image = lamp.image = 0;
+    b.description().image_lights = {projector, lamp};
     return b.build();
 }
 

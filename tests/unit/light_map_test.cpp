@@ -5,6 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "common/core/math.h"
 #include "common/core/rng.h"
 #include "tests/support/small_scenes.h"
 
@@ -63,6 +66,54 @@ TEST(SurfaceMap, NoPartIsForgotten) {
     image.floats[100 * 512 + 77] = 1;
     const Vec2 uv[3] = {{0, 0}, {1, 0}, {0, 1}};
     EXPECT_GT(SurfaceMap(image, image.mean(), uv).mean().g, 0);
+}
+
+/// As one would see the slide from the lamp: +x to the right, +y up, row 0 at the top.
+TEST(DirectionMap, ProjectsThePictureUpright) {
+    const Image image = four_corners();
+    const DirectionMap map = DirectionMap::projection(image, translation(5, 6, 7) * scaling(3, 3, 3), 0.5f, 0.25f);
+    const auto at = [&](float x, float y, float z = 1) { return map.intensity(normalize(Vec3{x, y, z})); };
+    EXPECT_EQ(at(-0.4f, 0.2f), Rgb(1, 0, 0));
+    EXPECT_EQ(at(0.4f, 0.2f), Rgb(0, 1, 0));
+    EXPECT_EQ(at(-0.4f, -0.2f), Rgb(0, 0, 1));
+    EXPECT_EQ(at(0.4f, -0.2f), Rgb(1.0f));
+    for (const Rgb& outside : {at(0.51f, 0), at(-0.51f, 0), at(0, 0.26f), at(0, -0.26f), at(-0.4f, 0.2f, -1)})
+        EXPECT_TRUE(outside.is_black());
+    // The solid angle of a rectangle of half sides a and b at distance 1 is 4 atan(a b / sqrt(1 + a^2 + b^2)).
+    const double whole = 4 * std::atan(0.5 * 0.25 / std::sqrt(1 + 0.25 + 0.0625));
+    EXPECT_NEAR(map.integral().g, whole / 2, 1e-6);
+}
+
+/// pbrt-v4's goniometric lights have the pole of their octahedral map at +y. Its upper half is the middle of the square.
+TEST(DirectionMap, WrapsAboutTheVertical) {
+    Image image;
+    image.width = image.height = 8;
+    image.channels = 1;
+    image.floats.assign(64, 0);
+    for (const int i : {27, 28, 35, 36}) image.floats[size_t(i)] = 3;
+    const DirectionMap map = DirectionMap::goniometric(image, Mat4());
+    EXPECT_EQ(map.intensity({0, 1, 0}), Rgb(3.0f));
+    for (const Vec3& dark : {Vec3{0, -1, 0}, Vec3{1, 0, 0}, Vec3{0, 0, 1}, Vec3{-1, 0, 0}, Vec3{0, 0, -1}})
+        EXPECT_TRUE(map.intensity(dark).is_black());
+    EXPECT_NEAR(map.integral().r, 3 * 4 * kPi * 4 / 64, 1e-5f);
+    // x stays x: a texel right of the middle lights +x.
+    image.floats.assign(64, 0);
+    image.floats[3 * 8 + 5] = image.floats[4 * 8 + 5] = 1;
+    const DirectionMap side = DirectionMap::goniometric(image, Mat4());
+    EXPECT_FALSE(side.intensity(normalize(Vec3{0.6f, 0.8f, 0})).is_black());
+    EXPECT_TRUE(side.intensity(normalize(Vec3{-0.6f, 0.8f, 0})).is_black());
+}
+
+/// A slide of one texel at 60 degrees and one of a hundredth of a degree: every texel keeps its share.
+TEST(DirectionMap, SolidAnglesOfTexelsSumToTheWhole) {
+    for (const double half : {0.577350269, 8.7e-5, 100.0}) {
+        double sum = 0, least = 1;
+        const std::vector<double> cells = projected_solid_angles(100, 50, half, half / 2);
+        for (const double cell : cells) sum += cell, least = std::min(least, cell);
+        EXPECT_NEAR(sum / (4 * std::atan(half * half / 2 / std::sqrt(1 + 1.25 * half * half))), 1, 1e-9) << half;
+        EXPECT_GT(least, 0) << half;
+        EXPECT_EQ(cells.size(), 5000u);
+    }
 }
 
 }  // namespace
