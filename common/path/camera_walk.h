@@ -30,7 +30,7 @@ template <class Visit, class Escape>
 int trace_camera_path(const Scene& scene, CameraSampler& sampler, int px, int py, int max_edges, const RouletteRule& rule,
                       PathVertex* z, WalkCounters* counters, Visit&& visit, Escape&& escape) {
     const Camera::CameraRay lens_ray = sampler.ray(scene.camera(), px, py);
-    WalkRay ray{lens_ray.origin, lens_ray.direction, Rgb(1.0f), lens_ray.pdf_solid_angle, false, true};
+    WalkRay ray{lens_ray.origin, lens_ray.direction, Rgb(1.0f), lens_ray.pdf, scene.camera().has_parallel_rays(), true};
     z[0].p = ray.origin;
     z[0].alpha = ray.alpha;
     z[0].delta = false;

@@ -177,16 +177,16 @@ Rgb connect(const Scene& scene, const PathVertex* y, int s, const PathVertex* z,
     return contribution;
 }
 
-/// t = 1: connects y_{s-1}, s >= 2, to `lens_point` of Camera::sample_lens(). `film` receives the film position.
-inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, const Vec3& lens_point, Vec2* film, PathView* view,
+/// t = 1: connects y_{s-1}, s >= 2, to `lens_point` of Camera::sample_lens(), which moves as Camera::see() says. `film` receives
+/// the film position.
+inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, Vec3* lens_point, Vec2* film, PathView* view,
                              WalkCounters* counters) {
     const PathVertex& a = y[s - 1];
-    const Vec3 d = a.p - lens_point;
-    const float d2 = length_squared(d);
-    if (!(d2 > 0)) return {};
-    const Vec3 w = d / std::sqrt(d2);
-    float pdf = 0;
-    if (!scene.camera().project(lens_point, w, film, &pdf)) return {};
+    Camera::Sight sight;
+    if (!scene.camera().see(a.p, lens_point, &sight)) return {};
+    *film = sight.film;
+    const Vec3& w = sight.direction;
+    const float pdf = sight.pdf, d2 = sight.distance2;
     const Rect& crop = scene.frame().crop;
     if (!crop.contains(int(film->x), int(film->y))) return {};
     const Scatter at_light = scatter<TransportMode::kImportance>(a, -w);
@@ -195,7 +195,7 @@ inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, con
     if (contribution.is_black()) return {};
     ++counters->rays;
     ++counters->connections;
-    if (scene.occluded(a.p, a.ng, a.reach, lens_point)) return {};
+    if (scene.occluded(a.p, a.ng, a.reach, *lens_point)) return {};
     const int k = s;
     view->k = k;
     view_light_prefix(y, s, view);

@@ -153,9 +153,17 @@ struct InfiniteLight {
     std::string source = {};
 };
 
-struct PerspectiveCamera {
+enum class CameraKind : uint8_t {
+    kPerspective,
+    kOrthographic,     ///< Rays along +z from the screen window in the plane z = 0, in the camera's units. No lens.
+    kEqualArea,        ///< All directions, the equal-area octahedral square about +y filling the frame. No lens.
+    kEquirectangular,  ///< All directions: from +y at the top to -y, and from +x over +z, -x and -z from left to right. No lens.
+};
+
+struct CameraDescription {
+    CameraKind kind = CameraKind::kPerspective;
     Mat4 camera_to_world;    ///< Camera looks along +z, +y up, +x right; may mirror.
-    float fov_degrees = 90;  ///< Of the shorter image side.
+    float fov_degrees = 90;  ///< kPerspective: of the shorter image side.
     /// pbrt's screen window; when unset (`has_screen_window` false) it follows the film's aspect ratio.
     bool has_screen_window = false;
     float screen_window[4] = {-1, 1, -1, 1};  ///< x0, x1, y0, y1.
@@ -189,7 +197,7 @@ struct SceneDescription {
     std::vector<ImageLight> image_lights;
     std::vector<DistantLight> distant_lights;
     std::vector<InfiniteLight> infinite_lights;
-    PerspectiveCamera camera;
+    CameraDescription camera;
     FilmDescription film;
     int max_depth = 5;                  ///< Bounces, as in pbrt: paths have up to max_depth + 1 edges.
     int samples_per_pixel = 16;         ///< What the file asks for; the command line may override.

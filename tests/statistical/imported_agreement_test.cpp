@@ -27,6 +27,7 @@ constexpr File kFiles[] = {
     {"furnace-sphere", "path light bdpt"},
     {"image-lights", "path light bdpt"},
     {"instances", "path light bdpt"},
+    {"panorama", "path light bdpt"},
     {"point-spot", "path light bdpt"},
     {"smooth-normals", "path light bdpt"},
     {"textures", "path light bdpt"},

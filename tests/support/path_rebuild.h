@@ -131,7 +131,7 @@ inline std::optional<std::vector<PathVertex>> rebuild_camera(const Scene& scene,
     std::vector<PathVertex> z(1);
     z[0].p = path.lens;
     z[0].alpha = Rgb(1.0f);
-    WalkRay ray{path.lens, first, Rgb(1.0f), pdf, false, true};
+    WalkRay ray{path.lens, first, Rgb(1.0f), pdf, scene.camera().has_parallel_rays(), true};
     for (int j = 1; j < t; ++j) {
         const PathVertex& x = path.x[size_t(k - j)];
         PathVertex v;
@@ -235,7 +235,7 @@ inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, 
             (*z)[0].p = path.lens;
             towards = normalize(y->back().p - path.lens);
             Vec2 film;
-            r.contribution = connect_to_camera(scene, y->data(), k, path.lens, &film, &r.view, &counters);
+            r.contribution = connect_to_camera(scene, y->data(), k, &(*z)[0].p, &film, &r.view, &counters);
             break;
         }
         case TechniqueKind::kMerge: {

@@ -163,7 +163,7 @@ inline std::shared_ptr<const Scene> textured_and_two_sided() {
 }
 
 /// What a pbrt scene is made of: an object shown twice (once mirrored and stretched), a curtain with holes from a texture, a floor
-/// with an image, a rough coat over metal.
+/// with an image, a rough coat over metal; seen all around.
 inline std::shared_ptr<const Scene> instances_and_cutouts() {
     SceneBuilder b = cornell_builder();
     Image picture;
@@ -205,6 +205,8 @@ inline std::shared_ptr<const Scene> instances_and_cutouts() {
     b.description().objects.push_back(std::move(object));
     b.description().instances.push_back({0, translation(-0.5, 0.2, 0.5), "first"});
     b.description().instances.push_back({0, translation(0.2, 1.0, 0.4) * scaling(-0.8f, 1.5f, 0.6f), "mirrored"});
+    b.description().camera.camera_to_world = *inverse(*look_at({0.1f, 1, -0.6f}, {0, 0.8f, 1}, {0.2f, 1, 0}));
+    b.description().camera.kind = CameraKind::kEqualArea;
     return b.build();
 }
 
@@ -222,7 +224,8 @@ inline std::shared_ptr<const Scene> spherical_lights() {
 }
 
 /// Lamps that no ray meets, hanging in front of the camera: a square that shines down, and a sphere that shines to both sides and
-/// has a ball inside of it. Lamps whose light an image gives: a screen on the wall, a sphere, and a square that no ray meets.
+/// has a ball inside of it. Lamps whose light an image gives: a screen on the wall, a sphere, and a square that no ray meets. Seen
+/// by parallel rays that start in the middle of the box.
 inline std::shared_ptr<const Scene> hidden_and_pictured_lamps() {
     SceneBuilder b = cornell_builder();
     b.description().emissions[0].radiance = {2, 2, 3};
@@ -248,6 +251,9 @@ inline std::shared_ptr<const Scene> hidden_and_pictured_lamps() {
     b.sphere({-0.5f, 1.1f, 0.2f}, 0.2f, white, emission({4, 3, 5}, false)).orientation = Frame(normalize(Vec3{1, 2, -1}));
     b.quad({0.1f, 0.7f, -0.3f}, {0.5f, 0, 0}, {0, 0.2f, 0.5f}, white, emission({3, 2, 3}, true));
     b.hide_quad();
+    CameraDescription& camera = b.description().camera;
+    camera.camera_to_world = *inverse(*look_at({0.1f, 1.1f, -0.6f}, {0, 0.8f, 1}, {0, 1, 0})) * scaling(0.8, 0.8, 0.8);
+    camera.kind = CameraKind::kOrthographic;
     return b.build();
 }
 

@@ -1,4 +1,4 @@
-// Film: exposure, sensor and white balance.
+// Film (exposure, sensor, white balance) and the cameras that are no perspective ones.
 
 #include "import_testing.h"
 
@@ -69,6 +69,32 @@ TEST(ImportFilm, GeometryChannelsAreNamed) {
     EXPECT_NE(d.warnings[0].find("--layers"), std::string::npos);
     EXPECT_EQ(d.film.width, 7);
     expect_refused("Film \"rgb\" \"string coordinatesystem\" \"world\"", "coordinatesystem");
+}
+
+TEST(ImportCamera, Orthographic) {
+    const SceneDescription d =
+        with_film("Translate 0 0 1", "Camera \"orthographic\" \"float screenwindow\" [-2 2 -1 1] \"float focaldistance\" 3");
+    EXPECT_TRUE(d.warnings.empty());
+    EXPECT_EQ(d.camera.kind, CameraKind::kOrthographic);
+    EXPECT_TRUE(d.camera.has_screen_window);
+    EXPECT_EQ(d.camera.screen_window[1], 2);
+    EXPECT_EQ(with_film("", "Camera \"orthographic\" \"float frameaspectratio\" 2").camera.frame_aspect_ratio, 2);
+    expect_refused("Camera \"orthographic\" \"float lensradius\" 0.1", "lensradius");
+    expect_refused("Camera \"orthographic\" \"float fov\" 30", "fov");
+    expect_refused("Camera \"orthographic\" \"float screenwindow\" [0 1e-12 0 1]", "narrower");
+    expect_refused("Camera \"orthographic\" \"float screenwindow\" [0 1e16 0 1]", "wider");
+    expect_refused("Scale 1 2 1 Camera \"orthographic\"", "shears or scales");
+}
+
+TEST(ImportCamera, Spherical) {
+    EXPECT_EQ(with_film("", "Camera \"spherical\"").camera.kind, CameraKind::kEqualArea);
+    EXPECT_EQ(with_film("", "Camera \"spherical\" \"string mapping\" \"equirectangular\"").camera.kind,
+              CameraKind::kEquirectangular);
+    const SceneDescription d = with_film("", "Camera \"spherical\" \"float screenwindow\" [-1 1 -1 1]");
+    ASSERT_EQ(d.warnings.size(), 1u);
+    EXPECT_NE(d.warnings[0].find("screenwindow"), std::string::npos);
+    expect_refused("Camera \"spherical\" \"string mapping\" \"fisheye\"", "equirectangular");
+    expect_refused("Camera \"realistic\"", "perspective");
 }
 
 }  // namespace

@@ -354,7 +354,7 @@ TEST(ImportOptions, UnsupportedOnesAreNamed) {
         ASSERT_EQ(scene->description.warnings.size(), 1u) << text;
         EXPECT_NE(scene->description.warnings[0].find(part), std::string::npos) << scene->description.warnings[0];
     };
-    refused("Camera \"spherical\"", "perspective");
+    refused("Camera \"realistic\"", "perspective");
     refused("Camera \"perspective\" \"float fov\" 180", "fov");
     refused("Film \"spectral\"", "rgb");
     refused("\nFilm \"rgb\" \"integer xresolution\" 10000 \"integer yresolution\" 7670", "scene.pbrt:2");
