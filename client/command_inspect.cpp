@@ -106,7 +106,7 @@ void print(const SceneDescription& d, const SceneSummary& s, const std::string& 
                 d.film.width, d.film.height, d.max_depth, d.samples_per_pixel);
     std::printf("  lights     %zu\n", s.lights.size());
     for (const SceneSummary::Light& l : s.lights) {
-        std::printf("    %-9s power %.6g W", l.kind.c_str(), l.power);
+        std::printf("    %-11s power %.6g W", l.kind.c_str(), l.power);
         if (l.primitives > 1) std::printf(", %" PRIu64 " primitives", l.primitives);
         std::printf("%s%s\n", l.where.empty() ? "" : ", ", l.where.c_str());
     }
