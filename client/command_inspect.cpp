@@ -40,6 +40,11 @@ const char* name_of(TextureKind kind) {
     return kNames[size_t(kind)];
 }
 
+const char* name_of(CameraKind kind) {
+    constexpr std::array<const char*, 4> kNames{"perspective", "orthographic", "equal-area", "equirectangular"};
+    return kNames[size_t(kind)];
+}
+
 std::string megabytes(uint64_t bytes) {
     char text[32];
     std::snprintf(text, sizeof text, "%.1f MB", double(bytes) * 1e-6);
@@ -63,8 +68,12 @@ nlohmann::json describe(const SceneDescription& d, const SceneSummary& s, const 
     out["triangles_emissive"] = s.emissive_triangle_count;
     out["spheres"] = s.sphere_count;
     out["instances"] = s.instance_count;
-    out["camera"] = {{"kind", "perspective"}, {"fov_degrees", d.camera.fov_degrees}, {"lens_radius", d.camera.lens_radius}};
-    out["film"] = {{"width", d.film.width}, {"height", d.film.height}, {"exposure_scale", d.film.exposure_scale}};
+    out["camera"] = {
+        {"kind", name_of(d.camera.kind)}, {"fov_degrees", d.camera.fov_degrees}, {"lens_radius", d.camera.lens_radius}};
+    out["film"] = {{"width", d.film.width},
+                   {"height", d.film.height},
+                   {"exposure_scale", d.film.response.exposure},
+                   {"colour_matrix", d.film.response.colour}};
     out["max_depth"] = d.max_depth;
     out["samples_per_pixel"] = d.samples_per_pixel;
     out["lights"] = nlohmann::json::array();
@@ -95,12 +104,13 @@ void print(const SceneDescription& d, const SceneSummary& s, const std::string& 
                 s.emissive_triangle_count, s.sphere_count);
     if (s.instance_count > 0)
         std::printf(", %" PRIu64 " instances showing %" PRIu64 " triangles", s.instance_count, s.instanced_triangle_count);
-    std::printf("\n  camera     perspective, fov %g degrees%s; film %d x %d, maxdepth %d, %d samples per pixel\n",
-                double(d.camera.fov_degrees), d.camera.lens_radius > 0 ? ", thin lens" : "", d.film.width, d.film.height,
-                d.max_depth, d.samples_per_pixel);
+    std::printf("\n  camera     %s", name_of(d.camera.kind));
+    if (d.camera.kind == CameraKind::kPerspective) std::printf(", fov %g degrees", double(d.camera.fov_degrees));
+    std::printf("%s; film %d x %d, maxdepth %d, %d samples per pixel\n", d.camera.lens_radius > 0 ? ", thin lens" : "",
+                d.film.width, d.film.height, d.max_depth, d.samples_per_pixel);
     std::printf("  lights     %zu\n", s.lights.size());
     for (const SceneSummary::Light& l : s.lights) {
-        std::printf("    %-9s power %.6g W", l.kind.c_str(), l.power);
+        std::printf("    %-11s power %.6g W", l.kind.c_str(), l.power);
         if (l.primitives > 1) std::printf(", %" PRIu64 " primitives", l.primitives);
         std::printf("%s%s\n", l.where.empty() ? "" : ", ", l.where.c_str());
     }

@@ -73,17 +73,26 @@ Result<WorkUnit> find_unit(const ReplayOptions& options, const Plan& plan, uint6
     }
 }
 
+/// What the film makes of the camera part of a unit.
+FilmResponse::Triple camera_sum(const Partial& partial, const FilmResponse& response) {
+    FilmResponse::Triple sum{};
+    for (size_t i = 0; i + 2 < partial.camera.size(); i += 3) {
+        const FilmResponse::Triple value = response({partial.camera[i], partial.camera[i + 1], partial.camera[i + 2]});
+        for (size_t c = 0; c < 3; ++c) sum[c] += value[c];
+    }
+    return sum;
+}
+
 /// Prints what the sample is made of: `work`, of which `renderer` shows every contribution.
 int show_paths(const ReplayOptions& options, const BuiltJob& job, const Renderer& renderer, const WorkUnit& unit,
                const RenderUnit& work, bool shares_light_paths) {
-    const double exposure_scale = double(job.exposure_scale);
     SampleReport report{.algorithm = job.spec.algorithm.name(),
                         .iteration = options.iteration,
                         .x = options.pixel[0],
                         .y = options.pixel[1],
                         .group = unit.key.group,
                         .tile = unit.key.tile,
-                        .exposure_scale = job.exposure_scale,
+                        .response = job.response,
                         .splats_of_unit = shares_light_paths,
                         .splats_left_out = shares_light_paths && !options.splats};
     const uint32_t pixel = uint32_t(job.scene->frame().crop.index(report.x, report.y));
@@ -99,7 +108,7 @@ int show_paths(const ReplayOptions& options, const BuiltJob& job, const Renderer
         },
         interrupt_token());
     if (!partial.ok()) return report_error(partial.status());
-    for (size_t i = 0; i < partial->camera.size(); ++i) report.camera[i % 3] += exposure_scale * partial->camera[i];
+    report.camera = camera_sum(*partial, job.response);
     report.dropped = partial->dropped_count;
     const bool black = partial->splats.empty() && report.camera == std::array<double, 3>{};
     if (!shown && !black)
@@ -115,7 +124,7 @@ int replay(const ReplayOptions& options) {
     if (!built.ok()) return report_error(built.status());
     const JobSpec& spec = built->spec;
     const std::shared_ptr<const Scene>& scene = built->scene;
-    const double exposure_scale = double(built->exposure_scale);
+    const FilmResponse& response = built->response;
     const Plan plan(scene->frame(), spec.algorithm);
     // Light sub-paths of a sample's own are replayed with it; those of a cache are the whole unit's.
     const bool shares_light_paths = spec.algorithm.info().shares_light_paths;
@@ -146,16 +155,15 @@ int replay(const ReplayOptions& options) {
     if (options.paths) return show_paths(options, *built, **renderer, *unit, work, shares_light_paths);
     const auto partial = (*renderer)->render(work, interrupt_token());
     if (!partial.ok()) return report_error(partial.status());
-    double sum[3] = {};
-    for (size_t i = 0; i < partial->camera.size(); ++i) sum[i % 3] += exposure_scale * partial->camera[i];
+    const FilmResponse::Triple sum = camera_sum(*partial, response);
     std::printf("unit %u,%u  camera %.9g %.9g %.9g\n", unit->key.group, unit->key.tile, sum[0], sum[1], sum[2]);
     const int width = scene->frame().crop.width();
     // With a cache, the splats are the unit's, not this sample's.
     if (options.unit.empty() && !shares_light_paths) {
         for (const SplatSum& splat : partial->splats) {
+            const FilmResponse::Triple value = response(splat.rgb);
             std::printf("splat at %d,%d  %.9g %.9g %.9g\n", scene->frame().crop.x0 + int(splat.pixel) % width,
-                        scene->frame().crop.y0 + int(splat.pixel) / width, exposure_scale * splat.rgb[0],
-                        exposure_scale * splat.rgb[1], exposure_scale * splat.rgb[2]);
+                        scene->frame().crop.y0 + int(splat.pixel) / width, value[0], value[1], value[2]);
         }
     }
     std::printf("dropped %llu\n", static_cast<unsigned long long>(partial->dropped_count));

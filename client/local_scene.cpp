@@ -18,7 +18,7 @@ Result<BuiltJob> build_job(const JobOptions& options, uint32_t threads, const Sc
     auto job = read_job(options, check);
     if (!job.ok()) return job.status();
     SceneDescription& description = job->scene.imported.description;
-    BuiltJob built{.spec = std::move(job->spec), .exposure_scale = description.film.exposure_scale};
+    BuiltJob built{.spec = std::move(job->spec), .response = description.film.response};
     if (built.spec.max_depth < 0) built.spec.max_depth = description.max_depth;
     built.thread_limit = std::make_unique<const tbb::global_control>(tbb::global_control::max_allowed_parallelism, threads);
     auto scene = Scene::build(std::move(description), {.width = built.spec.width, .height = built.spec.height});

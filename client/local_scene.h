@@ -27,7 +27,7 @@ struct BuiltJob {
     std::unique_ptr<const tbb::global_control> thread_limit;
     std::shared_ptr<const Scene> scene;
     JobSpec spec;  ///< With the frame, and with the scene's depth where the options leave it open.
-    float exposure_scale = 1;
+    FilmResponse response;
 };
 Result<BuiltJob> build_job(const JobOptions& options, uint32_t threads, const SceneCheck& check = {});
 

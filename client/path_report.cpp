@@ -35,6 +35,8 @@ std::string_view name_of(EmitterKind kind) {
         case EmitterKind::kSpot: return "spot light";
         case EmitterKind::kDistant: return "distant light";
         case EmitterKind::kEnvironment: return "environment";
+        case EmitterKind::kProjection: return "projection light";
+        case EmitterKind::kGoniometric: return "goniometric light";
     }
     return "";
 }
@@ -103,9 +105,7 @@ ReportedPath report_path(const Scene& scene, const SeenContribution& seen) {
         }
         path.vertices.push_back(v);
     }
-    path.source_measure = emitter->is_infinite() ? (emitter->is_delta() ? "discrete" : "solid angle")
-                          : emitter->is_delta()  ? "discrete"
-                                                 : "area";
+    path.source_measure = emitter->is_discrete() ? "discrete" : emitter->is_infinite() ? "solid angle" : "area";
     const Rgb camera = found.t > 1 ? found.z[found.t - 1].alpha : Rgb(1);
     const Rgb light = s >= 2 || merged ? found.y[merged ? s : s - 1].alpha : Rgb(1);
     path.throughput = camera * light;
@@ -115,8 +115,7 @@ ReportedPath report_path(const Scene& scene, const SeenContribution& seen) {
 std::array<double, 3> SampleReport::sum() const {
     Rgb total;
     for (const ReportedPath& path : paths) total += path.weighted;
-    const double scale = double(exposure_scale);
-    return {scale * double(total.r), scale * double(total.g), scale * double(total.b)};
+    return response.of(total);
 }
 
 namespace {
@@ -130,9 +129,9 @@ namespace {
     out += text;
 }
 
-std::string rgb_text(const Rgb& c, float scale) {
+std::string rgb_text(const FilmResponse::Triple& c) {
     std::string out;
-    append(out, "%.6g %.6g %.6g", double(scale) * double(c.r), double(scale) * double(c.g), double(scale) * double(c.b));
+    append(out, "%.6g %.6g %.6g", c[0], c[1], c[2]);
     return out;
 }
 
@@ -142,13 +141,14 @@ std::string vec_text(const Vec3& v) {
     return out;
 }
 
-void append_path(std::string& out, const ReportedPath& path, size_t number, bool splat, float scale) {
+void append_path(std::string& out, const ReportedPath& path, size_t number, bool splat, const FilmResponse& response) {
     append(out, "%zu  %s  s %d  t %d  k %d", number, std::string(to_string(path.technique.kind)).c_str(), path.technique.s, path.t,
            path.k);
     if (splat) append(out, "  splat at %d,%d", path.x, path.y);
-    append(out, "\n   value %s  x weight %.9g  =  %s\n", rgb_text(path.value, scale).c_str(), double(path.weight),
-           rgb_text(path.weighted, scale).c_str());
-    append(out, "   throughput %s  roulette survival %.4g", rgb_text(path.throughput, 1).c_str(), double(path.survival));
+    append(out, "\n   value %s  x weight %.9g  =  %s\n", rgb_text(response.of(path.value)).c_str(), double(path.weight),
+           rgb_text(response.of(path.weighted)).c_str());
+    append(out, "   throughput %s  roulette survival %.4g", rgb_text(FilmResponse::triple(path.throughput)).c_str(),
+           double(path.survival));
     if (!std::isnan(path.next_event)) append(out, "  next-event density of x0 %.6g", path.next_event);
     append(out, "\n");
     bool labels = false;
@@ -178,14 +178,13 @@ void append_path(std::string& out, const ReportedPath& path, size_t number, bool
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 Json json_of(const Vec3& v) { return {number(double(v.x)), number(double(v.y)), number(double(v.z))}; }
-/// The product of two floats is exact in double, so the sum can be made again from what is printed.
-Json json_of(const Rgb& c, float scale) {
-    return {number(double(scale) * double(c.r)), number(double(scale) * double(c.g)), number(double(scale) * double(c.b))};
-}
 Json json_of(const std::array<double, 3>& c) { return {number(c[0]), number(c[1]), number(c[2])}; }
+/// An exposure is a float, and the product of two floats is exact in double: without white balance the sum can be made again from
+/// what is printed.
+Json json_of(const Rgb& c, const FilmResponse& response = {}) { return json_of(response.of(c)); }
 Json index_or_null(int64_t index) { return index < 0 ? Json() : Json(index); }
 
-Json json_of(const ReportedPath& path, float scale) {
+Json json_of(const ReportedPath& path, const FilmResponse& response) {
     Json vertices = Json::array();
     for (const ReportedVertex& v : path.vertices) {
         vertices.push_back({{"kind", v.kind},
@@ -194,7 +193,7 @@ Json json_of(const ReportedPath& path, float scale) {
                             {"emitter", index_or_null(v.emitter)},
                             {"dirac", v.dirac},
                             {"survival", number(double(v.survival))},
-                            {"throughput", json_of(v.throughput, 1)},
+                            {"throughput", json_of(v.throughput)},
                             {"fwd", number(v.fwd)},
                             {"rev", number(v.rev)},
                             {"light_label", index_or_null(v.light_label)},
@@ -206,10 +205,10 @@ Json json_of(const ReportedPath& path, float scale) {
             {"k", path.k},
             {"pixel", {path.x, path.y}},
             {"iteration", path.iteration},
-            {"value", json_of(path.value, scale)},
+            {"value", json_of(path.value, response)},
             {"weight", number(double(path.weight))},
-            {"weighted", json_of(path.weighted, scale)},
-            {"throughput", json_of(path.throughput, 1)},
+            {"weighted", json_of(path.weighted, response)},
+            {"throughput", json_of(path.throughput)},
             {"survival", number(double(path.survival))},
             {"source_measure", path.source_measure},
             {"next_event", number(path.next_event)},
@@ -225,7 +224,7 @@ std::string to_text(const SampleReport& report) {
     append(out, "%zu contributions to pixel %d,%d in iteration %llu; densities per area (m^-2), of x0 in its emitter's measure\n",
            report.paths.size(), report.x, report.y, static_cast<unsigned long long>(report.iteration));
     size_t number = 0;
-    for (const ReportedPath& path : report.paths) append_path(out, path, ++number, false, report.exposure_scale);
+    for (const ReportedPath& path : report.paths) append_path(out, path, ++number, false, report.response);
     const auto total = report.sum();
     append(out, "sum of weight x value  %.9g %.9g %.9g\n", total[0], total[1], total[2]);
     if (report.splats_left_out) {
@@ -233,7 +232,7 @@ std::string to_text(const SampleReport& report) {
     } else if (report.splats_of_unit || !report.splats.empty()) {
         append(out, "%zu splats %s\n", report.splats.size(),
                report.splats_of_unit ? "of the unit's light paths in this pixel" : "of the sample's own light path");
-        for (const ReportedPath& path : report.splats) append_path(out, path, ++number, true, report.exposure_scale);
+        for (const ReportedPath& path : report.splats) append_path(out, path, ++number, true, report.response);
     }
     append(out, "dropped %llu\n", static_cast<unsigned long long>(report.dropped));
     return out;
@@ -242,14 +241,15 @@ std::string to_text(const SampleReport& report) {
 std::string to_json(const SampleReport& report) {
     const auto list = [&](const std::vector<ReportedPath>& paths) {
         Json out = Json::array();
-        for (const ReportedPath& path : paths) out.push_back(json_of(path, report.exposure_scale));
+        for (const ReportedPath& path : paths) out.push_back(json_of(path, report.response));
         return out;
     };
     const Json json = {{"algorithm", report.algorithm},
                        {"iteration", report.iteration},
                        {"pixel", {report.x, report.y}},
                        {"unit", {report.group, report.tile}},
-                       {"exposure_scale", report.exposure_scale},
+                       {"exposure_scale", report.response.exposure},
+                       {"colour_matrix", report.response.colour},
                        {"dropped", report.dropped},
                        {"camera", json_of(report.camera)},
                        {"sum", json_of(report.sum())},

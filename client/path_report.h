@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/core/vec.h"
+#include "common/film/response.h"
 #include "common/transport/renderer.h"
 
 namespace lightloom::client {
@@ -54,7 +55,7 @@ struct SampleReport {
     uint64_t iteration = 0;
     int x = 0, y = 0;
     uint32_t group = 0, tile = 0;  ///< The unit that it belongs to.
-    float exposure_scale = 1;      ///< Of the film; printed values are multiplied by it.
+    FilmResponse response;         ///< Of the film; printed values are what it makes of them.
     std::array<double, 3> camera{};
     uint64_t dropped = 0;
     /// Contributions to the sample, in the order in which they are added. `splats`: of its own light path or, where the light
@@ -75,7 +76,7 @@ std::string to_json(const SampleReport& report);
 /// For --help.
 inline constexpr const char* kPathSchema =
     R"(--paths --json prints one JSON document; numbers that do not exist or are not finite are null:
-  algorithm, iteration, pixel [x,y], unit [group,tile], exposure_scale, dropped
+  algorithm, iteration, pixel [x,y], unit [group,tile], exposure_scale, colour_matrix, dropped
   camera, sum       [r,g,b]: the sample's value, and weight x value of `paths` added in order; equal unless it was dropped
   paths, splats     contributions to the sample; to other pixels too, by its own light path (or, with --splats, to this pixel
                     by the unit's light paths). A splat counts as one light path's, `camera` as one camera sample's. Each has

@@ -53,22 +53,22 @@ Result<Preparation> prepare(const Scene& scene, const RenderSettings& settings, 
 Result<ProgressiveRender> ProgressiveRender::start(std::shared_ptr<const Scene> scene, const RenderSettings& settings,
                                                    const Preparation& preparation) {
     const FrameLayout frame = scene->frame();
-    const float exposure_scale = scene->description().film.exposure_scale;
+    const FilmResponse response = scene->description().film.response;
     const auto begin = Clock::now();
     auto renderer = Renderer::create(std::move(scene), settings, preparation.tables);
     if (!renderer.ok()) return renderer.status();
-    return ProgressiveRender(std::move(renderer).value(), frame, Plan(frame, settings.algorithm), exposure_scale,
+    return ProgressiveRender(std::move(renderer).value(), frame, Plan(frame, settings.algorithm), response,
                              preparation.seconds + seconds_since(begin));
 }
 
 ProgressiveRender::ProgressiveRender(std::unique_ptr<const Renderer> renderer, const FrameLayout& frame, const Plan& plan,
-                                     float exposure_scale, double preparation_seconds)
+                                     const FilmResponse& response, double preparation_seconds)
     : renderer_(std::move(renderer)),
       frame_(frame),
       plan_(plan),
-      exposure_scale_(exposure_scale),
+      response_(response),
       preparation_seconds_(preparation_seconds),
-      sums_(frame) {}
+      sums_(frame, response) {}
 
 Status ProgressiveRender::advance(uint64_t iteration_limit, std::stop_token stop) {
     if (cut_short_ || iterations() >= iteration_limit)
@@ -101,9 +101,9 @@ Status ProgressiveRender::advance(uint64_t iteration_limit, std::stop_token stop
 
 Result<RgbImage> ProgressiveRender::last_group_image() const {
     if (!last_) return failed_precondition("no group has been rendered yet");
-    Accumulation alone(frame_);
+    Accumulation alone(frame_, response_);
     LL_RETURN_IF_ERROR(alone.fold(*last_, last_iterations_));
-    return alone.develop(exposure_scale_);
+    return alone.develop();
 }
 
 }  // namespace lightloom::client

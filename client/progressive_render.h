@@ -42,16 +42,16 @@ class ProgressiveRender {
     /// Renderings may share the scene, and also a preparation: tables of longer paths serve shorter ones.
     static Result<ProgressiveRender> start(std::shared_ptr<const Scene> scene, const RenderSettings& settings,
                                            const Preparation& preparation);
-    /// `preparation_seconds` were spent on `renderer`; `plan` and `exposure_scale` are those of a job on `frame`.
-    ProgressiveRender(std::unique_ptr<const Renderer> renderer, const FrameLayout& frame, const Plan& plan, float exposure_scale,
-                      double preparation_seconds);
+    /// `preparation_seconds` were spent on `renderer`; `plan` and `response` are those of a job on `frame`.
+    ProgressiveRender(std::unique_ptr<const Renderer> renderer, const FrameLayout& frame, const Plan& plan,
+                      const FilmResponse& response, double preparation_seconds);
 
     /// Renders the next group on the threads of the calling arena, cut short where it would go beyond `iteration_limit`; no
     /// group follows one that was cut. kCancelled after a stop request; then the rendering is as it was.
     Status advance(uint64_t iteration_limit = std::numeric_limits<uint64_t>::max(), std::stop_token stop = {});
 
-    RgbImage image() const { return sums_.complete().develop(exposure_scale_); }
-    RgbImage variance() const { return sums_.complete().variance(exposure_scale_); }
+    RgbImage image() const { return sums_.complete().develop(); }
+    RgbImage variance() const { return sums_.complete().variance(); }
     /// The last group alone: with the other groups, independent images of the same mean.
     Result<RgbImage> last_group_image() const;
     uint32_t last_group_iterations() const { return last_iterations_; }
@@ -68,7 +68,7 @@ class ProgressiveRender {
     std::unique_ptr<const Renderer> renderer_;
     FrameLayout frame_;
     Plan plan_;
-    float exposure_scale_;
+    FilmResponse response_;
     double preparation_seconds_, seconds_ = 0, cpu_seconds_ = 0;
     GroupedSum sums_;
     std::optional<GroupSum> last_;

@@ -22,11 +22,9 @@ constexpr const char *kPage = "index.html", *kDescription = "pyramid.json", *kIm
 
 bool finite(const Rgb& c) { return std::isfinite(c.r) && std::isfinite(c.g) && std::isfinite(c.b); }
 
-double luminance(const double* rgb) { return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; }
+double luminance(const FilmResponse::Triple& rgb) { return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; }
 double luminance(const RgbImage& image, size_t pixel) {
-    const double rgb[] = {double(image.pixels[3 * pixel]), double(image.pixels[3 * pixel + 1]),
-                          double(image.pixels[3 * pixel + 2])};
-    return luminance(rgb);
+    return luminance({double(image.pixels[3 * pixel]), double(image.pixels[3 * pixel + 1]), double(image.pixels[3 * pixel + 2])});
 }
 
 double mean_luminance(const RgbImage& image) {
@@ -98,7 +96,11 @@ void UnitPictures::add(const SeenContribution& seen) {
     for (int c = 0; c < 3; ++c) sum[c] += double(weighted[c]), sum[3 + c] += double(unweighted[c]);
 }
 
-Pyramid::Pyramid(const FrameLayout& frame, int depth, uint64_t max_bytes) : frame_(frame), depth_(depth), max_bytes_(max_bytes) {}
+Pyramid::Pyramid(const FrameLayout& frame, int depth, const FilmResponse& response, uint64_t max_bytes)
+    : frame_(frame),
+      depth_(depth),
+      response_(response),
+      max_bytes_(max_bytes) {}
 
 void Pyramid::begin_group(uint32_t iterations, uint64_t light_paths) {
     group_iterations_ = iterations;
@@ -130,7 +132,7 @@ Status Pyramid::add(const UnitPictures& unit) {
                 const double* from = &sums[kSums * size_t(unit.tile_.index(x, y))];
                 const size_t pixel = size_t(frame_.crop.index(x, y));
                 for (size_t c = 0; c < kSums; ++c) picture->sums[kSums * pixel + c] += from[c];
-                picture->group[pixel] += luminance(from) / group_iterations_;
+                picture->group[pixel] += luminance(response_.balanced({from[0], from[1], from[2]})) / group_iterations_;
             }
         }
     }
@@ -144,7 +146,7 @@ Status Pyramid::add(const UnitPictures& unit) {
                 to[c] += double(splat.weighted[c]) * per_path * group_iterations_;
                 to[3 + c] += double(splat.unweighted[c]) * per_path * group_iterations_;
             }
-            picture->group[splat.pixel] += double(splat.weighted.luminance()) * per_path;
+            picture->group[splat.pixel] += luminance(response_.balanced(FilmResponse::triple(splat.weighted))) * per_path;
         }
     }
     return {};
@@ -167,22 +169,26 @@ std::vector<PyramidKey> Pyramid::keys() const {
     return keys;
 }
 
-RgbImage Pyramid::develop(const PyramidKey& key, size_t first, float scale) const {
+RgbImage Pyramid::develop(const PyramidKey& key, size_t first) const {
     const Picture& picture = pictures_.at(key);
     RgbImage image{frame_.crop.width(), frame_.crop.height(), {}};
     image.pixels.resize(picture.sums.size() / kSums * 3);
-    for (size_t i = 0; i < image.pixels.size(); ++i)
-        image.pixels[i] = float(double(scale) * picture.sums[i / 3 * kSums + first + i % 3] / double(iterations_));
+    for (size_t pixel = 0; 3 * pixel < image.pixels.size(); ++pixel) {
+        const double* sums = &picture.sums[pixel * kSums + first];
+        const FilmResponse::Triple value = response_({sums[0], sums[1], sums[2]});
+        for (size_t c = 0; c < 3; ++c) image.pixels[3 * pixel + c] = float(value[c] / double(iterations_));
+    }
     return image;
 }
 
-double Pyramid::noise(const PyramidKey& key, const RgbImage& image, float scale) const {
+double Pyramid::noise(const PyramidKey& key, const RgbImage& image) const {
     if (groups_ < 2) return std::numeric_limits<double>::quiet_NaN();
     const Picture& picture = pictures_.at(key);
-    const double n = double(iterations_), square = double(scale) * double(scale);
+    const double n = double(iterations_), square = response_.exposure * response_.exposure;
     double sum = 0;
     for (size_t i = 0; i < picture.squares.size(); ++i) {
-        const double mean = luminance(&picture.sums[kSums * i]) / n, whole = luminance(image, i);
+        const double* sums = &picture.sums[kSums * i];
+        const double mean = luminance(response_.balanced({sums[0], sums[1], sums[2]})) / n, whole = luminance(image, i);
         const double variance = std::max(0.0, picture.squares[i] - n * mean * mean) / ((groups_ - 1) * n);
         sum += square * variance / (whole * whole + 0.01);
     }
@@ -207,7 +213,7 @@ Status open_pyramid_directory(const std::string& directory) {
 }
 
 Status write_pyramid(const std::string& directory, const Pyramid& pyramid, const FrameLayout& frame, const RgbImage& image,
-                     float scale, PyramidPage page) {
+                     PyramidPage page) {
     page.depth = pyramid.depth();
     page.not_finite = pyramid.not_finite();
     page.mean = mean_luminance(image);
@@ -218,9 +224,9 @@ Status write_pyramid(const std::string& directory, const Pyramid& pyramid, const
         const int k = key.k == PyramidKey::kLonger ? 0 : key.k;
         if (page.rows.empty() || page.rows.back().k != k) page.rows.push_back({.k = k});
         PyramidPicture picture{.kind = key.kind, .s = key.s, .name = key.name()};
-        picture.weighted = mean_luminance(pyramid.weighted(key, scale));
-        picture.unweighted = mean_luminance(pyramid.unweighted(key, scale));
-        picture.noise_share = pyramid.noise(key, image, scale);
+        picture.weighted = mean_luminance(pyramid.weighted(key));
+        picture.unweighted = mean_luminance(pyramid.unweighted(key));
+        picture.noise_share = pyramid.noise(key, image);
         noise += picture.noise_share;
         page.rows.back().mean += picture.weighted;
         page.rows.back().pictures.push_back(std::move(picture));
@@ -259,8 +265,8 @@ Status write_pyramid(const std::string& directory, const Pyramid& pyramid, const
     auto key = keys.begin();
     for (const PyramidRow& row : page.rows) {
         for (const PyramidPicture& picture : row.pictures) {
-            LL_RETURN_IF_ERROR(write("weighted-" + picture.name, pyramid.weighted(*key, scale), row.weighted_stops));
-            LL_RETURN_IF_ERROR(write("unweighted-" + picture.name, pyramid.unweighted(*key, scale), row.unweighted_stops));
+            LL_RETURN_IF_ERROR(write("weighted-" + picture.name, pyramid.weighted(*key), row.weighted_stops));
+            LL_RETURN_IF_ERROR(write("unweighted-" + picture.name, pyramid.unweighted(*key), row.unweighted_stops));
             ++key;
         }
     }

@@ -54,7 +54,7 @@ class UnitPictures {
 class Pyramid {
   public:
     /// `max_bytes` bounds the memory of the pictures.
-    Pyramid(const FrameLayout& frame, int depth, uint64_t max_bytes = uint64_t(4) << 30);
+    Pyramid(const FrameLayout& frame, int depth, const FilmResponse& response = {}, uint64_t max_bytes = uint64_t(4) << 30);
 
     /// A group of the plan: its units are added, in any fixed order, between these two.
     void begin_group(uint32_t iterations, uint64_t light_paths);
@@ -68,24 +68,25 @@ class Pyramid {
     uint64_t not_finite() const { return not_finite_; }
 
     std::vector<PyramidKey> keys() const;
-    /// Normalised as the image is; `scale` is the film's exposure. Of a key that there is.
-    RgbImage weighted(const PyramidKey& key, float scale) const { return develop(key, 0, scale); }
-    RgbImage unweighted(const PyramidKey& key, float scale) const { return develop(key, 3, scale); }
+    /// Normalised as the image is, and as the film responds to it. Of a key that there is.
+    RgbImage weighted(const PyramidKey& key) const { return develop(key, 0); }
+    RgbImage unweighted(const PyramidKey& key) const { return develop(key, 3); }
     /// Mean over the pixels of the variance of the weighted picture's luminance, from whole groups, over the squared luminance of
     /// `image` plus 0.01: what the technique adds to relMSE, but for how techniques vary together. NaN for fewer than two groups.
-    double noise(const PyramidKey& key, const RgbImage& image, float scale) const;
+    double noise(const PyramidKey& key, const RgbImage& image) const;
 
   private:
     struct Picture {
         std::vector<double> sums;     // 6 per pixel as in UnitPictures: iterations times the mean
-        std::vector<double> group;    // luminance of the open group's weighted mean
+        std::vector<double> group;    // luminance of the open group's weighted mean, after white balance
         std::vector<double> squares;  // sum over groups of iterations times its square
     };
     Status find(const PyramidKey& key, Picture** picture);
-    RgbImage develop(const PyramidKey& key, size_t first, float scale) const;
+    RgbImage develop(const PyramidKey& key, size_t first) const;
 
     FrameLayout frame_;
     int depth_;
+    FilmResponse response_;
     uint64_t max_bytes_;
     std::map<PyramidKey, Picture> pictures_;
     uint64_t iterations_ = 0, contributions_ = 0, not_finite_ = 0;
@@ -98,9 +99,9 @@ class Pyramid {
 Status open_pyramid_directory(const std::string& directory);
 
 /// EXR and PNG of every picture, image.exr and image.png of the whole, index.html that shows them and pyramid.json that describes
-/// them. `page` says what was rendered and how; rows and pictures are filled in here. `image` and the pictures have `scale`, the
-/// film's exposure.
+/// them. `page` says what was rendered and how; rows and pictures are filled in here. `image` is developed by the
+/// pyramid's response.
 Status write_pyramid(const std::string& directory, const Pyramid& pyramid, const FrameLayout& frame, const RgbImage& image,
-                     float scale, PyramidPage page);
+                     PyramidPage page);
 
 }  // namespace lightloom::client

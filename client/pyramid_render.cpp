@@ -135,8 +135,8 @@ int render_pyramid(JobOptions options, const PyramidOptions& pyramid_options, ui
     if (!renderer.ok()) return report_error(renderer.status());
 
     const FrameLayout& frame = job->spec.frame;
-    Pyramid pyramid(frame, pyramid_options.depth);
-    GroupedSum sums(frame);
+    Pyramid pyramid(frame, pyramid_options.depth, job->response);
+    GroupedSum sums(frame, job->response);
     if (Status s = watch_units(*job, **renderer, threads, options.quiet, &pyramid, &sums); !s.ok()) return report_error(s);
     const Accumulation& image = sums.complete();
     PyramidPage page{.scene = std::filesystem::path(options.scene).filename().string(),
@@ -148,8 +148,7 @@ int render_pyramid(JobOptions options, const PyramidOptions& pyramid_options, ui
                      .height = frame.crop.height(),
                      .max_depth = job->spec.max_depth};
     for (const auto& [key, value] : job->spec.algorithm.chosen_text()) page.parameters.emplace_back(key, value);
-    const Status written = write_pyramid(pyramid_options.directory, pyramid, frame, image.develop(job->exposure_scale),
-                                         job->exposure_scale, std::move(page));
+    const Status written = write_pyramid(pyramid_options.directory, pyramid, frame, image.develop(), std::move(page));
     if (!written.ok()) return report_error(written);
     if (!options.quiet)
         std::printf("%s  %zu techniques, %llu spp\n", (std::filesystem::path(pyramid_options.directory) / "index.html").c_str(),

@@ -189,7 +189,6 @@ Result<JobInfo> Coordinator::wait_job(const std::string& job_id, uint64_t after_
 Result<std::string> Coordinator::image(const std::string& job_id, ImageKind kind) const {
     std::shared_ptr<Reducer> reducer;
     std::filesystem::path directory;
-    float scale = 1;
     {
         const std::lock_guard lock(mutex_);
         const auto job = find_job(job_id);
@@ -201,10 +200,9 @@ Result<std::string> Coordinator::image(const std::string& job_id, ImageKind kind
             return failed_precondition("job " + job_id + " has no image to preview");
         reducer = job->reducer;
         directory = job->directory;
-        scale = job->exposure_scale;
     }
     if (kind == ImageKind::kFinal) return read_image(directory);
-    return preview_png(directory, reducer.get(), scale);
+    return preview_png(directory, reducer.get());
 }
 
 Result<std::string> Coordinator::manifest(const std::string& job_id) const {

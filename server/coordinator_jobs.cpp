@@ -86,13 +86,12 @@ void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, Tab
         double(spec.algorithm.light_paths_per_iteration(frame.crop.area())) * plan.max_group_iterations() / plan.tile_count();
     std::optional<UnitTable> units;
     units.emplace(plan, spec.samples_per_pixel, 1, options_.shuffle_seed);
-    auto reducer = std::make_shared<Reducer>(frame, plan.tile_count());
+    auto reducer = std::make_shared<Reducer>(frame, plan.tile_count(), facts.response);
 
     const std::lock_guard lock(mutex_);
     if (job.state != JobState::kPreparing) return;
     job.prepared = options_.clock();
     job.spec = std::move(spec);
-    job.exposure_scale = facts.exposure_scale;
     job.layers = std::move(facts.layers);
     job.units = std::move(units);
     job.reducer = std::move(reducer);
@@ -135,7 +134,6 @@ void Coordinator::finish_if_complete(JobRecord& job) {
 Status Coordinator::write_results(JobRecord& job) {
     std::shared_ptr<Reducer> reducer;
     JobSpec spec;
-    float scale = 1;
     std::vector<ImageLayer> layers;
     {
         const std::lock_guard lock(mutex_);
@@ -143,10 +141,9 @@ Status Coordinator::write_results(JobRecord& job) {
         reducer = job.reducer;
         layers = std::move(job.layers);
         spec = job.spec;
-        scale = job.exposure_scale;
     }
     reducer->freeze();
-    const auto image = encode_image(spec, *reducer, scale, std::move(layers));
+    const auto image = encode_image(spec, *reducer, std::move(layers));
     if (!image.ok()) return image.status();
     const Digest digest = sha256(*image);
 

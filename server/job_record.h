@@ -26,10 +26,9 @@ struct JobRecord {
     std::string message;
     uint64_t revision = 1;
     TimePoint created, prepared, first_render, finishing, ended;
-    bool rendering = false;  ///< first_render is set.
-    bool closed = false;     ///< The time limit has passed.
-    std::string created_at;  ///< UTC, for the manifest only.
-    float exposure_scale = 1;
+    bool rendering = false;          ///< first_render is set.
+    bool closed = false;             ///< The time limit has passed.
+    std::string created_at;          ///< UTC, for the manifest only.
     std::vector<ImageLayer> layers;  ///< First-hit layers, until the image is written.
     std::optional<UnitTable> units;  ///< Until the job ends; then `ended_units` is left of it.
     struct UnitCounts {

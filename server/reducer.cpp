@@ -6,7 +6,10 @@
 
 namespace lightloom {
 
-Reducer::Reducer(const FrameLayout& frame, uint32_t tile_count) : frame_(frame), tile_count_(tile_count) {}
+Reducer::Reducer(const FrameLayout& frame, uint32_t tile_count, const FilmResponse& response)
+    : frame_(frame),
+      tile_count_(tile_count),
+      response_(response) {}
 
 Result<std::vector<Reducer::Refusal>> Reducer::add(const WorkUnit& unit, Partial partial) {
     const std::lock_guard lock(mutex_);
@@ -20,7 +23,7 @@ Result<std::vector<Reducer::Refusal>> Reducer::add(const WorkUnit& unit, Partial
 
 Result<std::vector<Reducer::Refusal>> Reducer::add_locked(const WorkUnit& unit, Partial partial) {
     if (frozen_) return Status(StatusCode::kCancelled, "the image is being finished");
-    if (!sums_) sums_ = std::make_unique<GroupedSum>(frame_);
+    if (!sums_) sums_ = std::make_unique<GroupedSum>(frame_, response_);
     std::vector<Refusal> refused;
     if (unit.key.group < group_count()) {
         refused.push_back({unit.key, internal_error("the unit was merged twice")});
@@ -93,15 +96,15 @@ std::vector<Reducer::Dropped> Reducer::first_dropped() const {
     return out;
 }
 
-Result<RgbImage> Reducer::image(float scale) const {
+Result<RgbImage> Reducer::image() const {
     const std::lock_guard lock(mutex_);
     if (group_count() == 0) return failed_precondition("no group of iterations is complete yet; ask again later");
-    return sums_->complete().develop(scale);
+    return sums_->complete().develop();
 }
 
-Result<RgbImage> Reducer::variance(float scale) const {
+Result<RgbImage> Reducer::variance() const {
     const std::lock_guard lock(mutex_);
-    return sums_ ? sums_->complete().variance(scale) : RgbImage();
+    return sums_ ? sums_->complete().variance() : RgbImage();
 }
 
 }  // namespace lightloom

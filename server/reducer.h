@@ -17,7 +17,7 @@ namespace lightloom {
 
 class Reducer {
   public:
-    Reducer(const FrameLayout& frame, uint32_t tile_count);
+    Reducer(const FrameLayout& frame, uint32_t tile_count, const FilmResponse& response = {});
 
     /// A unit whose partial is not part of the sums after all: it has to be rendered again.
     struct Refusal {
@@ -45,8 +45,8 @@ class Reducer {
     static constexpr size_t kMaxDropped = 64;
     std::vector<Dropped> first_dropped() const;
     /// Developed complete groups; kFailedPrecondition before the first.
-    Result<RgbImage> image(float scale) const;
-    Result<RgbImage> variance(float scale) const;
+    Result<RgbImage> image() const;
+    Result<RgbImage> variance() const;
 
   private:
     Result<std::vector<Refusal>> add_locked(const WorkUnit& unit, Partial partial);
@@ -55,6 +55,7 @@ class Reducer {
 
     const FrameLayout frame_;
     const uint32_t tile_count_;
+    const FilmResponse response_;
     mutable std::mutex mutex_;
     std::unique_ptr<GroupedSum> sums_;
     std::vector<Dropped> dropped_;  ///< Also of the group that is being summed: those are the last ones.

@@ -192,11 +192,10 @@ Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, 
     return encode_exr(image);
 }
 
-Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, float exposure_scale,
-                                 std::vector<ImageLayer> layers) {
-    auto color = reducer.image(exposure_scale);
+Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, std::vector<ImageLayer> layers) {
+    auto color = reducer.image();
     if (!color.ok()) return color.status();
-    auto variance = reducer.variance(exposure_scale);
+    auto variance = reducer.variance();
     if (!variance.ok()) return variance.status();
     return encode_image(spec, {*std::move(color), *std::move(variance), reducer.iterations(), reducer.folded_groups()},
                         std::move(layers));
@@ -206,9 +205,9 @@ Result<std::string> read_image(const std::filesystem::path& job_directory) {
     return read_file((job_directory / "image.exr").string());
 }
 
-Result<std::string> preview_png(const std::filesystem::path& job_directory, const Reducer* reducer, float exposure_scale) {
+Result<std::string> preview_png(const std::filesystem::path& job_directory, const Reducer* reducer) {
     if (reducer) {
-        const auto image = reducer->image(exposure_scale);
+        const auto image = reducer->image();
         if (!image.ok()) return image.status();
         return encode_png(*image);
     }

@@ -58,9 +58,9 @@ struct DevelopedImage {
 /// The EXR's bytes: colour, its variance where that is known, and `layers`. Who rendered it, and how, does not enter.
 Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers);
 /// The same for the merged groups of `reducer`.
-Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, float exposure_scale, std::vector<ImageLayer> layers);
+Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, std::vector<ImageLayer> layers);
 Result<std::string> read_image(const std::filesystem::path& job_directory);
 /// PNG of the groups merged so far, or of the finished image when there is no reducer any more.
-Result<std::string> preview_png(const std::filesystem::path& job_directory, const Reducer* reducer, float exposure_scale);
+Result<std::string> preview_png(const std::filesystem::path& job_directory, const Reducer* reducer);
 
 }  // namespace lightloom

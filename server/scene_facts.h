@@ -9,6 +9,7 @@
 #include "common/core/result.h"
 #include "common/film/exr_io.h"
 #include "common/film/frame.h"
+#include "common/film/response.h"
 #include "common/scene/scene.h"
 #include "common/work/service.h"
 
@@ -16,7 +17,7 @@ namespace lightloom {
 
 struct SceneFacts {
     FrameLayout frame;               ///< With the job's resolution.
-    float exposure_scale = 1;        ///< Multiplies the developed image.
+    FilmResponse response;           ///< Of the scene's film.
     int max_depth = 5;               ///< Bounces, if the job leaves them to the scene.
     std::vector<ImageLayer> layers;  ///< First-hit layers, if the job asks for them.
     /// The built scene, of which learning needs the lights. Called only for a job whose tables have to be made; holds no scene.

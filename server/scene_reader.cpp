@@ -59,7 +59,7 @@ Result<ImportedScene> read_scene(const AssetStore& assets, const Digest& root, c
 Result<SceneFacts> scene_facts(const SceneDescription& description, const JobSpec& spec) {
     const auto frame = frame_layout(description.film, {.width = spec.width, .height = spec.height});
     if (!frame.ok()) return frame.status();
-    SceneFacts facts{*frame, description.film.exposure_scale, description.max_depth, {}, {}};
+    SceneFacts facts{*frame, description.film.response, description.max_depth, {}, {}};
     if (spec.first_hit_layers) {
         const auto scene = Scene::build(description, {.width = spec.width, .height = spec.height});
         if (!scene.ok()) return scene.status();

@@ -72,8 +72,9 @@ Status GroupSum::add(const Partial& partial) {
     return Status::ok_status();
 }
 
-Accumulation::Accumulation(const FrameLayout& frame)
+Accumulation::Accumulation(const FrameLayout& frame, const FilmResponse& response)
     : frame_(frame),
+      response_(response),
       camera_(size_t(frame.crop.area()) * 3),
       splat_(size_t(frame.crop.area()) * 3),
       camera_count_(size_t(frame.crop.area())),
@@ -103,11 +104,17 @@ Status Accumulation::fold(const GroupSum& group, uint32_t iterations) {
     splat_.add(group.splat_);
     const double weight = iterations;
     const double total = double(iterations_) + weight;
-    for (size_t i = 0; i < camera_.size(); ++i) {
-        const double x = pixel_value(group.camera_.value(i), expected, group.splat_.value(i), group.light_paths_);
-        const double delta = x - mean_[i];
-        mean_[i] += delta * (weight / total);
-        moment_[i] += weight * delta * (x - mean_[i]);
+    for (size_t first = 0; first < camera_.size(); first += 3) {
+        FilmResponse::Triple x;
+        for (size_t c = 0; c < 3; ++c)
+            x[c] = pixel_value(group.camera_.value(first + c), expected, group.splat_.value(first + c), group.light_paths_);
+        x = response_.balanced(x);
+        for (size_t c = 0; c < 3; ++c) {
+            const size_t i = first + c;
+            const double delta = x[c] - mean_[i];
+            mean_[i] += delta * (weight / total);
+            moment_[i] += weight * delta * (x[c] - mean_[i]);
+        }
     }
     for (size_t p = 0; p < camera_count_.size(); ++p) camera_count_[p] += group.camera_count_[p];
     camera_bound_ += group.camera_bound_;
@@ -119,19 +126,22 @@ Status Accumulation::fold(const GroupSum& group, uint32_t iterations) {
     return Status::ok_status();
 }
 
-RgbImage Accumulation::develop(float scale) const {
+RgbImage Accumulation::develop() const {
     RgbImage image{frame_.crop.width(), frame_.crop.height(), std::vector<float>(camera_.size())};
-    for (size_t i = 0; i < camera_.size(); ++i) {
-        const double value = pixel_value(camera_.value(i), camera_count_[i / 3], splat_.value(i), light_paths_);
-        image.pixels[i] = float(double(scale) * value);
+    for (size_t first = 0; first < camera_.size(); first += 3) {
+        FilmResponse::Triple value;
+        for (size_t c = 0; c < 3; ++c)
+            value[c] = pixel_value(camera_.value(first + c), camera_count_[first / 3], splat_.value(first + c), light_paths_);
+        value = response_(value);
+        for (size_t c = 0; c < 3; ++c) image.pixels[first + c] = float(value[c]);
     }
     return image;
 }
 
-RgbImage Accumulation::variance(float scale) const {
+RgbImage Accumulation::variance() const {
     if (group_count_ < 2) return {};
     RgbImage image{frame_.crop.width(), frame_.crop.height(), std::vector<float>(camera_.size())};
-    const double factor = double(scale) * double(scale) / (double(group_count_ - 1) * double(iterations_));
+    const double factor = response_.exposure * response_.exposure / (double(group_count_ - 1) * double(iterations_));
     for (size_t i = 0; i < moment_.size(); ++i) image.pixels[i] = float(moment_[i] * factor);
     return image;
 }

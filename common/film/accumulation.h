@@ -11,6 +11,7 @@
 #include "common/core/result.h"
 #include "common/film/fixed_sums.h"
 #include "common/film/partial.h"
+#include "common/film/response.h"
 
 namespace lightloom {
 
@@ -41,7 +42,7 @@ class GroupSum {
 /// The exact sums of the complete groups of one (epoch, algorithm, N1).
 class Accumulation {
   public:
-    explicit Accumulation(const FrameLayout& frame);
+    explicit Accumulation(const FrameLayout& frame, const FilmResponse& response = {});
 
     /// Folds a complete group of `iterations` iterations in. Groups are folded in ascending order of their index (the
     /// caller holds later ones back), because the second moments are kept in double. kFailedPrecondition, and nothing is
@@ -53,15 +54,16 @@ class Accumulation {
     uint64_t iterations() const { return iterations_; }
     uint64_t dropped() const { return dropped_; }
 
-    /// camera sum / camera count + splat sum / light paths, per pixel, times `scale` (the film's exposure).
-    RgbImage develop(float scale = 1) const;
+    /// camera sum / camera count + splat sum / light paths, per pixel, as the film responds to it.
+    RgbImage develop() const;
     /// Variance of each developed pixel and channel, from the second moments of whole group images (never of single
     /// samples, which share light paths): sum_g n_g (X_g - mean)^2 / ((G - 1) sum n_g). Empty for fewer than
     /// two groups, which say nothing of it.
-    RgbImage variance(float scale = 1) const;
+    RgbImage variance() const;
 
   private:
     FrameLayout frame_;
+    FilmResponse response_;
     FixedSums camera_, splat_;
     std::vector<uint64_t> camera_count_;
     uint64_t light_paths_ = 0;
@@ -69,7 +71,8 @@ class Accumulation {
     uint64_t iterations_ = 0;
     uint32_t group_count_ = 0;
     double camera_bound_ = 0, splat_bound_ = 0;
-    std::vector<double> mean_;    // Mean of the X_g with weights n_g, 3 per pixel.
+    // Of the X_g after white balance, which mixes channels (variances alone could not follow it), before the exposure.
+    std::vector<double> mean_;    // Their mean with weights n_g, 3 per pixel.
     std::vector<double> moment_;  // sum_g n_g (X_g - mean_)^2, updated as groups come [West 1979].
 };
 

@@ -12,7 +12,8 @@ namespace lightloom {
 
 class GroupedSum {
   public:
-    explicit GroupedSum(const FrameLayout& frame) : frame_(frame), complete_(frame) {}
+    /// `response` develops the image.
+    explicit GroupedSum(const FrameLayout& frame, const FilmResponse& response = {}) : frame_(frame), complete_(frame, response) {}
 
     /// Adds a unit of the group that is being summed; units come in any order, each once. An error refuses this unit alone: the
     /// sums are as they were, and it may be rendered again. As GroupSum::add(); takes the memory of a group's sums

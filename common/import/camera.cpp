@@ -12,7 +12,7 @@ namespace lightloom::import {
 namespace {
 
 /// Refuses a camera whose rays or their densities are beyond single precision.
-void check_camera(const ParameterList& p, const PerspectiveCamera& camera) {
+void check_camera(const ParameterList& p, const CameraDescription& camera) {
     const auto& m = camera.camera_to_world.m;
     if (!within_bounds({float(m[0][3]), float(m[1][3]), float(m[2][3])}))
         fail(p.where(), p.what() + ": its position lies beyond 1e15; scale the scene down");
@@ -26,6 +26,7 @@ void check_camera(const ParameterList& p, const PerspectiveCamera& camera) {
     }
     if (!keeps_angles(camera.camera_to_world))
         fail(p.where(), p.what() + ": its transformation shears or scales axes differently; use fov or screenwindow instead");
+    if (camera.kind == CameraKind::kEqualArea || camera.kind == CameraKind::kEquirectangular) return;
     // Steeper rays than this come from no pixel of a usable picture, and the renderer takes them for sideways ones.
     constexpr double kSteepest = 1e6;
     if (camera.lens_radius > 0) {
@@ -44,6 +45,16 @@ void check_camera(const ParameterList& p, const PerspectiveCamera& camera) {
         x[0] = -aspect, x[1] = aspect;
     else if (aspect > 0)
         y[0] = -1 / aspect, y[1] = 1 / aspect;
+    if (camera.kind == CameraKind::kOrthographic) {
+        constexpr double kLeast = 1e-9;  // of which a pixel's area is still a number
+        for (const double* side : {x, y})
+            if (!(std::fmax(std::fabs(side[0]), std::fabs(side[1])) * scale <= kLongest) ||
+                !((side[1] - side[0]) * scale >= kLeast))
+                fail(p.where(), p.what() +
+                                    ": screenwindow, frameaspectratio and the transformation give a picture that is wider "
+                                    "than 1e15 or narrower than 1e-9; correct them");
+        return;
+    }
     const double half = math::tan(double(camera.fov_degrees) * (kPiD / 360));
     constexpr double kNarrowest = 1e-9;
     for (const double* side : {x, y})
@@ -80,29 +91,59 @@ bool read_crop(const ParameterList& p, FilmDescription* film) {
     return true;
 }
 
-}  // namespace
-
-void set_camera(Context* context, const std::string& kind, const ParameterList& p, const Mat4& camera_to_world) {
-    if (kind != "perspective") fail(p.where(), p.what() + " is not supported; use \"perspective\"");
-    PerspectiveCamera camera;
-    camera.camera_to_world = camera_to_world;
-    camera.fov_degrees = p.one_float("fov", 90);
-    if (!(camera.fov_degrees > 0) || !(camera.fov_degrees < 180))
-        fail(p.where(), p.what() + ": fov must lie between 0 and 180 degrees");
-    camera.lens_radius = p.one_float("lensradius", 0);
-    camera.focal_distance = p.one_float("focaldistance", 1e6f);
-    if (!(camera.lens_radius >= 0) || !(camera.focal_distance > 0))
-        fail(p.where(), p.what() + ": lensradius must not be negative and focaldistance must be positive");
-    camera.frame_aspect_ratio = p.one_float("frameaspectratio", 0);
-    if (p.find("float", "frameaspectratio") && !(camera.frame_aspect_ratio > 0))
+/// Where the picture is cut from, for the cameras that have one in a plane.
+void read_window(const ParameterList& p, CameraDescription* camera) {
+    camera->frame_aspect_ratio = p.one_float("frameaspectratio", 0);
+    if (p.find("float", "frameaspectratio") && !(camera->frame_aspect_ratio > 0))
         fail(p.where(), p.what() + ": frameaspectratio must be positive");
     if (const std::vector<double>* window = p.numbers("float", "screenwindow", 4)) {
         if (window->size() != 4) fail(p.where(), p.what() + ": screenwindow needs four numbers");
-        camera.has_screen_window = true;
-        for (size_t i = 0; i < 4; ++i) camera.screen_window[i] = float((*window)[i]);
-        if (!(camera.screen_window[0] < camera.screen_window[1]) || !(camera.screen_window[2] < camera.screen_window[3]))
+        camera->has_screen_window = true;
+        for (size_t i = 0; i < 4; ++i) camera->screen_window[i] = float((*window)[i]);
+        if (!(camera->screen_window[0] < camera->screen_window[1]) || !(camera->screen_window[2] < camera->screen_window[3]))
             fail(p.where(), p.what() + ": screenwindow must be x0 < x1, y0 < y1");
     }
+}
+
+void read_perspective(const ParameterList& p, CameraDescription* camera) {
+    camera->fov_degrees = p.one_float("fov", 90);
+    if (!(camera->fov_degrees > 0) || !(camera->fov_degrees < 180))
+        fail(p.where(), p.what() + ": fov must lie between 0 and 180 degrees");
+    camera->lens_radius = p.one_float("lensradius", 0);
+    camera->focal_distance = p.one_float("focaldistance", 1e6f);
+    if (!(camera->lens_radius >= 0) || !(camera->focal_distance > 0))
+        fail(p.where(), p.what() + ": lensradius must not be negative and focaldistance must be positive");
+    read_window(p, camera);
+}
+
+void read_orthographic(const ParameterList& p, CameraDescription* camera) {
+    camera->kind = CameraKind::kOrthographic;
+    if (p.one_float("lensradius", 0) != 0)
+        fail(p.where(), p.what() + ": a lens is not supported here; remove lensradius, or use a far \"perspective\" camera");
+    p.accept("float", "focaldistance");  // Means nothing without a lens.
+    read_window(p, camera);
+}
+
+void read_spherical(Context* context, const ParameterList& p, CameraDescription* camera) {
+    const std::string mapping = p.one_choice("mapping", "equalarea", {"equalarea", "equirectangular"});
+    camera->kind = mapping == "equalarea" ? CameraKind::kEqualArea : CameraKind::kEquirectangular;
+    for (const std::string_view name : {"lensradius", "focaldistance", "frameaspectratio", "screenwindow"})
+        p.ignore(&context->diagnostics, name, "a camera that sees in all directions has no use for it, in pbrt as well");
+}
+
+}  // namespace
+
+void set_camera(Context* context, const std::string& kind, const ParameterList& p, const Mat4& camera_to_world) {
+    CameraDescription camera;
+    camera.camera_to_world = camera_to_world;
+    if (kind == "perspective")
+        read_perspective(p, &camera);
+    else if (kind == "orthographic")
+        read_orthographic(p, &camera);
+    else if (kind == "spherical")
+        read_spherical(context, p, &camera);
+    else
+        fail(p.where(), p.what() + " is not supported; use \"perspective\", \"orthographic\" or \"spherical\"");
     check_camera(p, camera);
     // Nothing moves, so the shutter matters only as the exposure time.
     const float open = p.one_float("shutteropen", 0), close = p.one_float("shutterclose", 1);
@@ -112,7 +153,14 @@ void set_camera(Context* context, const std::string& kind, const ParameterList& 
 }
 
 void set_film(Context* context, const std::string& kind, const ParameterList& p) {
-    if (kind != "rgb") fail(p.where(), p.what() + " is not supported; use \"rgb\"");
+    if (kind == "gbuffer") {
+        p.accept("string", "coordinatesystem");
+        context->diagnostics.warn(p.where(), p.what() +
+                                                 " becomes \"rgb\": of its further channels, the option --layers writes "
+                                                 "albedo, normal and depth of the first hit");
+    } else if (kind != "rgb") {
+        fail(p.where(), p.what() + " is not supported; use \"rgb\" or \"gbuffer\"");
+    }
     FilmDescription film;
     film.width = p.one_int("xresolution", 1280);
     film.height = p.one_int("yresolution", 720);
@@ -128,10 +176,11 @@ void set_film(Context* context, const std::string& kind, const ParameterList& p)
     p.ignore(&context->diagnostics, "maxcomponentvalue", "samples are not clamped, because that changes the mean");
     context->iso = p.one_float("iso", 100);
     if (!(context->iso > 0)) fail(p.where(), p.what() + ": iso must be positive");
-    const std::string sensor = p.one_string("sensor", "cie1931");
-    if (sensor != "cie1931")
-        fail(p.where(), p.what() + ": the sensor " + quoted(sensor) + " is not supported; use \"cie1931\" or remove it");
-    if (p.one_float("whitebalance", 0) != 0) fail(p.where(), p.what() + ": whitebalance is not supported; remove it");
+    if (p.find("float", "exposuretime")) {
+        context->film_exposure_time = p.one_float("exposuretime", 1);
+        if (!(*context->film_exposure_time > 0)) fail(p.where(), p.what() + ": exposuretime must be positive");
+    }
+    context->film_colour = sensor_colour(context, p);
     p.ignore(&context->diagnostics, "diagonal", "it matters only for cameras with real lenses");
     p.ignore(&context->diagnostics, "savefp16", "the output's precision is the command line's business");
     context->scene.film = film;

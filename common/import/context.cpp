@@ -46,6 +46,12 @@ bool Context::leaves_out(const Location& where, std::string_view feature) {
     return true;
 }
 
+const Rgb& Context::image_mean(int32_t image) {
+    const auto [it, inserted] = image_means.try_emplace(image);
+    if (inserted) it->second = scene.images[size_t(image)].mean();
+    return it->second;
+}
+
 void Context::unsupported(const Location& where, const std::string& feature, const std::string& what) {
     if (!leaves_out(where, feature)) diagnostics.fault({where, what + " is not supported" + how_to_leave_out(feature), feature});
 }

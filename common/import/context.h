@@ -107,14 +107,17 @@ struct Context {
     std::map<std::tuple<float, float, float>, TextureId> constants;
     std::map<decltype(Mat4::m), int32_t> texture_spaces;
     std::map<std::string, int32_t> image_index;  ///< By file, encoding and channel choice.
-    std::map<std::tuple<float, float, float, bool>, int32_t> emission_index;
+    std::map<std::tuple<float, float, float, bool, int32_t>, int32_t> emission_index;
     std::vector<TextureCost> texture_costs;        ///< One per scene texture.
     std::vector<TextureRange> texture_ranges;      ///< The same.
+    std::map<int32_t, Rgb> image_means;            ///< Of the images of area and goniometric lights.
     std::map<int32_t, TextureRange> image_ranges;  ///< Of the one-channel images of textures, by their index.
     std::map<MaterialId, int> mix_levels;          ///< Of mix materials; others have none.
     int texture_depth = 0, material_depth = 0;     ///< Of the definitions being resolved.
 
-    float exposure_time = 1, iso = 100;
+    float exposure_time = 1, iso = 100;       ///< Of the camera's shutter; of the film.
+    std::optional<float> film_exposure_time;  ///< Of a film that says it itself, as pbrt-v4's did at first.
+    FilmResponse::Matrix film_colour = FilmResponse::kNeutral;
     bool has_pixel_filter = false;
 
     /// Says that the scene has an unsupported feature: it is left out if the options say so, and a fault otherwise.
@@ -129,6 +132,8 @@ struct Context {
     std::string read_file(const Location& where, const std::string& reference, std::string* normalised = nullptr);
     /// Index of the decoded image in the scene; every file is decoded once per way of using it.
     int32_t load_image(const Location& where, const std::string& reference, const ImageRequest& request);
+    /// Mean of an image of the scene, which many shapes may ask for.
+    const Rgb& image_mean(int32_t image);
     /// The Location::file for a normalised name.
     const std::string* intern_file_name(const std::string& name);
 };
@@ -181,13 +186,16 @@ void add_light(Context* context, const std::string& kind, const ParameterList& p
 bool within_bounds(const Vec3& position);
 
 /// Radiance of an area light on a surface of `area`, in world space: its "power" is what each primitive emits, however that is
-/// scaled. (pbrt-v4 divides by the area that a sphere or disk has before its transformation.)
+/// scaled. (pbrt-v4 divides by the area that a sphere or disk has before its transformation.) Where an image gives the light, the
+/// power is that of a primitive that shows all of the image evenly, as in pbrt-v4.
 AreaEmission area_emission(Context* context, const AreaLightDefinition& definition, double area);
 bool area_light_uses_power(const AreaLightDefinition& definition);
 
 // camera.cpp
 void set_camera(Context* context, const std::string& kind, const ParameterList& parameters, const Mat4& camera_to_world);
 void set_film(Context* context, const std::string& kind, const ParameterList& parameters);
+/// What the sensor and the white balance of a film do to colours (sensor.cpp).
+FilmResponse::Matrix sensor_colour(Context* context, const ParameterList& parameters);
 void set_pixel_filter(Context* context, const std::string& kind, const ParameterList& parameters);
 void set_sampler(Context* context, const std::string& kind, const ParameterList& parameters);
 void set_integrator(Context* context, const std::string& kind, const ParameterList& parameters);

@@ -28,9 +28,10 @@ void read_scene(Context* context, const std::string& name) {
     });
     resolve_shapes(context);
     context->diagnostics.guard([&] {
-        context->scene.film.exposure_scale = context->exposure_time * context->iso / 100;
-        if (!(context->scene.film.exposure_scale >= 0 && context->scene.film.exposure_scale <= kMaxCoordinate))
-            fail(main, "iso and the shutter's time multiply the picture by more than 1e15; lower them");
+        const float exposure = context->film_exposure_time.value_or(context->exposure_time) * context->iso / 100;
+        if (!(exposure >= 0 && exposure <= kMaxCoordinate))
+            fail(main, "iso and the exposure time multiply the picture by more than 1e15; lower them");
+        context->scene.film.response = {double(exposure), context->film_colour};
     });
 }
 

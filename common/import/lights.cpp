@@ -113,6 +113,59 @@ void spot_light(Context* context, const ParameterList& p, const Mat4& m) {
     context->scene.spot_lights.push_back(light);
 }
 
+/// What the lights have in common whose intensity an image gives.
+ImageLight image_light(Context* context, const ParameterList& p, const Mat4& m) {
+    if (!similarity_scale(m)) fail(p.where(), p.what() + ": its transformation must be a rotation, reflection or uniform scale");
+    const std::string reference = p.one_string("filename", "");
+    if (reference.empty()) fail(p.where(), p.what() + " has no \"string filename\"");
+    ImageLight light;
+    light.position = light_position(p, m, {0, 0, 0});
+    light.light_to_world = m;
+    light.image = context->load_image(p.where(), reference, ImageRequest{});
+    light.source = p.where().text();
+    return light;
+}
+
+/// The factor that gives a light of this flux its "power", if it has one.
+double power_factor(const ParameterList& p, double flux) {
+    const double power = magnitude(p, "power");
+    if (!(power > 0)) return 1;
+    if (!(flux > 0)) fail(p.where(), p.what() + ": the image is black, so power cannot scale it");
+    return power / flux;
+}
+
+void projection_light(Context* context, const ParameterList& p, const Mat4& m) {
+    ImageLight light = image_light(context, p, m);
+    const Image& image = context->scene.images[size_t(light.image)];
+    const float fov = p.one_float("fov", 90);
+    if (!(fov >= 0.01f) || !(fov <= 179)) fail(p.where(), p.what() + ": fov must lie between 0.01 and 179 degrees");
+    // fov is that of the shorter side.
+    const double half = math::tan(double(fov) * (kPiD / 360)), shorter = std::min(image.width, image.height);
+    const double half_width = half * image.width / shorter, half_height = half * image.height / shorter;
+    light.half_width = float(half_width), light.half_height = float(half_height);
+    const std::vector<double> solid_angles = projected_solid_angles(image.width, image.height, half_width, half_height);
+    double flux = 0;
+    for (size_t i = 0; i < solid_angles.size(); ++i) {
+        const size_t width = size_t(image.width);
+        flux += double(image.texel(int(i % width), int(i / width)).luminance()) * solid_angles[i];
+    }
+    light.intensity = checked(p, Rgb(1.0f), light_scale(p) * power_factor(p, flux));
+    if (flux > 0) context->scene.image_lights.push_back(light);
+}
+
+void goniometric_light(Context* context, const ParameterList& p, const Mat4& m) {
+    ImageLight light = image_light(context, p, m);
+    light.kind = ImageLight::Kind::kGoniometric;
+    const Image& image = context->scene.images[size_t(light.image)];
+    if (image.width != image.height)
+        fail(p.where(), quoted(image.name) + ": a goniometric light needs a square equal-area octahedral image, not " +
+                            std::to_string(image.width) + " x " + std::to_string(image.height) +
+                            "; convert it with \"imgtool makeequiarea\"");
+    const double flux = 4 * kPiD * double(context->image_mean(light.image).average());
+    light.intensity = checked(p, light_colour(context, p, "I"), light_scale(p) * power_factor(p, flux));
+    if (flux > 0) context->scene.image_lights.push_back(light);
+}
+
 void distant_light(Context* context, const ParameterList& p, const Mat4& m) {
     double scale = light_scale(p);
     if (const double illuminance = magnitude(p, "illuminance"); illuminance > 0) scale *= illuminance;
@@ -186,27 +239,41 @@ void add_light(Context* context, const std::string& kind, const ParameterList& p
         point_light(context, p, light_to_world);
     else if (kind == "spot")
         spot_light(context, p, light_to_world);
+    else if (kind == "projection")
+        projection_light(context, p, light_to_world);
+    else if (kind == "goniometric")
+        goniometric_light(context, p, light_to_world);
     else if (kind == "distant")
         distant_light(context, p, light_to_world);
     else if (kind == "infinite")
         infinite_light(context, p, light_to_world);
     else
-        fail(p.where(), p.what() + " is not supported; use point, spot, distant or infinite");
+        fail(p.where(), p.what() + " is not supported; use point, spot, projection, goniometric, distant or infinite");
 }
 
 bool area_light_uses_power(const AreaLightDefinition& definition) { return magnitude(definition.parameters, "power") > 0; }
 
 AreaEmission area_emission(Context* context, const AreaLightDefinition& definition, double area) {
     const ParameterList& p = definition.parameters;
-    p.refuse("filename", "images on area lights are not supported; give the light a constant L");
     AreaEmission emission;
+    Rgb colour(1.0f);
+    double luminance = 1;
+    if (const std::string reference = p.one_string("filename", ""); !reference.empty()) {
+        if (p.find_any("L")) fail(p.where(), p.what() + ": give either L or filename, not both");
+        emission.image = context->load_image(p.where(), reference, ImageRequest{});
+        luminance = double(context->image_mean(emission.image).luminance());
+    } else {
+        colour = light_colour(context, p, "L");
+    }
     emission.two_sided = p.one_bool("twosided", false);
     double scale = light_scale(p);
     if (const double power = magnitude(p, "power"); power > 0) {
         if (!(area > 0)) fail(p.where(), p.what() + ": power needs a shape with an area");
-        scale *= power / ((emission.two_sided ? 2 : 1) * kPiD * area);
+        if (!(luminance > 0)) fail(p.where(), p.what() + ": the image is black, so power cannot scale it");
+        scale *= power / ((emission.two_sided ? 2 : 1) * kPiD * area * luminance);
     }
-    emission.radiance = checked(p, light_colour(context, p, "L"), scale);
+    if (luminance == 0) scale = 0;  // A black image makes no light.
+    emission.radiance = checked(p, colour, scale);
     p.finish();
     return emission;
 }

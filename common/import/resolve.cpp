@@ -22,7 +22,8 @@ double triangle_area(const TriangleMesh& mesh, size_t first) {
 
 /// Index of an equal emission, or of a new one.
 int32_t add_emission(Context* context, const AreaEmission& emission) {
-    const auto key = std::make_tuple(emission.radiance.r, emission.radiance.g, emission.radiance.b, emission.two_sided);
+    const auto key =
+        std::make_tuple(emission.radiance.r, emission.radiance.g, emission.radiance.b, emission.two_sided, emission.image);
     const auto [it, inserted] = context->emission_index.try_emplace(key, int32_t(context->scene.emissions.size()));
     if (inserted) context->scene.emissions.push_back(emission);
     return it->second;
@@ -49,7 +50,7 @@ TriangleMesh subset(const TriangleMesh& mesh, const std::vector<size_t>& triangl
 
 /// As in pbrt, every triangle, disk, sphere and patch (also a PLY quadrilateral) is a light of its own with the given
 /// power, which the triangles that stand for it share by area; those of equal radiance stay together.
-void add_powered_mesh(Context* context, TriangleMesh&& mesh, const PendingShape& shape) {
+void add_powered_mesh(Context* context, TriangleMesh&& mesh, const PendingShape& shape, bool hidden) {
     const size_t triangles_in_all = mesh.indices.size() / 3;
     const auto face_of = [&](size_t triangle) { return shape.faces.empty() ? triangle : shape.faces[triangle]; };
     const size_t count = triangles_in_all == 0 ? 0 : face_of(triangles_in_all - 1) + 1;
@@ -62,15 +63,18 @@ void add_powered_mesh(Context* context, TriangleMesh&& mesh, const PendingShape&
         context->diagnostics.warn(shape.where, "as in pbrt, each of the " + std::to_string(count) +
                                                    (shape.faces.empty() ? " triangles" : " faces") +
                                                    " of this light emits the given power");
+    std::vector<TriangleMesh>& meshes = hidden ? context->scene.hidden_meshes : context->scene.meshes;
     const auto add_part = [&](TriangleMesh part, float area) {
         part.attributes.emission = add_emission(context, area_emission(context, *shape.area_light, double(area)));
-        context->scene.meshes.push_back(std::move(part));
+        meshes.push_back(std::move(part));
     };
     for (const auto& [area, triangles] : by_area) {
         if (triangles.size() == triangles_in_all) return add_part(std::move(mesh), area);  // There is no other part.
         add_part(subset(mesh, triangles), area);
     }
 }
+
+bool is_zero(const TextureNode& alpha) { return alpha.kind == TextureKind::kConstant && alpha.value == Rgb(0.0f); }
 
 void add_shape(Context* context, PendingShape shape) {
     SceneDescription& scene = context->scene;
@@ -90,27 +94,30 @@ void add_shape(Context* context, PendingShape shape) {
         attributes.alpha = named_texture(context, shape.where, shape.alpha_texture, TextureUse::kFloat);
     else if (shape.alpha != 1)
         attributes.alpha = constant_texture(context, Rgb(shape.alpha));
+    bool hidden = false;
     if (shape.area_light) {
-        if (shape.alpha_texture.empty() && shape.alpha == 0)
-            fail(shape.where, "an emitting shape with alpha 0 (pbrt's invisible light) is not supported; give it a visible alpha");
+        // As in pbrt-v4: where alpha is 0 everywhere, no ray meets the shape, and all of it is a light nevertheless.
+        hidden = attributes.alpha != kNone && is_zero(scene.textures[size_t(attributes.alpha)]);
+        if (hidden) attributes.alpha = kNone;
         if (attributes.alpha != kNone)
             fail(shape.where,
-                 "an emitting shape with an alpha is not supported: the light sampled on it would be that of "
+                 "an emitting shape with an alpha other than 0 and 1 is not supported: the light sampled on it would be that of "
                  "the uncut shape; cut the geometry instead");
         const bool powered = area_light_uses_power(*shape.area_light);
         if (powered && shape.is_scaled_quadric)
             context->diagnostics.warn(shape.where,
                                       "the light emits its power from the sphere, disk or cylinder as it is scaled; pbrt-v4 "
                                       "takes the area before the transformation, and warns of the scale");
-        if (powered && mesh) return add_powered_mesh(context, std::move(*mesh), shape);
+        if (powered && mesh) return add_powered_mesh(context, std::move(*mesh), shape, hidden);
         const double area = sphere ? 4 * kPiD * double(sphere->radius) * sphere->radius : 0;
         const AreaEmission emission = area_emission(context, *shape.area_light, area);
         if (!emission.radiance.is_black()) attributes.emission = add_emission(context, emission);
+        if (hidden && attributes.emission == kNone) return;  // Neither seen nor shining.
     }
     if (mesh)
-        (object ? object->meshes : scene.meshes).push_back(std::move(*mesh));
+        (object ? object->meshes : hidden ? scene.hidden_meshes : scene.meshes).push_back(std::move(*mesh));
     else
-        (object ? object->spheres : scene.spheres).push_back(*sphere);
+        (object ? object->spheres : hidden ? scene.hidden_spheres : scene.spheres).push_back(*sphere);
 }
 
 }  // namespace

@@ -276,7 +276,8 @@ TriangleMesh subdivision_surface(Context* context, const ParameterList& paramete
 
 TriangleMesh bilinear_mesh(Context* context, const ParameterList& parameters, const ShapeState& state,
                            std::vector<uint32_t>* faces) {
-    parameters.refuse("emissionfilename", "images on area lights are not supported; give the light a constant L");
+    parameters.ignore(&context->diagnostics, "emissionfilename",
+                      "it only guides pbrt's choice of points on the light, whose image is the light's \"filename\"");
     parameters.ignore(&context->diagnostics, "faceIndices", "no texture here is looked up by face");
     bool curved = false;
     TriangleMesh mesh = tessellate_patches(read_mesh(parameters, 4), &curved, faces);

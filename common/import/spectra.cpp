@@ -113,7 +113,7 @@ std::optional<Rgb> illuminant_rgb(const Spectrum& spectrum, bool* clipped) {
     return unit_luminance_rgb(x, y, z, clipped);
 }
 
-Rgb blackbody_rgb(double kelvin, bool* clipped) {
+Xyz blackbody_xyz(double kelvin) {
     // Planck's law relative to its value at 780 nm, so that neither end of the temperatures overflows.
     constexpr double kSecond = 1.4387769e7;  // h c / k_B in nm K
     const double top = kSecond / (780 * kelvin);
@@ -126,7 +126,12 @@ Rgb blackbody_rgb(double kelvin, bool* clipped) {
         const double v = s * s * s * s * s * ratio;
         x += v * row.x, y += v * row.y, z += v * row.z;
     });
-    return unit_luminance_rgb(x, y, z, clipped);
+    return {x, y, z};
+}
+
+Rgb blackbody_rgb(double kelvin, bool* clipped) {
+    const Xyz c = blackbody_xyz(kelvin);
+    return unit_luminance_rgb(c.x, c.y, c.z, clipped);
 }
 
 Spectrum blackbody_spectrum(double kelvin) {

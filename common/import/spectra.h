@@ -41,6 +41,12 @@ double evaluate(const Spectrum& spectrum, double nanometres);
 Rgb unit_luminance_rgb(double x, double y, double z, bool* clipped);
 /// RGB of luminance 1; nothing if the spectrum has no luminance.
 std::optional<Rgb> illuminant_rgb(const Spectrum& spectrum, bool* clipped);
+/// CIE 1931 2 degree tristimulus values.
+struct Xyz {
+    double x, y, z;
+};
+/// Of a black body, on any scale. `kelvin` is positive.
+Xyz blackbody_xyz(double kelvin);
 /// A black body's colour, luminance 1. `kelvin` is positive.
 Rgb blackbody_rgb(double kelvin, bool* clipped);
 /// A black body from 380 to 780 nm, relative to its peak (which may lie elsewhere), as pbrt takes one for anything but a light.

@@ -35,7 +35,8 @@ int trace_camera_path(const Scene& scene, CameraSampler& sampler, int px, int py
     WalkRay ray{.origin = lens_ray.origin,
                 .direction = lens_ray.direction,
                 .alpha = Rgb(1.0f),
-                .pdf = lens_ray.pdf_solid_angle,
+                .pdf = lens_ray.pdf,
+                .from_infinite = scene.camera().has_parallel_rays(),
                 .clearance = scene.camera_clearance()};
     z[0].p = ray.origin;
     z[0].alpha = ray.alpha;

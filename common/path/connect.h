@@ -35,13 +35,14 @@ inline void view_camera_suffix(const PathVertex* z, int t, int k, PathView* view
 /// end vertices (start and step), for methods that select by the light's throughput.
 enum class ViewDetail : uint8_t { kFull, kLightEnd, kSubspace };
 
-/// start[] of a path whose x_0 lies on `e` and emits along `w`; fwd[0] must be set. `direction_pdf` as pdf_direction().
-inline void view_start(const EmitterSet& emitters, const Emitter& e, const Vec3& normal, const Vec3& w, float direction_pdf,
-                       PathView* view) {
+/// start[] of a path whose x_0, at `position`, lies on `e` and emits along `w`; fwd[0] must be set. `direction_pdf` as
+/// pdf_direction().
+inline void view_start(const EmitterSet& emitters, const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w,
+                       float direction_pdf, PathView* view) {
     const float inv_position = float(1 / view->fwd[0]);
-    view->start[0] = emitters.strength(e, w) * inv_position;
+    view->start[0] = emitters.strength(e, position, w) * inv_position;
     const float cosine = e.is_area() ? abs_dot(normal, w) : 1;
-    view->start[1] = direction_pdf > 0 ? emitters.emitted(e, normal, w) * (cosine * inv_position / direction_pdf) : Rgb{};
+    view->start[1] = direction_pdf > 0 ? emitters.emitted(e, position, normal, w) * (cosine * inv_position / direction_pdf) : Rgb{};
 }
 
 /// PathVertex::step of a camera vertex that a connection leaves towards the light along `w`.
@@ -68,7 +69,7 @@ Rgb emitter_hit(const Scene& scene, const PathVertex* z, int t, PathView* view) 
     const PathVertex& v = z[t - 1];
     const EmitterSet& emitters = scene.emitters();
     const Emitter& e = emitters[uint32_t(v.emitter)];
-    const Rgb radiance = emitters.emitted(e, v.ng, v.wo);
+    const Rgb radiance = emitters.emitted(e, v.p, v.ng, v.wo);
     if (radiance.is_black()) return {};
     const int k = t - 1;
     view->k = k;
@@ -77,7 +78,7 @@ Rgb emitter_hit(const Scene& scene, const PathVertex* z, int t, PathView* view) 
     view->fwd[0] = emitters.pdf_position(e, v.wo);
     if (k >= 2) {
         const float direction_pdf = emitters.pdf_direction(e, v.ng, v.wo);
-        if constexpr (detail == ViewDetail::kSubspace) view_start(emitters, e, v.ng, v.wo, direction_pdf, view);
+        if constexpr (detail == ViewDetail::kSubspace) view_start(emitters, e, v.p, v.ng, v.wo, direction_pdf, view);
         view->fwd[1] = double(direction_pdf) * v.to_previous;
         view->next_event = emitters.pdf_next_event(e, z[t - 2].p, v.p, v.ng, -v.wo);
     }
@@ -90,7 +91,7 @@ Rgb environment_hit(const Scene& scene, const PathVertex* z, int t, const WalkRa
     const EmitterSet& emitters = scene.emitters();
     if (emitters.environment_index() == kNone) return {};
     const Emitter& e = emitters[uint32_t(emitters.environment_index())];
-    const Rgb radiance = emitters.emitted(e, {}, -ray.direction);
+    const Rgb radiance = emitters.emitted(e, {}, {}, -ray.direction);
     if (radiance.is_black()) return {};
     const int k = t;
     view->k = k;
@@ -100,7 +101,7 @@ Rgb environment_hit(const Scene& scene, const PathVertex* z, int t, const WalkRa
     view->fwd[0] = emitters.pdf_position(e, -ray.direction);
     if (k >= 2) {
         const float direction_pdf = emitters.pdf_direction(e, {}, -ray.direction);
-        if constexpr (detail == ViewDetail::kSubspace) view_start(emitters, e, {}, -ray.direction, direction_pdf, view);
+        if constexpr (detail == ViewDetail::kSubspace) view_start(emitters, e, {}, {}, -ray.direction, direction_pdf, view);
         view->fwd[1] = double(direction_pdf) * abs_dot(z[t - 1].ng, ray.direction);
         view->next_event = view->fwd[0];
     }
@@ -127,7 +128,7 @@ Rgb next_event(const Scene& scene, const PathVertex* z, int t, const NextEventSa
     view_suffix<detail>(z, t, k, view);
     view->delta[0] = view->delta[1] = false;
     view->discrete_source = e.is_discrete();
-    view->rev[0] = e.is_delta() ? 0.0 : double(s.pdf_fwd) * light.geometry;
+    view->rev[0] = e.can_be_hit() ? double(s.pdf_fwd) * light.geometry : 0.0;
     view->fwd[0] = emitters.pdf_position(e, -light.wi);
     view->next_event = light.pdf;
     const float receiver = abs_dot(v.ng, light.wi);
@@ -135,7 +136,7 @@ Rgb next_event(const Scene& scene, const PathVertex* z, int t, const NextEventSa
     const float direction_pdf = emitters.pdf_direction(e, light.normal, -light.wi);
     view->fwd[1] = double(direction_pdf) * (receiver * inv_d2);
     if constexpr (detail == ViewDetail::kSubspace) {
-        view_start(emitters, e, light.normal, -light.wi, direction_pdf, view);
+        view_start(emitters, e, light.position, light.normal, -light.wi, direction_pdf, view);
         view->step[1] = light_step(v, s, light.wi);
     }
     if (k >= 3) view->fwd[2] = double(s.pdf_rev) * v.to_previous;
@@ -180,16 +181,16 @@ Rgb connect(const Scene& scene, const Vertex* y, int s, const PathVertex* z, int
     return contribution;
 }
 
-/// t = 1: connects y_{s-1}, s >= 2, to `lens_point` of Camera::sample_lens(). `film` receives the film position.
-inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, const Vec3& lens_point, Vec2* film, PathView* view,
+/// t = 1: connects y_{s-1}, s >= 2, to `lens_point` of Camera::sample_lens(), which moves as Camera::see() says. `film` receives
+/// the film position.
+inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, Vec3* lens_point, Vec2* film, PathView* view,
                              WalkCounters* counters) {
     const PathVertex& a = y[s - 1];
-    const Vec3 d = a.p - lens_point;
-    const float d2 = length_squared(d);
-    if (!(d2 > 0)) return {};
-    const Vec3 w = d / std::sqrt(d2);
-    float pdf = 0;
-    if (!scene.camera().project(lens_point, w, film, &pdf)) return {};
+    Camera::Sight sight;
+    if (!scene.camera().see(a.p, lens_point, &sight)) return {};
+    *film = sight.film;
+    const Vec3& w = sight.direction;
+    const float pdf = sight.pdf, d2 = sight.distance2;
     const Rect& crop = scene.frame().crop;
     if (!crop.contains(int(film->x), int(film->y))) return {};
     const Scatter at_light = scatter<TransportMode::kImportance>(a, -w);
@@ -198,7 +199,7 @@ inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, con
     if (contribution.is_black()) return {};
     ++counters->rays;
     ++counters->connections;
-    if (scene.occluded(a.p, a.ng, a.reach, lens_point, scene.camera_clearance())) return {};
+    if (scene.occluded(a.p, a.ng, a.reach, *lens_point, scene.camera_clearance())) return {};
     const int k = s;
     view->k = k;
     view_light_prefix(y, s, view);

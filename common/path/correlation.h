@@ -15,7 +15,7 @@ namespace lightloom {
 /// z[0 .. t-1].
 inline void view_footprint(const Emitter& e, const LightSubPath& y, int s, const PathVertex* z, int t, PathView* view) {
     view->primary_distance2 = double(length_squared((t >= 2 ? z[1].p : y[s - 1].p) - z[0].p));
-    view->source = e.is_delta()      ? PathView::Source::kDiscrete
+    view->source = e.is_discrete()   ? PathView::Source::kDiscrete
                    : e.is_infinite() ? PathView::Source::kDirection
                                      : PathView::Source::kArea;
 }

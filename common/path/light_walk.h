@@ -30,7 +30,7 @@ inline bool start_light_path(const Scene& scene, LightSampler& sampler, PathVert
     y0->p = s.position;
     y0->ng = s.normal;
     y0->emitter = int32_t(s.emitter);
-    y0->alpha = scene.emitters().strength(e, s.direction) / s.pdf_position;
+    y0->alpha = scene.emitters().strength(e, s.position, s.direction) / s.pdf_position;
     y0->survival = 1;
     y0->label = y0->reverse_label = kNoLabel;
     y0->reverse_branch = 0;
@@ -42,7 +42,7 @@ inline bool start_light_path(const Scene& scene, LightSampler& sampler, PathVert
     ray->pdf = s.pdf_direction;
     ray->from_infinite = e.is_infinite();
     ray->clearance = e.clearance;
-    ray->previous_hittable = !e.is_delta();
+    ray->previous_hittable = e.can_be_hit();
     ray->origin = e.is_area() ? offset_origin(s.position, s.normal, s.direction, e.reach) : s.position;
     return true;
 }

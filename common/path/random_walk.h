@@ -25,9 +25,9 @@ struct ScatterSample {
 /// State of a walk between two vertices.
 struct WalkRay {
     Vec3 origin, direction;
-    Rgb alpha;       ///< Throughput carried along the ray.
-    double pdf = 0;  ///< Density of the direction, solid angle; for an infinite light: area on its disc.
-    bool from_infinite = false;
+    Rgb alpha;                      ///< Throughput carried along the ray.
+    double pdf = 0;                 ///< Density of the direction, solid angle; of parallel rays: area across them.
+    bool from_infinite = false;     ///< Leaves an infinite light (area on its disc) or a camera with parallel rays.
     float clearance = 0;            ///< At the origin; see Scene::intersect().
     bool previous_hittable = true;  ///< False leaving a light that cannot be hit: its reverse density is zero.
     float survival = 1;             ///< See SubPathVertex.

@@ -177,8 +177,8 @@ void sphere_occluded(const RTCOccludedFunctionNArguments* args) {
 
 }  // namespace
 
-Vec2 sphere_uv(const Sphere& sphere, const Vec3& n) {
-    const Vec3 local = sphere.orientation.to_local(n);
+Vec2 sphere_uv(const Frame& orientation, const Vec3& n) {
+    const Vec3 local = orientation.to_local(n);
     double phi = math::atan2(local.y, local.x);
     if (phi < 0) phi += 2 * kPiD;
     return {float(phi / (2 * kPiD)), float(1 - math::acos(local.z) / kPiD)};

@@ -17,8 +17,9 @@
 
 namespace lightloom {
 
-/// Texture coordinates of a sphere, pbrt's, at the outward unit normal `n`.
-Vec2 sphere_uv(const Sphere& sphere, const Vec3& n);
+/// Texture coordinates of a sphere, pbrt's, at the outward unit normal `n`; `orientation` as Sphere's.
+Vec2 sphere_uv(const Frame& orientation, const Vec3& n);
+inline Vec2 sphere_uv(const Sphere& sphere, const Vec3& n) { return sphere_uv(sphere.orientation, n); }
 
 class Accel {
   public:

@@ -11,6 +11,8 @@ std::string at(const ShapeAttributes& a) { return a.source.empty() ? std::string
 
 std::string at(const InfiniteLight& l) { return l.source.empty() ? std::string("infinite light") : l.source; }
 
+std::string at(const ImageLight& l) { return l.source.empty() ? std::string("image light") : l.source; }
+
 bool rgb_ok(const Rgb& c) { return is_finite(c) && c.r >= 0 && c.g >= 0 && c.b >= 0; }
 
 struct Checker {
@@ -84,6 +86,8 @@ Status validate(const SceneDescription& description) {
     const Checker checker{description};
     for (const TriangleMesh& m : description.meshes) LL_RETURN_IF_ERROR(checker.mesh(m, true));
     for (const Sphere& s : description.spheres) LL_RETURN_IF_ERROR(checker.sphere(s, true));
+    for (const TriangleMesh& m : description.hidden_meshes) LL_RETURN_IF_ERROR(checker.mesh(m, true));
+    for (const Sphere& s : description.hidden_spheres) LL_RETURN_IF_ERROR(checker.sphere(s, true));
     for (const ObjectDefinition& o : description.objects) {
         for (const TriangleMesh& m : o.meshes) LL_RETURN_IF_ERROR(checker.mesh(m, false));
         for (const Sphere& s : o.spheres) LL_RETURN_IF_ERROR(checker.sphere(s, false));
@@ -93,8 +97,17 @@ Status validate(const SceneDescription& description) {
             return invalid_argument(i.source + ": no such object to instance");
         if (!inverse(i.object_to_world)) return invalid_argument(i.source + ": the instance's transformation is singular");
     }
-    for (const AreaEmission& e : description.emissions)
+    for (const AreaEmission& e : description.emissions) {
         if (!rgb_ok(e.radiance)) return invalid_argument("an area light's radiance is negative or not finite");
+        if (e.image != kNone && (size_t(e.image) >= description.images.size() || description.images[size_t(e.image)].empty()))
+            return invalid_argument("an area light's image is missing or empty");
+    }
+    for (const ImageLight& l : description.image_lights) {
+        if (!rgb_ok(l.intensity)) return invalid_argument(at(l) + ": the light's intensity is negative or not finite");
+        if (!inverse(l.light_to_world)) return invalid_argument(at(l) + ": the light's transformation is singular");
+        if (l.image < 0 || size_t(l.image) >= description.images.size() || description.images[size_t(l.image)].empty())
+            return invalid_argument(at(l) + ": the light's image is missing or empty");
+    }
     for (const InfiniteLight& l : description.infinite_lights) {
         if (!rgb_ok(l.radiance)) return invalid_argument(at(l) + ": the light's radiance is negative or not finite");
         if (!inverse(l.light_to_world)) return invalid_argument(at(l) + ": the light's transformation is singular");

@@ -9,6 +9,7 @@
 #include "common/core/result.h"
 #include "common/core/transform.h"
 #include "common/core/vec.h"
+#include "common/film/response.h"
 #include "common/scene/image.h"
 
 namespace lightloom {
@@ -95,8 +96,9 @@ struct Material {
 
 /// Emission of an area light, attached to shapes. Radiance, W / (m^2 sr) per colour channel, scene units.
 struct AreaEmission {
-    Rgb radiance;
+    Rgb radiance;  ///< Multiplies the image, or is the radiance when there is none.
     bool two_sided = false;
+    int32_t image = kNone;  ///< Index into images; looked up by the shape's (u, v), see SurfaceMap.
 };
 
 /// What all shapes share.
@@ -157,6 +159,18 @@ struct SpotLight {
     std::string source = {};
 };
 
+/// A light at a point whose intensity an image gives by direction; see DirectionMap.
+struct ImageLight {
+    enum class Kind : uint8_t { kProjection, kGoniometric };
+    Kind kind = Kind::kProjection;
+    Vec3 position;
+    Mat4 light_to_world;                    ///< Rotation (and reflection) part is used.
+    float half_width = 1, half_height = 1;  ///< kProjection: of the picture at distance 1.
+    Rgb intensity{1.0f};                    ///< Multiplies the image, W / sr.
+    int32_t image = kNone;                  ///< Index into images; square for kGoniometric.
+    std::string source = {};
+};
+
 struct DistantLight {
     Vec3 direction;  ///< Unit vector in which the light travels.
     Rgb irradiance;  ///< On a surface facing it, W / m^2.
@@ -170,9 +184,17 @@ struct InfiniteLight {
     std::string source = {};
 };
 
-struct PerspectiveCamera {
+enum class CameraKind : uint8_t {
+    kPerspective,
+    kOrthographic,     ///< Rays along +z from the screen window in the plane z = 0, in the camera's units. No lens.
+    kEqualArea,        ///< All directions, the equal-area octahedral square about +y filling the frame. No lens.
+    kEquirectangular,  ///< All directions: from +y at the top to -y, and from +x over +z, -x and -z from left to right. No lens.
+};
+
+struct CameraDescription {
+    CameraKind kind = CameraKind::kPerspective;
     Mat4 camera_to_world;    ///< Camera looks along +z, +y up, +x right; may mirror.
-    float fov_degrees = 90;  ///< Of the shorter image side.
+    float fov_degrees = 90;  ///< kPerspective: of the shorter image side.
     /// pbrt's screen window; when unset (`has_screen_window` false) it follows the film's aspect ratio.
     bool has_screen_window = false;
     float screen_window[4] = {-1, 1, -1, 1};  ///< x0, x1, y0, y1.
@@ -185,13 +207,16 @@ struct FilmDescription {
     int width = 1280, height = 720;
     /// Crop window in pixels, half open: x0, x1, y0, y1; all -1 means the whole frame.
     int crop[4] = {-1, -1, -1, -1};
-    float exposure_scale = 1;  ///< iso * exposure time / 100: multiplies the image.
-    std::string file_name;     ///< As in the scene file; where pictures go is the command line's to say.
+    FilmResponse response;
+    std::string file_name;  ///< As in the scene file; where pictures go is the command line's to say.
 };
 
 struct SceneDescription {
     std::vector<TriangleMesh> meshes;
     std::vector<Sphere> spheres;
+    /// Surfaces that emit and are nothing else: no ray meets them (pbrt: area lights with alpha 0).
+    std::vector<TriangleMesh> hidden_meshes;
+    std::vector<Sphere> hidden_spheres;
     std::vector<ObjectDefinition> objects;
     std::vector<Instance> instances;
     std::vector<Material> materials;
@@ -201,9 +226,10 @@ struct SceneDescription {
     std::vector<AreaEmission> emissions;
     std::vector<PointLight> point_lights;
     std::vector<SpotLight> spot_lights;
+    std::vector<ImageLight> image_lights;
     std::vector<DistantLight> distant_lights;
     std::vector<InfiniteLight> infinite_lights;
-    PerspectiveCamera camera;
+    CameraDescription camera;
     FilmDescription film;
     int max_depth = 5;                  ///< Bounces, as in pbrt: paths have up to max_depth + 1 edges.
     int samples_per_pixel = 16;         ///< What the file asks for; the command line may override.
@@ -211,9 +237,9 @@ struct SceneDescription {
     std::vector<std::string> warnings;  ///< Named warnings: "file:line: what was ignored and why that matters".
 };
 
-/// What rendering relies on in shapes, instances, and the strength of area and infinite lights: indices in range, finite numbers,
-/// areas within single precision, invertible matrices. kInvalidArgument names the first that breaks it, a shape with its place in
-/// the scene file. import_pbrt() and Scene::build() check it; everything else is the importer's to guarantee.
+/// What rendering relies on in shapes, instances, and the strength of area, image and infinite lights: indices in range, finite
+/// numbers, areas within single precision, invertible matrices. kInvalidArgument names the first that breaks it, a shape with its
+/// place in the scene file. import_pbrt() and Scene::build() check it; everything else is the importer's to guarantee.
 Status validate(const SceneDescription& description);
 
 /// Whether a transformation is made of rotations, translations, reflections and one scale for all axes, as a camera's must be.

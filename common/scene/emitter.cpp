@@ -26,14 +26,18 @@ float cone_height(float radius, float d2) {
     return sin2 / (1 + safe_sqrt(1 - sin2));
 }
 
-/// Whether next event samples the sphere by the cone that it subtends (otherwise by area).
-bool samples_cone(const Emitter& e, float d2) { return !e.inward && d2 > e.radius * e.radius * 1.0001f; }
+/// Whether next event samples the sphere by the cone that it subtends (otherwise by area): from outside, if nothing but the near
+/// side can shine there. The far side's inner face shines through a near side that no ray meets.
+bool samples_cone(const Emitter& e, float d2) {
+    return !e.inward && !(e.hidden && e.two_sided) && d2 > e.radius * e.radius * 1.0001f;
+}
 
 }  // namespace
 
-EmitterSet::EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius)
+EmitterSet::EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius, LightMaps maps)
     : emitters_(std::move(emitters)),
       environment_(std::move(environment)),
+      maps_(std::move(maps)),
       centre_(centre),
       scene_radius_(radius) {
     disc_pdf_ = 1 / (kPi * radius * radius);
@@ -50,23 +54,30 @@ double EmitterSet::power(const Emitter& e) const {
     const double disc = kPiD * double(scene_radius_) * scene_radius_;
     switch (e.kind) {
         case EmitterKind::kTriangle:
-        case EmitterKind::kSphere: return kPiD * scalar_of(e.radiance) / e.inv_area * (e.two_sided ? 2 : 1);
+        case EmitterKind::kSphere: {
+            const Rgb mean = e.map == kNone ? e.radiance : e.radiance * maps_.surfaces[size_t(e.map)].mean();
+            return kPiD * scalar_of(mean) / e.inv_area * (e.two_sided ? 2 : 1);
+        }
         case EmitterKind::kPoint: return 4 * kPiD * scalar_of(e.radiance);
         case EmitterKind::kSpot: return kPiD * scalar_of(e.radiance) * (double(e.falloff_height) + double(e.total_height));
         case EmitterKind::kDistant: return scalar_of(e.radiance) * disc;
         case EmitterKind::kEnvironment: return environment_.integrated_radiance() * disc;
+        case EmitterKind::kProjection:
+        case EmitterKind::kGoniometric: return scalar_of(e.radiance * direction_map(e).integral());
     }
     return 0;
 }
 
-Rgb EmitterSet::emitted(const Emitter& e, const Vec3& normal, const Vec3& w) const {
+Rgb EmitterSet::emitted(const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w) const {
     switch (e.kind) {
         case EmitterKind::kTriangle:
-        case EmitterKind::kSphere: return e.two_sided || dot(normal, w) > 0 ? e.radiance : Rgb{};
+        case EmitterKind::kSphere: return e.two_sided || dot(normal, w) > 0 ? radiance_at(e, position) : Rgb{};
         case EmitterKind::kPoint: return e.radiance;
         case EmitterKind::kSpot: return e.radiance * spot_falloff(e, w);
         case EmitterKind::kDistant: return e.radiance;
         case EmitterKind::kEnvironment: return environment_.radiance(-w);
+        case EmitterKind::kProjection:
+        case EmitterKind::kGoniometric: return e.radiance * direction_map(e).intensity(w);
     }
     return {};
 }
@@ -89,6 +100,8 @@ float EmitterSet::pdf_direction(const Emitter& e, const Vec3& normal, const Vec3
         case EmitterKind::kSpot: return height_between(e.normal, w) <= e.total_height ? 1 / (kTwoPi * e.total_height) : 0;
         case EmitterKind::kDistant:
         case EmitterKind::kEnvironment: return disc_pdf_;
+        case EmitterKind::kProjection:
+        case EmitterKind::kGoniometric: return direction_map(e).pdf_solid_angle(w);
     }
     return 0;
 }
@@ -127,6 +140,11 @@ bool EmitterSet::sample_emission(double pick, Vec2 u_position, Vec2 u_direction,
             out->direction = out->normal = Frame(e.normal).to_world({r * float(sc.cos), r * float(sc.sin), z});
             break;
         }
+        case EmitterKind::kProjection:
+        case EmitterKind::kGoniometric:
+            out->position = e.position;
+            out->direction = out->normal = direction_map(e).sample(rest, u_direction);
+            break;
         case EmitterKind::kDistant:
         case EmitterKind::kEnvironment: {
             out->direction = e.kind == EmitterKind::kDistant ? e.normal : -environment_.sample(rest, u_position);
@@ -141,7 +159,7 @@ bool EmitterSet::sample_emission(double pick, Vec2 u_position, Vec2 u_direction,
     out->pdf_direction = pdf_direction(e, out->normal, out->direction);
     if (!(out->pdf_position > 0 && out->pdf_direction > 0)) return false;
     const float cosine = e.is_area() ? abs_dot(out->normal, out->direction) : 1;
-    out->alpha = emitted(e, out->normal, out->direction) * (cosine / (out->pdf_position * out->pdf_direction));
+    out->alpha = emitted(e, out->position, out->normal, out->direction) * (cosine / (out->pdf_position * out->pdf_direction));
     return !out->alpha.is_black();
 }
 
@@ -188,7 +206,7 @@ bool EmitterSet::sample_next_event(const Vec3& reference, double pick, Vec2 u, N
         out->pdf = pdf_next_event(e, reference, out->position, out->normal, out->wi);
         return out->pdf > 0;
     }
-    out->radiance = emitted(e, out->normal, -out->wi);
+    out->radiance = emitted(e, out->position, out->normal, -out->wi);
     return out->pdf > 0 && !out->radiance.is_black();
 }
 
@@ -209,7 +227,7 @@ bool EmitterSet::connect_point(const Vec3& reference, const Vec3& position, cons
         if (!e.is_area()) out->normal = -out->wi;
         out->geometry = (e.is_area() ? abs_dot(out->normal, out->wi) : 1.0f) / d2;
     }
-    out->radiance = emitted(e, out->normal, -out->wi);
+    out->radiance = emitted(e, out->position, out->normal, -out->wi);
     return out->geometry > 0 && !out->radiance.is_black();
 }
 

@@ -3,41 +3,46 @@
 // triangle is one emitter, all infinite lights together are one.
 //
 // The "native measure" of a point x_0 on an emitter: area (m^-2) for triangles and spheres, solid angle (sr^-1) of the
-// direction towards it for the environment, counting measure for point, spot and distant lights.
+// direction towards it for the environment, counting measure for all others.
 
 #include <cstdint>
 #include <vector>
 
 #include "common/scene/description.h"
 #include "common/scene/environment.h"
+#include "common/scene/light_map.h"
 #include "common/scene/sampling.h"
 
 namespace lightloom {
 
-enum class EmitterKind : uint8_t { kTriangle, kSphere, kPoint, kSpot, kDistant, kEnvironment };
+enum class EmitterKind : uint8_t { kTriangle, kSphere, kPoint, kSpot, kDistant, kEnvironment, kProjection, kGoniometric };
 
 struct Emitter {
     EmitterKind kind = EmitterKind::kTriangle;
     bool two_sided = false;
-    float pmf = 0;      ///< Of being selected, for light sub-paths and for next event alike (by power).
-    Rgb radiance;       ///< Radiance; intensity for point and spot; irradiance for distant; unused for environment.
-    Vec3 position;      ///< First corner, centre, or light position.
-    Vec3 edge1, edge2;  ///< kTriangle.
-    Vec3 normal;        ///< Unit; side that emits. Spot: axis. Distant: direction of travel.
-    float radius = 0;   ///< kSphere; negative-free. `inward` flips its emitting side.
+    float pmf = 0;        ///< Of being selected, for light sub-paths and for next event alike (by power).
+    int32_t map = kNone;  ///< Index of the map that multiplies `radiance`: SurfaceMap of area lights, DirectionMap of kProjection
+                          ///< and kGoniometric, which have one.
+    Rgb radiance;         ///< Radiance; intensity of lights at a point; irradiance for distant; unused for environment.
+    Vec3 position;        ///< First corner, centre, or light position.
+    Vec3 edge1, edge2;    ///< kTriangle.
+    Vec3 normal;          ///< Unit; side that emits. Spot: axis. Distant: direction of travel.
+    float radius = 0;     ///< kSphere; negative-free. `inward` flips its emitting side.
     bool inward = false;
     float inv_area = 0;
     float total_height = 0, falloff_height = 0;  ///< kSpot; see SpotLight.
     float reach = 0;                             ///< Area lights: largest coordinate magnitude; see offset_origin().
-    float clearance = 0;                         ///< Point and spot: see Scene::intersect().
+    float clearance = 0;                         ///< Of lamps that are points: see Scene::intersect().
+    bool hidden = false;                         ///< Area lights: no ray meets the surface, which only emits.
     int32_t light = 0;                           ///< Group for reports: the area-light shape or light source it came from.
 
     bool is_area() const { return kind == EmitterKind::kTriangle || kind == EmitterKind::kSphere; }
     bool is_infinite() const { return kind == EmitterKind::kDistant || kind == EmitterKind::kEnvironment; }
-    /// x_0 is the light itself: its native measure counts.
-    bool is_discrete() const { return kind == EmitterKind::kPoint || kind == EmitterKind::kSpot || kind == EmitterKind::kDistant; }
-    /// x_0 cannot be hit by chance: no technique with s = 0.
-    bool is_delta() const { return !is_area() && kind != EmitterKind::kEnvironment; }
+    bool has_direction_map() const { return kind == EmitterKind::kProjection || kind == EmitterKind::kGoniometric; }
+    /// x_0 is measured by counting: a point, or a single direction.
+    bool is_discrete() const { return !is_area() && kind != EmitterKind::kEnvironment; }
+    /// Whether a camera sub-path can find x_0 by itself. If not, there is no technique with s = 0.
+    bool can_be_hit() const { return is_area() ? !hidden : kind == EmitterKind::kEnvironment; }
 };
 
 /// Start of a light sub-path: x_0 and the ray towards x_1.
@@ -57,17 +62,23 @@ struct NextEventSample {
     Vec3 position;       ///< Point on a finite light; for infinite ones a point beyond the scene to test visibility to.
     Vec3 normal;         ///< At x_0, geometric; for infinite lights the direction of travel.
     Vec3 wi;             ///< Unit, from the reference point to the light.
-    Rgb radiance;        ///< Emitted towards the reference point (intensity for point and spot, irradiance for distant).
+    Rgb radiance;        ///< Emitted towards the reference point (intensity for lights at a point, irradiance for distant).
     float geometry = 0;  ///< Converts a solid-angle density at the reference point to the native measure: |cos| / d^2 for
-                         ///< area lights, 1 / d^2 for point and spot, 1 for infinite.
+                         ///< area lights, 1 / d^2 for lights at a point, 1 for infinite.
     float pdf = 0;       ///< Native measure, pmf included.
+};
+
+/// What Emitter::map stands for.
+struct LightMaps {
+    std::vector<SurfaceMap> surfaces;
+    std::vector<DirectionMap> directions;
 };
 
 class EmitterSet {
   public:
     EmitterSet() = default;
     /// `emitters` without their pmf; `centre` and `radius` of the sphere around the scene, for infinite lights.
-    EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius);
+    EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius, LightMaps maps = {});
 
     bool empty() const { return emitters_.empty(); }
     const std::vector<Emitter>& all() const { return emitters_; }
@@ -90,13 +101,14 @@ class EmitterSet {
     /// Connects `reference` to a given x_0 of emitter `out->emitter`: `position` on a finite light, `travel` the direction of
     /// travel of an infinite one, `normal` that of an area light. Fills in the rest of `out` but for pdf. False as above.
     bool connect_point(const Vec3& reference, const Vec3& position, const Vec3& normal_or_travel, NextEventSample* out) const;
-    /// Radiance (or intensity, irradiance) leaving x_0 of emitter `e` along `w` (unit, away from the light); `normal` is the
-    /// geometric normal at x_0 on the emitting side. The environment looks its map up in -w.
-    Rgb emitted(const Emitter& e, const Vec3& normal, const Vec3& w) const;
+    /// Radiance (or intensity, irradiance) leaving x_0 of emitter `e` along `w` (unit, away from the light); `position` is x_0, and
+    /// `normal` the geometric normal there on the emitting side. The environment looks its map up in -w.
+    Rgb emitted(const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w) const;
     /// The part of emitted() that belongs to x_0 alone, F(1) of a light prefix: radiance of area lights and of the environment
-    /// along `w`, intensity on a spot's axis.
-    Rgb strength(const Emitter& e, const Vec3& w) const {
-        return e.kind == EmitterKind::kEnvironment ? environment_.radiance(-w) : e.radiance;
+    /// along `w`, intensity on a spot's axis, or the mean over an image.
+    Rgb strength(const Emitter& e, const Vec3& position, const Vec3& w) const {
+        if (e.kind == EmitterKind::kEnvironment) return environment_.radiance(-w);
+        return e.has_direction_map() ? e.radiance * direction_map(e).mean() : radiance_at(e, position);
     }
     /// pL of x_0: density of sample_emission() for the point, native measure, pmf included. `w` as above (environment).
     float pdf_position(const Emitter& e, const Vec3& w) const;
@@ -107,9 +119,15 @@ class EmitterSet {
     float pdf_next_event(const Emitter& e, const Vec3& reference, const Vec3& position, const Vec3& normal, const Vec3& wi) const;
 
   private:
+    const DirectionMap& direction_map(const Emitter& e) const { return maps_.directions[size_t(e.map)]; }
+    Rgb radiance_at(const Emitter& e, const Vec3& position) const {
+        return e.map == kNone ? e.radiance : e.radiance * maps_.surfaces[size_t(e.map)].at(e, position);
+    }
+
     std::vector<Emitter> emitters_;
     AliasTable pick_;
     Environment environment_;
+    LightMaps maps_;
     int32_t environment_index_ = kNone;
     Vec3 centre_;
     float scene_radius_ = 1, disc_pdf_ = 0;

@@ -28,6 +28,15 @@ struct Image {
         if (channels == 1) return Rgb(channel(x, y, 0));
         return {channel(x, y, 0), channel(x, y, 1), channel(x, y, 2)};
     }
+    /// Of an image that is not empty.
+    Rgb mean() const {
+        double sum[3] = {};
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x)
+                for (int c = 0; c < 3; ++c) sum[c] += double(channel(x, y, channels == 1 ? 0 : c));
+        const double n = double(width) * height;
+        return {float(sum[0] / n), float(sum[1] / n), float(sum[2] / n)};
+    }
 };
 
 }  // namespace lightloom

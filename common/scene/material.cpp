@@ -73,7 +73,7 @@ Bsdf resolve_material(const TextureTables& tables, MaterialId material, const Te
     const float alpha_y = m.roughness_v == m.roughness_u ? alpha_x : alpha(tables, m.roughness_v, at, m.remap_roughness);
     switch (m.kind) {
         case MaterialKind::kConductor: {
-            const ConductorIndex index = conductor_index(tables, m, uv);
+            const ConductorIndex index = conductor_index(tables, m, at);
             return make_conductor(index.eta, index.k, alpha_x, alpha_y);
         }
         case MaterialKind::kDielectric: return make_dielectric(ior, alpha_x, alpha_y);
@@ -81,7 +81,7 @@ Bsdf resolve_material(const TextureTables& tables, MaterialId material, const Te
             return make_coated_diffuse(reflectance(tables, m.reflectance, at, Rgb(0.5f)), ior, m.thickness, alpha_x, alpha_y,
                                        (m.layer_events + 1) / 2);
         case MaterialKind::kCoatedConductor: {
-            const ConductorIndex index = conductor_index(tables, m, uv);
+            const ConductorIndex index = conductor_index(tables, m, at);
             return make_coated_conductor(index.eta, index.k, alpha(tables, m.base_roughness_u, at, m.remap_roughness),
                                          alpha(tables, m.base_roughness_v, at, m.remap_roughness), ior, m.thickness, alpha_x,
                                          alpha_y);

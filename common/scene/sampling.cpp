@@ -85,6 +85,25 @@ Vec2 sample_triangle(Vec2 u) {
     return {u.x - y, y};
 }
 
+std::vector<double> projected_solid_angles(int columns, int rows, double half_width, double half_height) {
+    // Of the rectangle from the axis to (x, y), signed; a cell's is the sum over its corners.
+    const auto to_corner = [](double x, double y) { return math::atan(x * y / std::sqrt(1 + x * x + y * y)); };
+    std::vector<double> above(size_t(columns) + 1), below(above.size()), out;
+    const auto fill = [&](std::vector<double>& line, int row) {
+        for (int i = 0; i <= columns; ++i)
+            line[size_t(i)] = to_corner(half_width * (2.0 * i / columns - 1), half_height * (1 - 2.0 * row / rows));
+    };
+    out.reserve(size_t(columns) * size_t(rows));
+    fill(above, 0);
+    for (int row = 0; row < rows; ++row) {
+        fill(below, row + 1);
+        for (size_t i = 0; i < size_t(columns); ++i)
+            out.push_back(std::fmax(above[i + 1] - above[i] - below[i + 1] + below[i], 0.0));
+        above.swap(below);
+    }
+    return out;
+}
+
 Vec3 equal_area_square_to_sphere(Vec2 p) {
     const double u = 2.0 * p.x - 1, v = 2.0 * p.y - 1;
     const double up = std::fabs(u), vp = std::fabs(v);

@@ -60,6 +60,10 @@ Vec3 sample_cosine_hemisphere_concentric(Vec2 u);
 /// Uniform barycentric weights (b1, b2) of a triangle.
 Vec2 sample_triangle(Vec2 u);
 
+/// Solid angles, sr, of columns x rows equal cells of [-half_width, half_width] x [-half_height, half_height] at distance 1, row by
+/// row.
+std::vector<double> projected_solid_angles(int columns, int rows, double half_width, double half_height);
+
 /// Equal-area octahedral mapping between [0,1]^2 and the sphere [Clarberg 2008], pbrt-v4's orientation.
 Vec3 equal_area_square_to_sphere(Vec2 p);
 Vec2 equal_area_sphere_to_square(const Vec3& d);

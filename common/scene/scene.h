@@ -32,7 +32,7 @@ struct SceneSummary {
     uint64_t texture_count = 0, image_bytes = 0, geometry_bytes = 0, acceleration_bytes = 0;
     double build_seconds = 0;
     struct Light {
-        std::string kind;   ///< area, point, spot, distant, infinite
+        std::string kind;   ///< area, point, spot, distant, infinite, projection, goniometric
         std::string where;  ///< file:line where known
         double power = 0;   ///< Flux, W, as luminance within 0.1 %; in these proportions lights are selected.
         uint64_t primitives = 0;
@@ -85,7 +85,7 @@ class Scene {
 
   private:
     Scene() = default;
-    void collect_emitters(std::vector<Emitter>* emitters);
+    void collect_emitters(std::vector<Emitter>* emitters, LightMaps* maps);
     /// Largest coordinate magnitude of everything in the scene.
     float largest_reach(const Bounds3& bounds) const;
     Status find_contacts(std::vector<Emitter>* emitters, float largest);

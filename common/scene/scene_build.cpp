@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
 
 #include "common/scene/scene.h"
 
@@ -43,7 +44,7 @@ std::vector<uint8_t> tilting_materials(const std::vector<Material>& materials) {
 
 }  // namespace
 
-void Scene::collect_emitters(std::vector<Emitter>* emitters) {
+void Scene::collect_emitters(std::vector<Emitter>* emitters, LightMaps* maps) {
     const auto new_light = [&](const std::string& source, const char* fallback = "") {
         light_sources_.push_back(source.empty() ? fallback : source);
         return int32_t(light_sources_.size()) - 1;
@@ -54,12 +55,12 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
         e.light = new_light(source, fallback);
         return e;
     };
-    // The emission of a shape or null, after a note where in `emitters` the shape's begin.
+    // The emission of a shape or null, after a note where in `emitters` the shape's begin, if a ray can meet it and will ask.
     const auto area_emission = [&](const ShapeAttributes& attributes, std::vector<int32_t>* first_emitter) {
         const AreaEmission* emission =
             attributes.emission != kNone ? &description_.emissions[size_t(attributes.emission)] : nullptr;
         if (emission && emission->radiance.is_black()) emission = nullptr;
-        first_emitter->push_back(emission ? int32_t(emitters->size()) : kNone);
+        if (first_emitter) first_emitter->push_back(emission ? int32_t(emitters->size()) : kNone);
         return emission;
     };
     const auto new_area_emitter = [&](EmitterKind kind, const AreaEmission& emission, const std::string& source) {
@@ -68,10 +69,21 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
         e.radiance = emission.radiance;
         return e;
     };
-    for (const TriangleMesh& mesh : description_.meshes) {
-        const AreaEmission* emission = area_emission(mesh.attributes, &mesh_first_emitter_);
-        if (!emission) continue;
+    // The index of a primitive's map, if its light has an image; `place` is what a SurfaceMap needs to know of the primitive.
+    std::map<int32_t, Rgb> image_means;
+    const auto add_map = [&](int32_t image, const auto& place) {
+        if (image == kNone) return kNone;
+        const Image& source = description_.images[size_t(image)];
+        const auto [mean, inserted] = image_means.try_emplace(image);
+        if (inserted) mean->second = source.mean();
+        maps->surfaces.push_back({source, mean->second, place});
+        return int32_t(maps->surfaces.size()) - 1;
+    };
+    const auto add_mesh = [&](const TriangleMesh& mesh, bool hidden) {
+        const AreaEmission* emission = area_emission(mesh.attributes, hidden ? nullptr : &mesh_first_emitter_);
+        if (!emission) return;
         Emitter e = new_area_emitter(EmitterKind::kTriangle, *emission, mesh.attributes.source);
+        e.hidden = hidden;
         for (size_t t = 0; t + 2 < mesh.indices.size(); t += 3) {
             const uint32_t* index = &mesh.indices[t];
             e.position = mesh.positions[index[0]];
@@ -88,20 +100,29 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
             // towards the interpolated one, which may differ within a triangle only for broken meshes.
             if (!mesh.normals.empty())
                 e.normal = face_forward(e.normal, mesh.normals[index[0]] + mesh.normals[index[1]] + mesh.normals[index[2]]);
+            Vec2 uv[3] = {{0, 0}, {1, 0}, {1, 1}};
+            for (size_t i = 0; i < 3 && !mesh.uvs.empty(); ++i) uv[i] = mesh.uvs[index[i]];
+            e.map = add_map(emission->image, uv);
             emitters->push_back(e);
         }
-    }
-    for (const Sphere& s : description_.spheres) {
-        const AreaEmission* emission = area_emission(s.attributes, &sphere_emitter_);
-        if (!emission) continue;
+    };
+    const auto add_sphere = [&](const Sphere& s, bool hidden) {
+        const AreaEmission* emission = area_emission(s.attributes, hidden ? nullptr : &sphere_emitter_);
+        if (!emission) return;
         Emitter e = new_area_emitter(EmitterKind::kSphere, *emission, s.attributes.source);
+        e.hidden = hidden;
         e.position = s.centre;
         e.radius = s.radius;
         e.reach = largest_coordinate(s.centre) + s.radius;
         e.inward = s.attributes.flip_normal;
         e.inv_area = 1 / (4 * kPi * s.radius * s.radius);
+        e.map = add_map(emission->image, s.orientation);
         emitters->push_back(e);
-    }
+    };
+    for (const TriangleMesh& mesh : description_.meshes) add_mesh(mesh, false);
+    for (const Sphere& s : description_.spheres) add_sphere(s, false);
+    for (const TriangleMesh& mesh : description_.hidden_meshes) add_mesh(mesh, true);
+    for (const Sphere& s : description_.hidden_spheres) add_sphere(s, true);
     for (const PointLight& l : description_.point_lights) {
         Emitter e = new_emitter(EmitterKind::kPoint, l.source, "point light");
         e.position = l.position;
@@ -115,6 +136,18 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
         e.radiance = l.intensity;
         e.total_height = l.total_height;
         e.falloff_height = l.falloff_height;
+        emitters->push_back(e);
+    }
+    for (const ImageLight& l : description_.image_lights) {
+        const bool projection = l.kind == ImageLight::Kind::kProjection;
+        const Image& image = description_.images[size_t(l.image)];
+        Emitter e = new_emitter(projection ? EmitterKind::kProjection : EmitterKind::kGoniometric, l.source,
+                                projection ? "projection light" : "goniometric light");
+        e.position = l.position;
+        e.radiance = l.intensity;
+        e.map = int32_t(maps->directions.size());
+        maps->directions.push_back(projection ? DirectionMap::projection(image, l.light_to_world, l.half_width, l.half_height)
+                                              : DirectionMap::goniometric(image, l.light_to_world));
         emitters->push_back(e);
     }
     for (const DistantLight& l : description_.distant_lights) {
@@ -135,8 +168,12 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters) {
 float Scene::largest_reach(const Bounds3& bounds) const {
     float reach = largest_coordinate(description_.camera.camera_to_world.point({0, 0, 0}));
     if (!bounds.empty()) reach = std::max({reach, largest_coordinate(bounds.lo), largest_coordinate(bounds.hi)});
+    for (const TriangleMesh& mesh : description_.hidden_meshes)
+        for (const Vec3& p : mesh.positions) reach = std::max(reach, largest_coordinate(p));
+    for (const Sphere& s : description_.hidden_spheres) reach = std::max(reach, largest_coordinate(s.centre) + s.radius);
     for (const PointLight& l : description_.point_lights) reach = std::max(reach, largest_coordinate(l.position));
     for (const SpotLight& l : description_.spot_lights) reach = std::max(reach, largest_coordinate(l.position));
+    for (const ImageLight& l : description_.image_lights) reach = std::max(reach, largest_coordinate(l.position));
     return reach;
 }
 
@@ -145,7 +182,7 @@ Status Scene::find_contacts(std::vector<Emitter>* emitters, float largest) {
     const ContactFinder contacts(description_, *accel_, instance_inverse_, largest);
     camera_clearance_ = contacts.clearance(camera_.position());
     for (Emitter& e : *emitters)
-        if (e.is_delta() && !e.is_infinite()) e.clearance = contacts.clearance(e.position);
+        if (e.is_discrete() && !e.is_infinite()) e.clearance = contacts.clearance(e.position);
     const auto emits = [&](uint32_t mesh) { return mesh_first_emitter_[mesh] != kNone; };
     covered_ = contacts.cover(emitters, emits);
     if (!covered_.any) return {};
@@ -192,6 +229,7 @@ Result<std::unique_ptr<Scene>> Scene::build(SceneDescription description, const 
         }
     };
     prepare(d.meshes);
+    prepare(d.hidden_meshes);
     for (ObjectDefinition& o : d.objects) prepare(o.meshes);
     scene->tables_ = {d.textures, d.images, d.materials, d.texture_spaces};
     scene->tilts_ = tilting_materials(d.materials);
@@ -213,13 +251,14 @@ Result<std::unique_ptr<Scene>> Scene::build(SceneDescription description, const 
     const float largest = scene->largest_reach(bounds);
     scene->least_reach_ = std::min(largest, kSmallScene);
     std::vector<Emitter> emitters;
-    scene->collect_emitters(&emitters);
+    LightMaps maps;
+    scene->collect_emitters(&emitters, &maps);
     for (Emitter& e : emitters) e.reach = std::max(e.reach, scene->least_reach_);
     LL_RETURN_IF_ERROR(scene->find_contacts(&emitters, largest));
     const Vec3 centre = bounds.empty() ? Vec3{} : bounds.centre();
     // A little larger than the bounding sphere, so that rounding never starts a light sub-path inside of the scene.
     const float radius = bounds.empty() ? 1.0f : length(bounds.hi - centre) * 1.0001f + 1e-6f;
-    scene->emitters_ = EmitterSet(std::move(emitters), Environment(d.infinite_lights, d.images), centre, radius);
+    scene->emitters_ = EmitterSet(std::move(emitters), Environment(d.infinite_lights, d.images), centre, radius, std::move(maps));
 
     scene->summarise();
     scene->summary_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -250,7 +289,7 @@ void Scene::summarise() {
     s.texture_count = description_.textures.size();
     for (const Image& image : description_.images) s.image_bytes += image.memory_bytes();
     s.acceleration_bytes = accel_->memory_bytes();
-    static constexpr const char* kKinds[] = {"area", "area", "point", "spot", "distant", "infinite"};
+    static constexpr const char* kKinds[] = {"area", "area", "point", "spot", "distant", "infinite", "projection", "goniometric"};
     s.lights.resize(light_sources_.size());
     for (const Emitter& e : emitters_.all()) {
         SceneSummary::Light& light = s.lights[size_t(e.light)];

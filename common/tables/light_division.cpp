@@ -30,7 +30,9 @@ Vec2 emitter_coordinates(const Emitter& e, const Vec3& position, const Vec3& w) 
         case EmitterKind::kEnvironment: return equal_area_sphere_to_square(-w);
         case EmitterKind::kPoint:
         case EmitterKind::kSpot:
-        case EmitterKind::kDistant: return {};
+        case EmitterKind::kDistant:
+        case EmitterKind::kProjection:
+        case EmitterKind::kGoniometric: return {};
     }
     return {};
 }

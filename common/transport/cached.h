@@ -64,7 +64,7 @@ struct CachedAlgorithm {
             PathVertex z0;
             Vec2 film;
             z0.p = scene.camera().sample_lens(lens_sample);
-            const Rgb c = connect_to_camera(scene, y, s, z0.p, &film, &view, &chunk.counters);
+            const Rgb c = connect_to_camera(scene, y, s, &z0.p, &film, &view, &chunk.counters);
             if (c.is_black()) return;
             method.complete(scene, y, s, &z0, 1, normalize(y[s - 1].p - z0.p), &view);
             const PathContribution found = from_light_path(c, Technique::lens(s), y, &z0, 1, film);

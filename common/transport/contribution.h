@@ -110,7 +110,7 @@ void contribute_to_lens(const Scene& scene, LightSampler& sampler, const PathVer
         if (!y[s - 1].bsdf.has_smooth_lobe()) continue;
         Vec2 film;
         z[0].p = scene.camera().sample_lens(sampler.rng().uniform2());
-        const Rgb value = connect_to_camera(scene, y, s, z[0].p, &film, view, counters);
+        const Rgb value = connect_to_camera(scene, y, s, &z[0].p, &film, view, counters);
         if (!value.is_black()) contribute(from_light_path(value, Technique::lens(s), y, z, 1, film), *view);
     }
 }

@@ -242,7 +242,7 @@ TEST(Reducer, WithoutAPartialThereIsNoImage) {
     EXPECT_EQ(reducer.folded_groups(), 0u);
     EXPECT_EQ(reducer.iterations(), 0u);
     EXPECT_EQ(reducer.dropped(), 0u);
-    EXPECT_EQ(reducer.image(1).status().code(), StatusCode::kFailedPrecondition);
+    EXPECT_EQ(reducer.image().status().code(), StatusCode::kFailedPrecondition);
 }
 
 TEST(Reducer, AGroupThatDoesNotFitTheSumsIsAnError) {

@@ -95,7 +95,7 @@ TEST(Furnace, WhiteSphereInConstantEnvironment) {
 
 /// Form factor of two parallel unit squares, facing at distance d [Howell, A Catalog of Radiation
 /// Heat Transfer Configuration Factors, C-11].
-double facing_squares(double d) {
+double facing_squares_form_factor(double d) {
     const double x = 1 / d, x1 = 1 + x * x;
     return 2 / (kPiD * x * x) *
            (std::log(std::sqrt(x1 * x1 / (1 + 2 * x * x))) + 2 * x * std::sqrt(x1) * std::atan(x / std::sqrt(x1)) -
@@ -103,17 +103,18 @@ double facing_squares(double d) {
 }
 
 /// A square lamp facing a white square that fills the frame exactly: its mean radiance is L albedo
-/// F.
-TEST(Analytic, FacingSquares) {
+/// F. So it is if no ray meets the lamp.
+void facing_squares(bool hidden) {
     TestFamily family;
     const float d = 1.5f;
     SceneBuilder b;
     b.description().film.width = b.description().film.height = 16;
     b.quad({-0.5f, -0.5f, 0}, {1, 0, 0}, {0, 1, 0}, b.diffuse(Rgb(0.0f)), b.emission(Rgb(3.0f)));
+    if (hidden) b.hide_quad();
     b.quad({-0.5f, -0.5f, d}, {0, 1, 0}, {1, 0, 0}, b.diffuse(Rgb(0.8f)));
     b.look({0, 0, d / 2}, {0, 0, d}, float(2 * std::atan(0.5 / (d / 2)) * 180 / kPiD));
     const auto scene = b.build();
-    const double expected = 3 * 0.8 * facing_squares(d);
+    const double expected = 3 * 0.8 * facing_squares_form_factor(d);
     const auto expect = [&](const testing::ImageOfSeed& image, const std::string& what) {
         const RegionMeans means = testing::replicate(image, scene->frame().crop, kSeeds, 8000);
         EXPECT_LT(means.frame().relative_error(), 0.005) << what;
@@ -128,17 +129,20 @@ TEST(Analytic, FacingSquares) {
     }
     family.check();
 }
+TEST(Analytic, FacingSquares) { facing_squares(false); }
+TEST(Analytic, FacingSquaresWithAHiddenLamp) { facing_squares(true); }
 
 /// A sphere wholly above the horizon of a plane: irradiance pi L (r / d)^2 cos(theta) at distance d
-/// of its centre.
-TEST(Analytic, SphereOverPlane) {
+/// of its centre. If no ray meets it and it shines to both sides, its far side's inner face shines through the near side.
+void sphere_over_plane(bool hidden) {
     TestFamily family;
     SceneBuilder b;
     b.description().film.width = b.description().film.height = 16;
     const Vec3 centre{0.3f, 1.0f, 0.2f};
     const double radius = 0.4;
     b.quad({-2, 0, -2}, {0, 0, 4}, {4, 0, 0}, b.diffuse(Rgb(0.6f)));
-    b.sphere(centre, float(radius), b.diffuse(Rgb(0.0f)), b.emission(Rgb(2.0f)));
+    b.sphere(centre, float(radius), b.diffuse(Rgb(0.0f)), b.emission(Rgb(hidden ? 1.0f : 2.0f), hidden));
+    if (hidden) b.hide_sphere();
     b.description().camera.camera_to_world = *inverse(*look_at({0, 0.5f, 0}, {0, 0, 0}, {0, 0, 1}));
     b.description().camera.fov_degrees = 90;  // sees [-0.5, 0.5]^2 of the plane, from below the sphere
     const auto scene = b.build();
@@ -154,12 +158,14 @@ TEST(Analytic, SphereOverPlane) {
     for (const AlgorithmInfo* row : catalog()) {
         const std::string algorithm(row->name);
         const RegionMeans means =
-            testing::replicate(testing::catalog_image(scene, algorithm, 1, 128), scene->frame().crop, kSeeds, 9000);
+            testing::replicate(testing::catalog_image(scene, algorithm, 1, hidden ? 256 : 128), scene->frame().crop, kSeeds, 9000);
         EXPECT_LT(means.frame().relative_error(), 0.005) << algorithm;
         family.add(testing::one_sample_p_value(means.frame(), expected), algorithm);
     }
     family.check();
 }
+TEST(Analytic, SphereOverPlane) { sphere_over_plane(false); }
+TEST(Analytic, HiddenSphereOverPlane) { sphere_over_plane(true); }
 
 /// The furnaces of the shared scenes, through the importer and at their own depth of 100 bounces: 1
 /// everywhere.

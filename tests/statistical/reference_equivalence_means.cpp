@@ -22,8 +22,8 @@ Result<Rendering> render_groups(const Scene& scene, const RenderGroup& render, d
                                 const std::function<bool(const Rendering&)>& settled) {
     constexpr uint32_t kIterations = 2, kLeastGroups = 16;
     const FrameLayout frame = scene.frame();
-    const float exposure = scene.description().film.exposure_scale;
-    GroupedSum total(frame);
+    const FilmResponse response = scene.description().film.response;
+    GroupedSum total(frame, response);
     Rendering result;
     const auto start = std::chrono::steady_clock::now();
     for (uint32_t group = 0;; ++group) {
@@ -34,16 +34,16 @@ Result<Rendering> render_groups(const Scene& scene, const RenderGroup& render, d
         LL_RETURN_IF_ERROR(total.add(*partial));
         const Result<GroupSum> sum = total.fold(kIterations);
         if (!sum.ok()) return sum.status();
-        Accumulation alone(frame);
+        Accumulation alone(frame, response);
         LL_RETURN_IF_ERROR(alone.fold(*sum, kIterations));
-        const PartMeans means = part_means(alone.develop(exposure));
+        const PartMeans means = part_means(alone.develop());
         for (size_t part = 0; part < means.size(); ++part) result.parts[part].add(means[part], kIterations);
         result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         if (group + 1 >= kLeastGroups && (result.seconds >= seconds || settled(result))) break;
     }
     result.iterations = total.complete().iterations();
     result.dropped = total.complete().dropped();
-    result.picture = total.complete().develop(exposure);
+    result.picture = total.complete().develop();
     return result;
 }
 

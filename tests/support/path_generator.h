@@ -32,8 +32,8 @@ inline void for_each_path(const Scene& scene, int count, int max_edges, uint64_t
         for (int s = 2; s <= n; ++s) {
             if (!y[size_t(s - 1)].bsdf.has_smooth_lobe()) continue;
             Vec2 film;
-            const Vec3 lens = scene.camera().sample_lens(rng.uniform2());
-            const Rgb c = connect_to_camera(scene, y.data(), s, lens, &film, &view, &counters);
+            Vec3 lens = scene.camera().sample_lens(rng.uniform2());
+            const Rgb c = connect_to_camera(scene, y.data(), s, &lens, &film, &view, &counters);
             if (c.is_black()) continue;
             PathVertex z0;
             z0.p = lens;

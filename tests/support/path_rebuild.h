@@ -98,10 +98,10 @@ inline std::optional<std::vector<PathVertex>> rebuild_light(const Scene& scene, 
     ray.pdf = emitters.pdf_direction(e, y0.ng, first);
     if (!(y0.fwd > 0 && ray.pdf > 0)) return std::nullopt;
     ray.from_infinite = e.is_infinite();
-    ray.previous_hittable = !e.is_delta();
+    ray.previous_hittable = e.can_be_hit();
     const float cosine = e.is_area() ? abs_dot(y0.ng, first) : 1;
-    ray.alpha = emitters.emitted(e, y0.ng, first) * (cosine / float(y0.fwd * ray.pdf));
-    y0.alpha = emitters.strength(e, first) / float(y0.fwd);
+    ray.alpha = emitters.emitted(e, y0.p, y0.ng, first) * (cosine / float(y0.fwd * ray.pdf));
+    y0.alpha = emitters.strength(e, y0.p, first) / float(y0.fwd);
     y0.survival = 1;
     y0.label = y0.reverse_label = kNoLabel;
     y0.reverse_branch = 0;
@@ -131,7 +131,7 @@ inline std::optional<std::vector<PathVertex>> rebuild_camera(const Scene& scene,
     std::vector<PathVertex> z(1);
     z[0].p = path.lens;
     z[0].alpha = Rgb(1.0f);
-    WalkRay ray{path.lens, first, Rgb(1.0f), pdf, false, true};
+    WalkRay ray{path.lens, first, Rgb(1.0f), pdf, scene.camera().has_parallel_rays(), true};
     for (int j = 1; j < t; ++j) {
         const PathVertex& x = path.x[size_t(k - j)];
         PathVertex v;
@@ -191,7 +191,7 @@ inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, 
     Vec3 towards;  // from z_{t-1} to x_{s-1}
     switch (technique.kind) {
         case TechniqueKind::kHit: {
-            if (e.is_delta()) return std::nullopt;
+            if (!e.can_be_hit()) return std::nullopt;
             WalkRay ray;
             z = rebuild_camera(scene, path, path.infinite ? k : k + 1, &ray, path.infinite);
             if (!z) return std::nullopt;
@@ -210,7 +210,7 @@ inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, 
             light.wi = towards = path.infinite ? -path.x[0].ng : normalize(path.x[0].p - ref.p);
             light.position = path.infinite ? ref.p + light.wi * (2 * scene.emitters().scene_radius()) : path.x[0].p;
             light.normal = e.is_area() ? path.x[0].ng : -light.wi;
-            light.radiance = scene.emitters().emitted(e, light.normal, -light.wi);
+            light.radiance = scene.emitters().emitted(e, light.position, light.normal, -light.wi);
             light.geometry = e.is_infinite()
                                  ? 1.0f
                                  : (e.is_area() ? abs_dot(light.normal, light.wi) : 1.0f) / length_squared(light.position - ref.p);
@@ -238,7 +238,7 @@ inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, 
             (*z)[0].p = path.lens;
             towards = normalize(y->back().p - path.lens);
             Vec2 film;
-            r.contribution = connect_to_camera(scene, y->data(), k, path.lens, &film, &r.view, &counters);
+            r.contribution = connect_to_camera(scene, y->data(), k, &(*z)[0].p, &film, &r.view, &counters);
             break;
         }
         case TechniqueKind::kMerge: {

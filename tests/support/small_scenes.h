@@ -67,6 +67,9 @@ class SceneBuilder {
         description_.spheres.push_back(std::move(s));
         return description_.spheres.back();
     }
+    /// Makes the last quad a surface that emits and is nothing else, or the last sphere.
+    TriangleMesh& hide_quad() { return move_last(description_.meshes, description_.hidden_meshes); }
+    Sphere& hide_sphere() { return move_last(description_.spheres, description_.hidden_spheres); }
     void look(const Vec3& eye, const Vec3& target, float fov) {
         description_.camera.camera_to_world = *inverse(*look_at(eye, target, {0, 1, 0}));
         description_.camera.fov_degrees = fov;
@@ -78,6 +81,13 @@ class SceneBuilder {
     }
 
   private:
+    template <class Shape>
+    static Shape& move_last(std::vector<Shape>& from, std::vector<Shape>& to) {
+        to.push_back(std::move(from.back()));
+        from.pop_back();
+        return to.back();
+    }
+
     SceneDescription description_;
 };
 

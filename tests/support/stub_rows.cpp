@@ -56,7 +56,7 @@ struct StubMerging {
             PathVertex z0;
             Vec2 film;
             z0.p = scope.scene.camera().sample_lens(lens_sample);
-            const Rgb c = connect_to_camera(scope.scene, y, s, z0.p, &film, &view, &chunk.counters);
+            const Rgb c = connect_to_camera(scope.scene, y, s, &z0.p, &film, &view, &chunk.counters);
             if (c.is_black()) return;
             const PathContribution found = from_light_path(c, Technique::lens(s), y, &z0, 1, film);
             contribute(found, view, weight(state, view, found.technique), m, chunk);

@@ -59,6 +59,22 @@ inline std::shared_ptr<const Scene> delta_lights() {
     spot.total_height = 0.3f, spot.falloff_height = 0.1f;
     b.description().spot_lights.push_back(spot);
     b.description().distant_lights.push_back({normalize(Vec3{0.2f, -1, 0.1f}), {2, 2, 2}});
+    Image picture;
+    picture.width = picture.height = 4;
+    for (int i = 0; i < 16; ++i)
+        picture.floats.insert(picture.floats.end(), {float(i % 3), 0.5f + 0.5f * float(i % 2), i == 5 ? 6.0f : 0.5f});
+    b.description().images.push_back(picture);
+    ImageLight projector, lamp;
+    projector.position = {-0.7f, 1.5f, -0.6f};
+    projector.light_to_world = *inverse(*look_at(projector.position, {0.3f, 0.5f, 0.8f}, {0, 1, 0}));
+    projector.half_width = 0.4f, projector.half_height = 0.5f;
+    projector.intensity = {4, 4, 3};
+    lamp.kind = ImageLight::Kind::kGoniometric;
+    lamp.position = {-0.2f, 1.2f, 0.5f};
+    lamp.light_to_world = rotation(40, 1, 1, 0);
+    lamp.intensity = {0.5f, 0.4f, 0.6f};
+    projector.image = lamp.image = 0;
+    b.description().image_lights = {projector, lamp};
     return b.build();
 }
 
@@ -147,7 +163,7 @@ inline std::shared_ptr<const Scene> textured_and_two_sided() {
 }
 
 /// What a pbrt scene is made of: an object shown twice (once mirrored and stretched), a curtain with holes from a texture, a floor
-/// with an image, a rough coat over metal.
+/// with an image, a rough coat over metal; seen all around.
 inline std::shared_ptr<const Scene> instances_and_cutouts() {
     SceneBuilder b = cornell_builder();
     Image picture;
@@ -189,6 +205,8 @@ inline std::shared_ptr<const Scene> instances_and_cutouts() {
     b.description().objects.push_back(std::move(object));
     b.description().instances.push_back({0, translation(-0.5, 0.2, 0.5), "first"});
     b.description().instances.push_back({0, translation(0.2, 1.0, 0.4) * scaling(-0.8f, 1.5f, 0.6f), "mirrored"});
+    b.description().camera.camera_to_world = *inverse(*look_at({0.1f, 1, -0.6f}, {0, 0.8f, 1}, {0.2f, 1, 0}));
+    b.description().camera.kind = CameraKind::kEqualArea;
     return b.build();
 }
 
@@ -262,6 +280,40 @@ inline std::shared_ptr<const Scene> spherical_lights() {
     b.quad({-1.5f, 0, -1.5f}, {0, 0, 3}, {3, 0, 0}, white);
     b.sphere({0.4f, 0.4f, 0.3f}, 0.4f, white);
     b.look({0, 1.2f, -2}, {0, 0.6f, 0}, 60);
+    return b.build();
+}
+
+/// Lamps that no ray meets, hanging in front of the camera: a square that shines down, and a sphere that shines to both sides and
+/// has a ball inside of it. Lamps whose light an image gives: a screen on the wall, a sphere, and a square that no ray meets. Seen
+/// by parallel rays that start in the middle of the box.
+inline std::shared_ptr<const Scene> hidden_and_pictured_lamps() {
+    SceneBuilder b = cornell_builder();
+    b.description().emissions[0].radiance = {2, 2, 3};
+    const MaterialId white = b.diffuse(Rgb(0.5f));
+    b.quad({-0.2f, 1.3f, -0.5f}, {0.5f, 0, 0}, {0, 0.1f, 0.5f}, white, b.emission({4, 3, 2}));
+    b.hide_quad();
+    b.sphere({0.4f, 1.2f, 0.3f}, 0.3f, white, b.emission({2, 3, 1}, true));
+    b.hide_sphere();
+    b.sphere({0.4f, 1.15f, 0.3f}, 0.12f, b.diffuse({0.6f, 0.3f, 0.4f}));
+
+    Image picture;
+    picture.width = 5, picture.height = 4;
+    for (int i = 0; i < 20; ++i)
+        picture.floats.insert(picture.floats.end(), {0.5f * float(i % 3), 0.2f + 0.2f * float(i / 5), float(i == 7) * 4});
+    b.description().images.push_back(picture);
+    const auto emission = [&](const Rgb& radiance, bool two_sided) {
+        const int32_t id = b.emission(radiance, two_sided);
+        b.description().emissions[size_t(id)].image = 0;
+        return id;
+    };
+    b.quad({-0.9f, 0.4f, 0.9f}, {0, 0.9f, 0.05f}, {0.8f, 0, 0}, white, emission({3, 4, 5}, false)).uvs = {
+        {0, 0}, {0, 1}, {1, 1}, {1, 0}};
+    b.sphere({-0.5f, 1.1f, 0.2f}, 0.2f, white, emission({4, 3, 5}, false)).orientation = Frame(normalize(Vec3{1, 2, -1}));
+    b.quad({0.1f, 0.7f, -0.3f}, {0.5f, 0, 0}, {0, 0.2f, 0.5f}, white, emission({3, 2, 3}, true));
+    b.hide_quad();
+    CameraDescription& camera = b.description().camera;
+    camera.camera_to_world = *inverse(*look_at({0.1f, 1.1f, -0.6f}, {0, 0.8f, 1}, {0, 1, 0})) * scaling(0.8, 0.8, 0.8);
+    camera.kind = CameraKind::kOrthographic;
     return b.build();
 }
 
@@ -403,6 +455,7 @@ inline constexpr NamedScene kScenes[] = {
     {"textures_in_space", textures_in_space, "path light bdpt"},
     {"smooth_normals_and_lens", smooth_normals_and_lens, "path light bdpt"},
     {"spherical_lights", spherical_lights, "path light bdpt"},
+    {"hidden_and_pictured_lamps", hidden_and_pictured_lamps, "path light bdpt"},
     {"environment_lit", environment_lit, "path light bdpt"},
     {"delta_lights", delta_lights, "path light bdpt"},
     {"glass_and_mirror", glass_and_mirror, "path bdpt"},        // light: what is seen through glass is missing

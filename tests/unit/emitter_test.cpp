@@ -8,166 +8,25 @@
 
 #include "common/core/math.h"
 #include "common/core/rng.h"
+#include "emitter_cases.h"
 #include "tests/support/statistics.h"
 
 namespace lightloom {
 namespace {
 
+using testing::Case;
+using testing::cases;
+using testing::Cells;
+using testing::EnvironmentCase;
+using testing::flux;
+using testing::kCentre;
+using testing::kRadius;
+using testing::quarter_of;
+using testing::set_of;
+using testing::sphere;
+using testing::spot;
+
 constexpr int kSamples = 100000;
-
-Emitter triangle(bool two_sided) {
-    Emitter e;
-    e.kind = EmitterKind::kTriangle;
-    e.two_sided = two_sided;
-    e.radiance = {3, 2, 1};
-    e.position = {0.2f, 1, -0.3f};
-    e.edge1 = {0.8f, 0.1f, 0.2f};
-    e.edge2 = {-0.1f, 0.3f, 0.9f};
-    const Vec3 n = cross(e.edge1, e.edge2);
-    e.normal = normalize(n);
-    e.inv_area = 2 / length(n);
-    return e;
-}
-
-Emitter sphere(bool inward, bool two_sided = false) {
-    Emitter e;
-    e.kind = EmitterKind::kSphere;
-    e.inward = inward;
-    e.two_sided = two_sided;
-    e.radiance = {1, 2, 4};
-    e.position = {-0.5f, 0.4f, 0.7f};
-    e.radius = 0.6f;
-    e.inv_area = 1 / (4 * kPi * e.radius * e.radius);
-    return e;
-}
-
-Emitter point() {
-    Emitter e;
-    e.kind = EmitterKind::kPoint;
-    e.radiance = {5, 6, 7};
-    e.position = {0.1f, 0.2f, 0.3f};
-    return e;
-}
-
-Emitter spot() {
-    Emitter e = point();
-    e.kind = EmitterKind::kSpot;
-    e.normal = normalize(Vec3{0.3f, -1, 0.2f});
-    e.total_height = 0.4f, e.falloff_height = 0.2f;
-    return e;
-}
-
-Emitter distant() {
-    Emitter e;
-    e.kind = EmitterKind::kDistant;
-    e.radiance = {2, 3, 4};
-    e.normal = normalize(Vec3{0.2f, -0.7f, 0.5f});
-    return e;
-}
-
-Emitter environment() {
-    Emitter e;
-    e.kind = EmitterKind::kEnvironment;
-    return e;
-}
-
-/// 0 nothing, 1 constant, 2 image, 3 both (the image twice, rotated differently).
-struct EnvironmentCase {
-    std::vector<InfiniteLight> lights;
-    std::vector<Image> images;
-
-    explicit EnvironmentCase(int which) {
-        Image map;
-        map.width = map.height = 8;
-        for (int i = 0; i < 64; ++i)
-            map.floats.insert(map.floats.end(), {0.1f * float(i % 7), 0.3f * float(i % 2), float(i == 20) * 9});
-        images.push_back(map);
-        InfiniteLight image, constant, turned;
-        image.image = turned.image = 0;
-        image.light_to_world = rotation(40, 1, 1, 0);
-        turned.light_to_world = rotation(130, 0, 1, 0.3) * scaling(-1, 1, 1);
-        turned.radiance = {0.5f, 2, 0.1f};
-        constant.radiance = {0.2f, 0.3f, 0.1f};
-        if (which & 1) lights.push_back(constant);
-        if (which & 2) lights.push_back(image);
-        if (which == 3) lights.push_back(turned);
-    }
-    Environment make() const { return Environment(lights, images); }
-};
-
-constexpr Vec3 kCentre{0.5f, -0.25f, 1};
-constexpr float kRadius = 3;
-
-struct Case {
-    std::string name;
-    Emitter emitter;
-    int environment;
-};
-
-std::vector<Case> cases() {
-    return {{"triangle", triangle(false), 0},
-            {"two-sided triangle", triangle(true), 0},
-            {"sphere", sphere(false), 0},
-            {"two-sided sphere", sphere(false, true), 0},
-            {"inward sphere", sphere(true), 0},
-            {"point", point(), 0},
-            {"spot", spot(), 0},
-            {"distant", distant(), 0},
-            {"constant environment", environment(), 1},
-            {"image environment", environment(), 2},
-            {"mixed environment", environment(), 3}};
-}
-
-/// Total flux per channel, W.
-Rgb flux(const Case& c) {
-    const Emitter& e = c.emitter;
-    const float disc = kPi * kRadius * kRadius;
-    switch (e.kind) {
-        case EmitterKind::kTriangle:
-        case EmitterKind::kSphere: return e.radiance * (kPi / e.inv_area * (e.two_sided ? 2.0f : 1.0f));
-        case EmitterKind::kPoint: return e.radiance * (4 * kPi);
-        // The smoothstep between the two cosines averages one half.
-        case EmitterKind::kSpot: return e.radiance * (kPi * (e.total_height + e.falloff_height));
-        case EmitterKind::kDistant: return e.radiance * disc;
-        case EmitterKind::kEnvironment: break;
-    }
-    const EnvironmentCase source(c.environment);
-    Rgb sum;
-    for (const InfiniteLight& light : source.lights) {
-        Rgb mean = light.image == kNone ? Rgb(1.0f) : Rgb{};
-        if (light.image != kNone)
-            for (int i = 0; i < 64; ++i) mean += source.images[0].texel(i % 8, i / 8) / 64;
-        sum += light.radiance * mean * (4 * kPi * disc);
-    }
-    return sum;
-}
-
-/// A bin on a sphere of directions or on a disc: equal-area cells in (height, azimuth).
-struct Cells {
-    int rows, columns;
-    int count() const { return rows * columns; }
-    /// `height` in [0, 1), azimuth of (x, y).
-    int of(double height, double x, double y) const {
-        const int row = std::clamp(int(height * rows), 0, rows - 1);
-        const double turns = std::atan2(y, x) / (2 * kPiD) + 0.5;
-        return row * columns + std::clamp(int(turns * columns), 0, columns - 1);
-    }
-};
-
-/// Which cell of four equal parts a point of a triangle lies in.
-int quarter_of(const Emitter& e, const Vec3& p) {
-    const Vec3 n = cross(e.edge1, e.edge2), d = p - e.position;
-    const float n2 = length_squared(n), b1 = dot(cross(d, e.edge2), n) / n2, b2 = dot(cross(e.edge1, d), n) / n2;
-    return b1 > 0.5f ? 1 : b2 > 0.5f ? 2 : b1 + b2 < 0.5f ? 0 : 3;
-}
-
-/// A stand-in reference emitter keeps the pmf of the tested one away from 1, so that a missing pmf
-/// is noticed.
-EmitterSet set_of(const Case& c, const EnvironmentCase& source) {
-    Emitter other = point();
-    other.radiance = Rgb(40.0f);
-    return EmitterSet({c.emitter, other}, c.environment != 0 ? source.make() : Environment(), kCentre, kRadius);
-}
 
 TEST(Emission, IsDrawnWithItsDensities) {
     testing::TestFamily family;
@@ -244,12 +103,15 @@ TEST(Emission, IsDrawnWithItsDensities) {
                 if (e.is_infinite()) {
                     direction = double(set.pdf_direction(e, {}, e.normal)) * kPiD * kRadius * kRadius / direction_bins;
                 } else {
-                    const int n = 64;
-                    for (int i = 0; i < n; ++i) {
-                        const double z = 2 * (d / directions.columns + (i + 0.5) / n) / directions.rows - 1;
+                    // Only images depend on the azimuth.
+                    const int n = e.has_direction_map() ? 256 : 64, azimuths = e.has_direction_map() ? n : 1;
+                    for (int i = 0; i < n * azimuths; ++i) {
+                        const double z = 2 * (d / directions.columns + (i % n + 0.5) / n) / directions.rows - 1;
+                        const double turns = (d % directions.columns + (i / n + 0.5) / azimuths) / directions.columns - 0.5;
                         const Vec3 axis = e.is_area() ? Vec3{0, 0, 1} : e.kind == EmitterKind::kSpot ? e.normal : Vec3{0, 0, 1};
-                        const Vec3 w = Frame(axis).to_world({float(std::sqrt(1 - z * z)), 0, float(z)});
-                        direction += double(set.pdf_direction(e, axis, w)) * 4 * kPiD / (double(direction_bins) * n);
+                        const double r = std::sqrt(1 - z * z), angle = 2 * kPiD * turns;
+                        const Vec3 w = Frame(axis).to_world({float(r * std::cos(angle)), float(r * std::sin(angle)), float(z)});
+                        direction += double(set.pdf_direction(e, axis, w)) * 4 * kPiD / (double(direction_bins) * n * azimuths);
                     }
                 }
                 total += expected[size_t(p * direction_bins + d)] = position * direction;
@@ -269,9 +131,11 @@ TEST(Emission, CarriesTheAnalyticPower) {
     testing::TestFamily family;
     for (const Case& c : cases()) {
         const EnvironmentCase source(c.environment);
-        const EmitterSet set({c.emitter}, c.environment != 0 ? source.make() : Environment(), kCentre, kRadius);
+        const EmitterSet set({c.emitter}, c.environment != 0 ? source.make() : Environment(), kCentre, kRadius, c.maps);
         const Rgb expected = flux(c);
-        EXPECT_NEAR(set.power(set[0]) / scalar_of(expected), 1, 1e-4) << c.name;
+        // That of images is the sum of a rule.
+        const double tolerance = !c.maps.surfaces.empty() ? 1e-2 : !c.maps.directions.empty() ? 1e-3 : 1e-4;
+        EXPECT_NEAR(set.power(set[0]) / scalar_of(expected), 1, tolerance) << c.name;
         std::vector<double> groups[3];
         Rng rng({2, Stage::kTraining, 0, 0});
         for (int g = 0; g < 20; ++g) {
@@ -325,6 +189,14 @@ TEST(Emission, NarrowSpotsKeepTheirPower) {
     }
 }
 
+/// A camera may find by itself what has an extent and can be met; x_0 of the others has a density all the same.
+TEST(Emission, WhatCanBeHit) {
+    for (const Case& c : cases()) {
+        const bool named = c.name.find("hidden") != std::string::npos;
+        EXPECT_EQ(c.emitter.can_be_hit(), !c.emitter.is_discrete() && !named) << c.name;
+    }
+}
+
 /// Irradiance of a sphere, facing it: pi L (r / d)^2, down to a lamp of a millimetre seen from ten kilometres.
 TEST(NextEvent, FindsASphereHoweverSmallItLooks) {
     for (const double ratio : {2.0, 1e3, 1e5, 1e6, 1e7}) {
@@ -364,7 +236,7 @@ TEST(NextEvent, IsDrawnWithItsDensity) {
             // reference; texels.
             const Vec3 axis = round ? normalize(reference - e.position) : Vec3{0, 0, 1};
             const double distance = length(reference - e.position);
-            const bool cone = round && !e.inward && distance > e.radius;
+            const bool cone = round && !e.inward && !(e.hidden && e.two_sided) && distance > e.radius;
             // A cap from outside, all of the sphere from inside.
             const double lowest = cone ? e.radius / distance : -1;
             const Cells cap{12, 8};
@@ -405,7 +277,7 @@ TEST(NextEvent, IsDrawnWithItsDensity) {
             // refused.
             const auto density = [&](const Vec3& p, const Vec3& n) {
                 const Vec3 wi = normalize(p - reference);
-                return set.emitted(e, n, -wi).is_black() ? 0.0 : double(set.pdf_next_event(e, reference, p, n, wi));
+                return set.emitted(e, p, n, -wi).is_black() ? 0.0 : double(set.pdf_next_event(e, reference, p, n, wi));
             };
             for (int b = 0; b < bins; ++b) {
                 double sum = 0;
@@ -428,7 +300,7 @@ TEST(NextEvent, IsDrawnWithItsDensity) {
                         sum += double(set.pdf_next_event(e, reference, {}, {}, d)) * 4 * kPiD / (square * square * n * n);
                     }
                 } else {
-                    const bool lit = !set.emitted(e, {}, normalize(reference - e.position)).is_black();
+                    const bool lit = !set.emitted(e, e.position, {}, normalize(reference - e.position)).is_black();
                     sum = lit ? double(set.pdf_next_event(e, reference, e.position, {}, {})) : 0;
                 }
                 total += expected[size_t(b)] = sum * kSamples;

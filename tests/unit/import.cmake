@@ -1,5 +1,7 @@
 lightloom_test(import_test LINK lt_import)
 lightloom_test(import_shapes_test LINK lt_import)
+lightloom_test(import_film_test LINK lt_import)
+lightloom_test(import_lights_test LINK lt_import)
 lightloom_test(import_looks_test LINK lt_import)
 lightloom_test(import_textures_test LINK lt_import)
 lightloom_test(import_procedural_test LINK lt_import lt_scene)

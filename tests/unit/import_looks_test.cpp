@@ -12,6 +12,7 @@ namespace {
 using testing::expect_error;
 using testing::expect_warning;
 using testing::exr;
+using testing::FileMap;
 using testing::import_world;
 using testing::kShape;
 using testing::material_of;
@@ -185,15 +186,56 @@ TEST(ImportLight, AreaLights) {
     d = world("AreaLightSource \"diffuse\" \"float power\" 10 " + uneven);
     EXPECT_EQ(d.meshes.size(), 2u);
     EXPECT_EQ(d.emissions.size(), 2u);
-    expect_error("AreaLightSource \"diffuse\" \"string filename\" \"a.png\"" + kShape, {"images on area lights"});
     expect_error("AreaLightSource \"diffuse\" \"float strength\" 2" + kShape, {"strength"});
     // Also where no shape emits with it.
     expect_error("AreaLightSource \"diffuse\"\n\"float strength\" 2", {"scene.pbrt:4", "unknown parameter", "strength"});
     expect_error("AreaLightSource \"diffuse\" \"integer scale\" 2", {"wrong type", "float scale"});
     expect_error("AreaLightSource \"sphere\"", {"diffuse"});
-    expect_error("AreaLightSource \"diffuse\" Shape \"sphere\" \"float alpha\" 0", {"alpha 0"});
     expect_error("AreaLightSource \"diffuse\" Shape \"sphere\" \"float alpha\" 0.5", {"emitting shape with an alpha"});
     expect_error("AreaLightSource \"diffuse\" \"rgb L\" [1e30 1 1] \"float scale\" 1e30" + kShape, {"finite"});
+}
+
+TEST(ImportLight, AlphaZeroHidesTheShapeAndLeavesTheLight) {
+    const std::string light = "AreaLightSource \"diffuse\" \"float power\" 10 ";
+    const std::string quad = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 3 0 0 3 1 0 0 1 0] \"integer indices\" [0 1 2 0 2 3]";
+    const std::string zero = "Texture \"none\" \"float\" \"constant\" \"float value\" 0 ";
+    for (const std::string alpha : {" \"float alpha\" 0", " \"texture alpha\" \"none\""}) {
+        const SceneDescription d = world(zero + light + kShape + alpha + " " + quad + alpha);
+        EXPECT_TRUE(d.meshes.empty() && d.spheres.empty());
+        ASSERT_EQ(d.hidden_spheres.size(), 1u);
+        ASSERT_EQ(d.hidden_meshes.size(), 1u);
+        EXPECT_EQ(d.hidden_spheres[0].attributes.alpha, kNone);
+        EXPECT_NEAR(d.emissions.at(size_t(d.hidden_meshes[0].attributes.emission)).radiance.g, 10 / (3.14159265 * 1.5), 1e-5);
+    }
+    const SceneDescription dark = world("AreaLightSource \"diffuse\" \"rgb L\" [0 0 0]" + kShape + "\"float alpha\" 0");
+    EXPECT_TRUE(dark.spheres.empty() && dark.hidden_spheres.empty());
+    expect_error("Texture \"half\" \"float\" \"constant\" \"float value\" 0.5 " + light + kShape + "\"texture alpha\" \"half\"",
+                 {"emitting shape with an alpha"});
+}
+
+TEST(ImportLight, AnImageOnAnAreaLight) {
+    // Two pixels: white, and black of which sRGB makes nothing.
+    const FileMap files{{"a.tga", tga(2, 1, std::string("\xff\xff\xff", 3) + std::string(3, '\0'))},
+                        {"black.tga", tga(1, 1, std::string(3, '\0'))}};
+    const std::string light = "AreaLightSource \"diffuse\" \"string filename\" \"a.tga\" ";
+    SceneDescription d = world(light + "\"float scale\" 3 \"bool twosided\" true" + kShape, files);
+    EXPECT_TRUE(d.warnings.empty());
+    ASSERT_EQ(d.emissions.size(), 1u);
+    EXPECT_EQ(d.emissions[0].radiance, Rgb(3.0f));
+    EXPECT_TRUE(d.emissions[0].two_sided);
+    EXPECT_EQ(d.images.at(size_t(d.emissions[0].image)).width, 2);
+    // The power is that of all of the image, half of which is white.
+    d = world(light + "\"float power\" 10" + kShape, files);
+    EXPECT_NEAR(d.emissions.at(0).radiance.g, 2 * 10 / (3.14159265 * 4 * 3.14159265), 1e-5);
+    d = world(light + kShape + "AreaLightSource \"diffuse\"" + kShape, files);
+    EXPECT_EQ(d.emissions.size(), 2u) << "one with the image and one without";
+    expect_error(light + "\"rgb L\" [1 1 1]" + kShape, {"either L or filename"}, files);
+    expect_error(light + kShape, {"a.tga"});
+    const std::string black = "AreaLightSource \"diffuse\" \"string filename\" \"black.tga\" ";
+    EXPECT_TRUE(world(black + kShape, files).emissions.empty());
+    expect_error(black + "\"float power\" 10" + kShape, {"scene.pbrt:3", "black"}, files);
+    expect_warning(light + "Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 0] \"string emissionfilename\" \"a.tga\"",
+                   "emissionfilename", files);
 }
 
 /// pi times radiance times area over the triangles of all meshes from `first` on; also that they have one radiance.

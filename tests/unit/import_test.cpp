@@ -257,7 +257,7 @@ TEST(ImportOptions, CameraFilmAndDepth) {
     EXPECT_EQ(d.camera.screen_window[3], 2);
     const int crop[4] = {0, 200, 50, 200};
     for (int i = 0; i < 4; ++i) EXPECT_EQ(d.film.crop[i], crop[i]);
-    EXPECT_FLOAT_EQ(d.film.exposure_scale, 2);
+    EXPECT_FLOAT_EQ(d.film.response.exposure, 2);
     EXPECT_EQ(d.samples_per_pixel, 6);
     EXPECT_EQ(d.max_depth, 9);
 }
@@ -333,7 +333,7 @@ TEST(ImportOptions, DefaultsAreThoseOfPbrt) {
     const SceneDescription& d = scene->description;
     EXPECT_EQ(d.film.width, 1280);
     EXPECT_EQ(d.film.height, 720);
-    EXPECT_EQ(d.film.exposure_scale, 1);
+    EXPECT_EQ(d.film.response.exposure, 1);
     EXPECT_EQ(d.camera.fov_degrees, 90);
     EXPECT_EQ(d.camera.focal_distance, 1e6f);
     EXPECT_EQ(d.max_depth, 5);
@@ -356,9 +356,9 @@ TEST(ImportOptions, UnsupportedOnesAreNamed) {
         ASSERT_EQ(scene->description.warnings.size(), 1u) << text;
         EXPECT_NE(scene->description.warnings[0].find(part), std::string::npos) << scene->description.warnings[0];
     };
-    refused("Camera \"spherical\"", "perspective");
+    refused("Camera \"realistic\"", "perspective");
     refused("Camera \"perspective\" \"float fov\" 180", "fov");
-    refused("Film \"gbuffer\"", "rgb");
+    refused("Film \"spectral\"", "rgb");
     refused("\nFilm \"rgb\" \"integer xresolution\" 16384 \"integer yresolution\" 16385", "scene.pbrt:2");
     refused("Film \"rgb\" \"integer xresolution\" 16384 \"integer yresolution\" 16385", "268451840 pixels, which take 69 GB");
     refused("\nIntegrator \"path\" \"integer maxdepth\" -1", "scene.pbrt:2");
@@ -366,7 +366,6 @@ TEST(ImportOptions, UnsupportedOnesAreNamed) {
     warned("Integrator \"path\" \"integer maxdepth\" 1000", "255");
     refused("Film \"rgb\" \"integer xresolution\" 0", "resolution");
     refused("Film \"rgb\" \"integer xresolution\" 2000000000", "resolution");
-    refused("Film \"rgb\" \"string sensor\" \"canon_eos_5d\"", "sensor");
     refused("Film \"rgb\" \"float cropwindow\" [0.5 0.5 0 1]", "empty");
     for (const std::string wrong : {"[0.7 0.3 0 1]", "[0 1 0.7 0.3]"})
         refused("\n\nFilm \"rgb\"\n\"float cropwindow\" " + wrong, "scene.pbrt:4: Film \"rgb\": cropwindow has");

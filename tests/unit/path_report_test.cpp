@@ -78,7 +78,7 @@ TEST(PathReport, SumsAreTheSamplesToTheLastBit) {
         const Seen seen = watch(std::string(row->name), scene);
         ASSERT_FALSE(seen.camera.empty() && seen.splats.empty()) << row->name;
         for (uint32_t pixel = 0; pixel < uint32_t(kSize * kSize) && row->camera_samples; ++pixel) {
-            SampleReport report{.exposure_scale = 1.7f};
+            SampleReport report{.response = {.exposure = double(1.7f)}};
             if (const auto paths = seen.camera.find(pixel); paths != seen.camera.end()) report.paths = paths->second;
             const auto sum = report.sum();
             for (size_t c = 0; c < 3; ++c) EXPECT_EQ(sum[c], double(1.7f) * seen.partial.camera[3 * pixel + c]) << row->name;

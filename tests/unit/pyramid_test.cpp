@@ -71,11 +71,11 @@ TEST(Pyramid, CameraSamplesAndSplatsHaveTheirOwnNumbers) {
     EXPECT_EQ(connected.name(), "k3-s2-connect");
     EXPECT_EQ(splatted.name(), "k3-s3-lens");
     // One contribution in two iterations, and one in fifty light paths.
-    EXPECT_FLOAT_EQ(pyramid.weighted(connected, 1).pixels[3 * 4 + 2], 1.0f);
-    EXPECT_FLOAT_EQ(pyramid.unweighted(connected, 3).pixels[3 * 4 + 2], 6.0f);
-    EXPECT_FLOAT_EQ(pyramid.weighted(splatted, 1).pixels[0], 0.05f);
-    EXPECT_FLOAT_EQ(pyramid.unweighted(splatted, 1).pixels[0], 0.2f);
-    EXPECT_EQ(pyramid.weighted(splatted, 1).pixels[3 * 4], 0.0f);
+    EXPECT_FLOAT_EQ(pyramid.weighted(connected).pixels[3 * 4 + 2], 1.0f);
+    EXPECT_FLOAT_EQ(pyramid.unweighted(connected).pixels[3 * 4 + 2], 2.0f);
+    EXPECT_FLOAT_EQ(pyramid.weighted(splatted).pixels[0], 0.05f);
+    EXPECT_FLOAT_EQ(pyramid.unweighted(splatted).pixels[0], 0.2f);
+    EXPECT_EQ(pyramid.weighted(splatted).pixels[3 * 4], 0.0f);
 }
 
 TEST(Pyramid, LongerPathsShareAPictureForEachKind) {
@@ -90,11 +90,11 @@ TEST(Pyramid, LongerPathsShareAPictureForEachKind) {
     ASSERT_EQ(keys.size(), 2u);
     EXPECT_EQ(keys[0].name(), "longer-next-event");
     EXPECT_EQ(keys[1].name(), "longer-connect");
-    EXPECT_EQ(pyramid.weighted(keys[1], 1).pixels[0], 5.0f);
+    EXPECT_EQ(pyramid.weighted(keys[1]).pixels[0], 5.0f);
 }
 
 TEST(Pyramid, VarianceIsThatOfGroups) {
-    Pyramid pyramid(kFrame, 3);
+    Pyramid pyramid(kFrame, 3, {.exposure = 2});
     const double values[] = {1, 4, 2};
     const uint32_t iterations[] = {1, 2, 3};
     double n = 0, mean = 0, variance = 0;
@@ -104,16 +104,16 @@ TEST(Pyramid, VarianceIsThatOfGroups) {
         pyramid.begin_group(iterations[g], 1);
         ASSERT_TRUE(pyramid.add(unit).ok());
         RgbImage black{3, 3, std::vector<float>(27)};
-        EXPECT_EQ(std::isnan(pyramid.noise(pyramid.keys()[0], black, 1)), g < 2) << "from complete groups alone";
+        EXPECT_EQ(std::isnan(pyramid.noise(pyramid.keys()[0], black)), g < 2) << "from complete groups alone";
         pyramid.end_group();
         n += iterations[g];
         mean += iterations[g] * values[g];
     }
     mean /= n;
     for (int g = 0; g < 3; ++g) variance += iterations[g] * (values[g] - mean) * (values[g] - mean) / (2 * n);
-    const RgbImage image = pyramid.weighted(pyramid.keys()[0], 2);
+    const RgbImage image = pyramid.weighted(pyramid.keys()[0]);
     EXPECT_NEAR(image.pixels[3 * 5], 2 * mean, 1e-6);
-    EXPECT_NEAR(pyramid.noise(pyramid.keys()[0], image, 2), 4 * variance / (4 * mean * mean + 0.01) / 9, 1e-6);
+    EXPECT_NEAR(pyramid.noise(pyramid.keys()[0], image), 4 * variance / (4 * mean * mean + 0.01) / 9, 1e-6);
 }
 
 TEST(Pyramid, WhatIsNotFiniteIsCounted) {
@@ -126,11 +126,11 @@ TEST(Pyramid, WhatIsNotFiniteIsCounted) {
     ASSERT_TRUE(pyramid.add(unit).ok());
     pyramid.end_group();
     EXPECT_EQ(pyramid.not_finite(), 2u);
-    EXPECT_EQ(pyramid.unweighted(pyramid.keys()[0], 1).pixels[0], 1.0f);
+    EXPECT_EQ(pyramid.unweighted(pyramid.keys()[0]).pixels[0], 1.0f);
 }
 
 TEST(Pyramid, MemoryIsBounded) {
-    Pyramid pyramid(kFrame, 3, 9 * 8 * sizeof(double));
+    Pyramid pyramid(kFrame, 3, {}, 9 * 8 * sizeof(double));
     UnitPictures unit(kFrame.crop, kFrame.crop, 3);
     unit.add(Made(Technique::hit(), 1, {1, 1, 1}).seen(1, 0));
     pyramid.begin_group(1, 1);
@@ -143,7 +143,12 @@ TEST(Pyramid, MemoryIsBounded) {
 
 /// A pyramid of real light, its image, and the frame.
 struct Rendered {
-    Rendered() : scene(testing::cornell_builder(20).build()), pyramid(scene->frame(), 4), sums(scene->frame()) {
+    static constexpr FilmResponse kResponse{1.5, {{{1.2, -0.1, 0}, {0, 1, 0.1}, {0, 0.2, 0.7}}}};
+
+    Rendered()
+        : scene(testing::cornell_builder(20).build()),
+          pyramid(scene->frame(), 4, kResponse),
+          sums(scene->frame(), kResponse) {
         const RenderSettings settings{.algorithm = *AlgorithmSettings::parse("bdpt", {}), .seed = 1, .max_depth = 6};
         const auto renderer = Renderer::create(scene, settings);
         const Plan plan(scene->frame(), settings.algorithm);
@@ -166,17 +171,17 @@ struct Rendered {
 
 TEST(Pyramid, WeightedPicturesSumToTheImage) {
     const Rendered rendered;
-    const RgbImage image = rendered.sums.complete().develop(1.5f);
+    const RgbImage image = rendered.sums.complete().develop();
     std::vector<double> sum(image.pixels.size());
     int longer = 0;
     for (const PyramidKey& key : rendered.pyramid.keys()) {
-        const RgbImage picture = rendered.pyramid.weighted(key, 1.5f);
+        const RgbImage picture = rendered.pyramid.weighted(key);
         ASSERT_EQ(picture.pixels.size(), sum.size());
         for (size_t i = 0; i < sum.size(); ++i) sum[i] += double(picture.pixels[i]);
         longer += key.k == PyramidKey::kLonger;
         EXPECT_TRUE(key.k == PyramidKey::kLonger || key.k <= 4);
         if (key.k == 1) {
-            EXPECT_EQ(picture.pixels, rendered.pyramid.unweighted(key, 1.5f).pixels) << "directly visible";
+            EXPECT_EQ(picture.pixels, rendered.pyramid.unweighted(key).pixels) << "directly visible";
         }
     }
     EXPECT_EQ(longer, 4) << "hit, next event, connect and lens";
@@ -191,7 +196,7 @@ TEST(PyramidFiles, ADirectoryOfItsOwnIsReplaced) {
     const Rendered rendered;
     const RgbImage image = rendered.sums.complete().develop();
     const PyramidPage page{.scene = "<room> & \"b\".pbrt", .algorithm = "bdpt", .samples_per_pixel = 5};
-    ASSERT_TRUE(write_pyramid(place, rendered.pyramid, rendered.scene->frame(), image, 1, page).ok());
+    ASSERT_TRUE(write_pyramid(place, rendered.pyramid, rendered.scene->frame(), image, page).ok());
     const auto html = *read_file(place + "/index.html");
     const Json json = Json::parse(*read_file(place + "/pyramid.json"));
     EXPECT_EQ(json["pictures"].size(), rendered.pyramid.keys().size());
@@ -220,7 +225,7 @@ TEST(PyramidFiles, ADirectoryOfItsOwnIsReplaced) {
     std::ofstream(place + "/notes.txt") << "mine";
     std::ofstream(place + "/weighted-k9-s9-merge.png") << "of an earlier pyramid";
     ASSERT_TRUE(open_pyramid_directory(place).ok());
-    ASSERT_TRUE(write_pyramid(place, rendered.pyramid, rendered.scene->frame(), image, 1, page).ok());
+    ASSERT_TRUE(write_pyramid(place, rendered.pyramid, rendered.scene->frame(), image, page).ok());
     EXPECT_TRUE(fs::exists(place + "/notes.txt"));
     EXPECT_FALSE(fs::exists(place + "/weighted-k9-s9-merge.png"));
     EXPECT_EQ(*read_file(place + "/index.html"), html);

@@ -30,7 +30,7 @@ constexpr int kEdges = 7;
 constexpr double kLooseTraced = 6e-3;
 bool can_be_hit(const Scene& scene) {
     const auto& emitters = scene.emitters().all();
-    return std::any_of(emitters.begin(), emitters.end(), [](const Emitter& e) { return !e.is_delta(); });
+    return std::any_of(emitters.begin(), emitters.end(), [](const Emitter& e) { return e.can_be_hit(); });
 }
 
 using SpcbptWeights = detail::CachedWeights<SubspaceConnections<>>;

@@ -30,7 +30,7 @@ constexpr double kLooseTraced = 6e-3;
 
 bool can_be_hit(const Scene& scene) {
     const auto& emitters = scene.emitters().all();
-    return std::any_of(emitters.begin(), emitters.end(), [](const Emitter& e) { return !e.is_delta(); });
+    return std::any_of(emitters.begin(), emitters.end(), [](const Emitter& e) { return e.can_be_hit(); });
 }
 
 /// Weights under test. The members of a family read the same of a path, so that it is rebuilt once for all of them.

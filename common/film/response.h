@@ -1,0 +1,35 @@
+#pragma once
+// FilmResponse: what a film makes of the light that reaches it. It is linear, so it is applied to sums and means, after rendering.
+
+#include <array>
+
+#include "common/core/vec.h"
+
+namespace lightloom {
+
+struct FilmResponse {
+    using Triple = std::array<double, 3>;
+    using Matrix = std::array<Triple, 3>;
+    static constexpr Matrix kNeutral{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+
+    double exposure = 1;       ///< Multiplies every channel: exposure time * iso / 100. Not negative.
+    Matrix colour = kNeutral;  ///< White balance, linear Rec.709 RGB to the same, before the exposure.
+
+    bool is_neutral() const { return colour == kNeutral; }
+    /// The colour part alone. With the neutral matrix the value itself, to the last bit.
+    Triple balanced(const Triple& rgb) const {
+        Triple out;
+        for (size_t c = 0; c < 3; ++c) out[c] = colour[c][0] * rgb[0] + colour[c][1] * rgb[1] + colour[c][2] * rgb[2];
+        return out;
+    }
+    /// The picture's value of light `rgb`.
+    Triple operator()(const Triple& rgb) const {
+        Triple out = balanced(rgb);
+        for (double& v : out) v *= exposure;
+        return out;
+    }
+    Triple of(const Rgb& rgb) const { return (*this)(triple(rgb)); }
+    static Triple triple(const Rgb& rgb) { return {double(rgb.r), double(rgb.g), double(rgb.b)}; }
+};
+
+}  // namespace lightloom
