@@ -171,7 +171,8 @@ void Parser::texture(Tokenizer* tokens, const Location& where) {
     if (was_ptex && type == "spectrum") list.add_default("rgb", "value", {0.5, 0.5, 0.5});
     if (const auto it = state_.attributes.find("texture"); it != state_.attributes.end()) list.add_defaults(it->second);
     auto& table = type == "float" ? context_->float_textures : context_->spectrum_textures;
-    Definition definition{kind, std::move(list), state_.ctm[0], !(state_.ctm[0] == state_.ctm[1])};
+    const bool moves = !(state_.ctm[0] == state_.ctm[1]) && !context_->leaves_out(where, "motion");
+    Definition definition{kind, std::move(list), state_.ctm[0], moves};
     if (!table.try_emplace(name, std::move(definition)).second)
         fail(where, "the " + type + " texture " + quoted(name) + " is defined twice; rename one of the two");
 }

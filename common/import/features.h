@@ -1,5 +1,6 @@
 #pragma once
-// What a scene may hold that the renderer does not support, and that can be left out for a run: the names that --without takes.
+// What a scene may hold that can be left out for a run, above all what the renderer does not support: the names that --without
+// takes.
 
 #include <string>
 #include <string_view>
@@ -32,7 +33,7 @@ struct FeatureRule {
     std::string_view parameter;  ///< What is left out; empty: the whole directive, unless `becomes` is another kind.
     std::string_view becomes;    ///< The kind that stands in.
     std::string_view keeps;      ///< Parameters that the stand-in takes over, separated by blanks.
-    bool is_refused = true;      ///< Or whoever reads the parameter decides by its value.
+    bool is_refused = true;      ///< Or it is supported, or whoever reads the parameter decides by its value.
 };
 
 /// The rules that apply to a directive, in the order of the table.

@@ -19,7 +19,7 @@ Mat4 world_to_texture(const Definition& definition) {
     if (definition.moves)
         fail(parameters.where(), parameters.what() +
                                      " moves while the shutter is open (ActiveTransform); motion is not supported, remove one of "
-                                     "the transformations");
+                                     "the transformations or render with --without motion");
     const std::optional<Mat4> inverted = inverse(definition.to_world);
     if (!inverted) fail(parameters.where(), parameters.what() + ": its transformation is singular");
     return *inverted;

@@ -134,16 +134,13 @@ TEST(Without, EachIsNamedByTheMessageAndLeftOut) {
     } kCases[] = {
         {"media", "MediumInterface \"fog\" \"\"\n"},
         {"media", "Material \"coateddiffuse\" \"rgb albedo\" [0.5 0.5 0.5] \"float g\" 0.5\n"},
-        {"bump", "Material \"diffuse\" \"texture displacement\" \"d\"\n"},
-        {"bump", "Material \"diffuse\" \"string normalmap\" \"n.png\"\n"},
-        {"bump", "Attribute \"material\" \"string normalmap\" \"n.png\" Material \"conductor\"\n"},
-        {"bump", "MakeNamedMaterial \"m\" \"string type\" \"dielectric\" \"texture displacement\" \"d\"\n"},
         {"displacement", "Shape \"plymesh\" \"string filename\" \"a.ply\" \"texture displacement\" \"d\" \"float edgelength\" 1\n"},
         {"curves", "Shape \"curve\" \"point3 P\" [0 0 0 1 1 1 2 2 2 3 3 3] \"float width\" 0.1\n"},
         {"hair", "Material \"hair\" \"float eumelanin\" 0.3 \"float beta_m\" 0.2\n"},
         {"subsurface", "Material \"subsurface\" \"string name\" \"Ketchup\" \"float scale\" 10\n"},
         {"measured", "Material \"measured\" \"string filename\" \"a.bsdf\"\n"},
         {"motion", "ActiveTransform EndTime Translate 1 0 0 ActiveTransform All\nLightSource \"point\"\n"},
+        {"motion", "ActiveTransform EndTime Translate 1 0 0 ActiveTransform All\nTexture \"m\" \"float\" \"fbm\" Identity\n"},
         {"portals", "LightSource \"infinite\" \"point3 portal\" [0 0 0 1 0 0 1 1 0 0 1 0]\n"},
         {"ptex", "Texture \"p\" \"spectrum\" \"ptex\" \"string filename\" \"a.ptx\"\n"},
         {"ptex", "Texture \"p\" \"float\" \"ptex\" \"string filename\" \"a.ptx\"\n"},
@@ -163,6 +160,22 @@ TEST(Without, EachIsNamedByTheMessageAndLeftOut) {
         EXPECT_EQ(scene->left_out[0].name, c.name);
         EXPECT_GE(scene->left_out[0].count, 1);
         EXPECT_EQ(scene->left_out[0].first.rfind("scene.pbrt:", 0), 0u);
+    }
+}
+
+/// They are supported; their files may be missing, or the scene be wanted without them.
+TEST(Without, BumpMapsCanBeLeftOut) {
+    for (const char* world :
+         {"Material \"diffuse\" \"texture displacement\" \"d\"\n", "Material \"diffuse\" \"string normalmap\" \"n.png\"\n",
+          "Attribute \"material\" \"string normalmap\" \"n.png\" Material \"conductor\"\n",
+          "MakeNamedMaterial \"m\" \"string type\" \"dielectric\" \"texture displacement\" \"d\"\n"}) {
+        const auto whole = import_without(world, {});
+        ASSERT_FALSE(whole.ok()) << world;
+        EXPECT_EQ(whole.status().message().find("--without"), std::string::npos) << whole.status().message();
+        const auto scene = import_without(world, {"bump"});
+        ASSERT_TRUE(scene.ok()) << world << scene.status().message();
+        ASSERT_EQ(scene->left_out.size(), 1u);
+        EXPECT_EQ(scene->left_out[0].name, "bump");
     }
 }
 
