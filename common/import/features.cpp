@@ -15,7 +15,7 @@ const std::vector<SceneFeature> kFeatures{
     {"measured", "materials \"measured\", which become diffuse with reflectance 0.5"},
     {"motion", "motion: everything stands where ActiveTransform StartTime puts it"},
     {"portals", "portals of infinite lights"},
-    {"gbuffer", "what the films \"gbuffer\" and \"spectral\" store besides colour"},
+    {"spectral", "what the film \"spectral\" stores besides colour"},
     {"ptex", "textures \"ptex\", which become 0.5"},
     {"options", "the Options disablepixeljitter, forcediffuse and pixelstats"},
 };
@@ -54,10 +54,7 @@ constexpr FeatureRule kRules[] = {
     {"displacement", "Shape", "plymesh", "displacement", "", ""},
     {"curves", "Shape", "curve", "", "", ""},
     {"portals", "LightSource", "infinite", "portal", "", ""},
-    {"gbuffer", "Film", "gbuffer", "", "rgb",
-     "xresolution yresolution cropwindow pixelbounds filename diagonal iso exposuretime sensor whitebalance maxcomponentvalue "
-     "savefp16"},
-    {"gbuffer", "Film", "spectral", "", "rgb",
+    {"spectral", "Film", "spectral", "", "rgb",
      "xresolution yresolution cropwindow pixelbounds filename diagonal iso exposuretime sensor whitebalance maxcomponentvalue "
      "savefp16"},
     {"ptex", "Texture", "ptex", "", "constant", ""},

@@ -102,7 +102,7 @@ struct FakeService {
         options.identity = identity;
         options.scene_files_needed = false;
         options.read_scene = [frame](const AssetStore&, const JobSpec&, std::stop_token) {
-            return Result<SceneFacts>(SceneFacts{frame, 1, 5});
+            return Result<SceneFacts>(SceneFacts{frame, {}, 5});
         };
         options.shuffle_seed = shuffle;
         options.clock = [this] { return TimePoint(std::chrono::milliseconds(now_ms)); };

@@ -156,7 +156,7 @@ TEST_P(Shapes, BytesDoNotDependOnWhoRendersWhatAndWhoVanishes) {
     // Without a service, group by group.
     auto renderer = Renderer::create(large_box(), {algorithm_of(algorithm), 0, kMaxDepth});
     ASSERT_TRUE(renderer.ok()) << renderer.status().message();
-    ProgressiveRender alone(*std::move(renderer), kLarge, Plan(kLarge, algorithm_of(algorithm)), 1, 0);
+    ProgressiveRender alone(*std::move(renderer), kLarge, Plan(kLarge, algorithm_of(algorithm)), {}, 0);
     while (alone.iterations() < kIterations) ASSERT_TRUE(alone.advance(kIterations).ok());
     const auto image = decode_exr(first.exr, "image");
     ASSERT_TRUE(image.ok());

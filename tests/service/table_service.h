@@ -29,7 +29,7 @@ inline std::shared_ptr<const Scene> golden() {
 }
 
 inline SceneFacts golden_facts() {
-    return {kFrame, 1, 5, {}, [] { return Result<std::shared_ptr<const Scene>>(golden()); }};
+    return {kFrame, {}, 5, {}, [] { return Result<std::shared_ptr<const Scene>>(golden()); }};
 }
 
 /// A service that makes tables of the golden scene.

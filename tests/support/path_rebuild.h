@@ -131,7 +131,7 @@ inline std::optional<std::vector<PathVertex>> rebuild_camera(const Scene& scene,
     std::vector<PathVertex> z(1);
     z[0].p = path.lens;
     z[0].alpha = Rgb(1.0f);
-    WalkRay ray{path.lens, first, Rgb(1.0f), pdf, scene.camera().has_parallel_rays(), true};
+    WalkRay ray{path.lens, first, Rgb(1.0f), pdf, scene.camera().has_parallel_rays()};
     for (int j = 1; j < t; ++j) {
         const PathVertex& x = path.x[size_t(k - j)];
         PathVertex v;

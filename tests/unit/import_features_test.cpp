@@ -154,7 +154,7 @@ TEST(Without, EachIsNamedByTheMessageAndLeftOut) {
         ASSERT_FALSE(refused.ok()) << c.world;
         EXPECT_NE(refused.status().message().find(std::string("--without ") + c.name), std::string::npos)
             << refused.status().message();
-        const auto scene = import_without(c.world, {"curves", c.name, "gbuffer"}, {{"a.ply", ply}});
+        const auto scene = import_without(c.world, {"curves", c.name, "spectral"}, {{"a.ply", ply}});
         ASSERT_TRUE(scene.ok()) << c.world << scene.status().message();
         ASSERT_EQ(scene->left_out.size(), 1u) << c.world;
         EXPECT_EQ(scene->left_out[0].name, c.name);
