@@ -133,7 +133,7 @@ TEST(ProceduralTexture, Errors) {
     expect_error(start + "\"wrinkled\" \"float roughness\" -0.5", {"roughness", "between 0 and 4"});
     expect_error(start + "\"windy\" \"integer octaves\" 3", {"octaves"});
     expect_error("Texture \"t\" \"spectrum\" \"marble\" \"float octaves\" 3", {"octaves"});
-    expect_error(start + "\"ptex\"", {"not supported", "marble"});
+    expect_error(start + "\"ptex\"", {"ptex", "not supported"});
     expect_error(start + "\"dots\" \"texture inside\" \"t\"", {"refers to itself"});
     expect_error("ActiveTransform EndTime Translate 1 0 0 " + start + "\"fbm\"", {"scene.pbrt:3", "moves"});
     // Who does not ask for the place does not mind.

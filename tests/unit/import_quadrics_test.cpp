@@ -194,7 +194,7 @@ TEST(ImportQuadrics, Errors) {
     expect_error("Shape \"disk\" \"float innerradius\" 1", {"larger than innerradius"});
     expect_error("Shape \"disk\" \"float zmin\" 1", {"zmin"});
     expect_error("Shape \"cylinder\" \"float height\" 1", {"height"});
-    expect_error("Shape \"curve\"", {"scene.pbrt:3", "curve", "not supported", "loopsubdiv"});
+    expect_error("Shape \"curve\"", {"scene.pbrt:3", "curve", "not supported"});
     // What lies beyond a sphere or a full turn cuts nothing off.
     EXPECT_EQ(world("Shape \"sphere\" \"float zmin\" -2 \"float zmax\" 7 \"float phimax\" 400").spheres.size(), 1u);
 }
