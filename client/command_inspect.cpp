@@ -72,8 +72,9 @@ nlohmann::json describe(const SceneDescription& d, const SceneSummary& s, const 
         {"kind", name_of(d.camera.kind)}, {"fov_degrees", d.camera.fov_degrees}, {"lens_radius", d.camera.lens_radius}};
     out["film"] = {{"width", d.film.width},
                    {"height", d.film.height},
-                   {"exposure_scale", d.film.response.exposure},
+                   {"exposure_scale", d.film.response.exposure * d.strength_scale},
                    {"colour_matrix", d.film.response.colour}};
+    out["origin"] = d.origin;
     out["max_depth"] = d.max_depth;
     out["samples_per_pixel"] = d.samples_per_pixel;
     out["lights"] = nlohmann::json::array();

@@ -152,6 +152,7 @@ void Parser::medium_interface(Tokenizer* tokens, const Location& where) {
 }
 
 void Parser::texture(Tokenizer* tokens, const Location& where) {
+    require_world(where, "Texture", true);
     const std::string name = read_name(tokens, where, "Texture");
     const std::string type = read_name(tokens, where, "Texture");
     std::string kind = read_name(tokens, where, "Texture");
@@ -200,9 +201,11 @@ void Parser::shape(Tokenizer* tokens, const Location& where) {
     }
     // Where faults are collected, those of its light and material shall be found, too, though they shine and lie on nothing.
     const bool good = context_->diagnostics.guard([&] {
-        pending.geometry = make_shape(
-            context_, kind, list, {static_transform(where, list.what()), state_.reverse_orientation, pending.area_light != nullptr},
-            &pending.faces);
+        const Mat4 to_scene = static_transform(where, list.what());
+        // An object has a space of its own, which its instances place.
+        const Mat4 placed = current_object_ == kNone ? to_scene : *inverse(world_) * to_scene;
+        pending.geometry =
+            make_shape(context_, kind, list, {placed, state_.reverse_orientation, pending.area_light != nullptr}, &pending.faces);
         list.finish();
     });
     if (!good) pending.geometry = Sphere{}, pending.faces = {};

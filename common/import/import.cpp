@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <new>
 
@@ -14,6 +15,36 @@
 namespace lightloom {
 namespace import {
 namespace {
+
+/// Calls visit(colour, image) for everything that lights are as strong as; the image, or kNone, multiplies the colour.
+template <typename Visit>
+void for_each_strength(SceneDescription* scene, Visit&& visit) {
+    for (AreaEmission& e : scene->emissions) visit(e.radiance, e.image);
+    for (PointLight& l : scene->point_lights) visit(l.intensity, kNone);
+    for (SpotLight& l : scene->spot_lights) visit(l.intensity, kNone);
+    for (ImageLight& l : scene->image_lights) visit(l.intensity, l.image);
+    for (DistantLight& l : scene->distant_lights) visit(l.irradiance, kNone);
+    for (InfiniteLight& l : scene->infinite_lights) visit(l.radiance, l.image);
+}
+
+/// Sums of samples are kept in steps of 2^-44, and throughputs in single precision: light that is very weak or strong as a whole is
+/// brought to about 1, and the film's exposure takes it back. Powers of two, so that nothing is rounded.
+void bring_strength_into_range(Context* context) {
+    SceneDescription* scene = &context->scene;
+    float strongest = 0;
+    for_each_strength(scene, [&](const Rgb& colour, int32_t image) {
+        const Rgb c = image == kNone ? colour : colour * context->image_mean(image);
+        strongest = std::max({strongest, c.r, c.g, c.b});
+    });
+    constexpr float kWeak = 0x1p-16f, kStrong = 0x1p40f;
+    if (!(strongest > 0) || !std::isfinite(strongest) || (strongest >= kWeak && strongest <= kStrong)) return;
+    const int exponent = std::ilogb(strongest);
+    for_each_strength(scene, [&](Rgb& c, int32_t) {
+        c = {std::ldexp(c.r, -exponent), std::ldexp(c.g, -exponent), std::ldexp(c.b, -exponent)};
+    });
+    scene->strength_scale = std::ldexp(1.0, -exponent);
+    scene->film.response.exposure = std::ldexp(scene->film.response.exposure, exponent);
+}
 
 /// Fills the context's scene. Without collected faults it is whole.
 void read_scene(Context* context, const std::string& name) {
@@ -32,6 +63,7 @@ void read_scene(Context* context, const std::string& name) {
         if (!(exposure >= 0 && exposure <= kMaxCoordinate))
             fail(main, "iso and the exposure time multiply the picture by more than 1e15; lower them");
         context->scene.film.response = {double(exposure), context->film_colour};
+        bring_strength_into_range(context);
     });
 }
 

@@ -240,9 +240,32 @@ void Parser::directive(Tokenizer* tokens, const Token& token) {
     fail(token.where, "unknown directive " + quoted(word) + "; remove it or correct its name");
 }
 
+/// Vertices are kept in single precision, which 100 km from the origin knows steps of 8 mm. Scenes that transformations put there
+/// are moved back by what the camera's position has in whole units, before anything is rounded; numbers that are so large in the
+/// file itself are read in single precision, as pbrt reads them.
+void Parser::begin_world() {
+    in_world_ = true;
+    Mat4& camera_to_world = context_->scene.camera.camera_to_world;
+    const auto whole = [](double coordinate) {
+        constexpr double kFar = 2048;
+        return std::fabs(coordinate) >= kFar ? std::round(coordinate) : 0.0;
+    };
+    const double w = camera_to_world.m[3][3];
+    double shift[3];
+    for (int i = 0; i < 3; ++i) context_->scene.origin[size_t(i)] = shift[i] = whole(camera_to_world.m[i][3] / w);
+    world_ = translation(-shift[0], -shift[1], -shift[2]);
+    camera_to_world = world_ * camera_to_world;
+    for (auto& [name, system] : coordinate_systems_)
+        for (Mat4& m : system.ctm) m = world_ * m;
+    state_.ctm[0] = state_.ctm[1] = world_;
+    state_.fault[0] = state_.fault[1] = {};
+    state_.active[0] = state_.active[1] = true;
+    coordinate_systems_["world"] = {{world_, world_}, {}};
+}
+
 bool Parser::transformation(Tokenizer* tokens, const std::string& word, const Location& where) {
     if (word == "Identity") {
-        transform(where, [](const Mat4&) { return Mat4(); });
+        transform(where, [&](const Mat4&) { return world_; });
     } else if (word == "Translate") {
         const auto v = read_numbers(tokens, where, word, 3);
         transform(where, [&](const Mat4& m) { return m * translation(v[0], v[1], v[2]); });
@@ -266,7 +289,7 @@ bool Parser::transformation(Tokenizer* tokens, const std::string& word, const Lo
             "LookAt: the eye equals the target, or the up vector is parallel to the view direction");
     } else if (word == "Transform") {
         const Mat4 matrix = read_matrix(tokens, where, word);
-        transform(where, [&](const Mat4&) { return matrix; });
+        transform(where, [&](const Mat4&) { return world_ * matrix; });
     } else if (word == "ConcatTransform") {
         const Mat4 matrix = read_matrix(tokens, where, word);
         transform(where, [&](const Mat4& m) { return m * matrix; });
@@ -339,11 +362,7 @@ bool Parser::scope(Tokenizer* tokens, const std::string& word, const Location& w
         current_object_ = kNone;
     } else if (word == "WorldBegin") {
         if (in_world_) fail(where, "a second WorldBegin; remove it");
-        in_world_ = true;
-        state_.ctm[0] = state_.ctm[1] = Mat4();
-        state_.fault[0] = state_.fault[1] = {};
-        state_.active[0] = state_.active[1] = true;
-        coordinate_systems_["world"] = {};
+        begin_world();
     } else if (word == "Include") {
         include(tokens, where);
     } else if (word == "Import") {

@@ -99,6 +99,10 @@ class Parser {
         Mat4 ctm[2];
         TransformFault fault[2];
     };
+    void begin_world();
+    /// From the file's world space to the scene's, whose origin lies near the camera where the camera is far away; see
+    /// begin_world().
+    Mat4 world_;
     std::map<std::string, CoordinateSystem> coordinate_systems_;
     std::map<std::string, int32_t> objects_;
     std::vector<PendingInstance> instances_;

@@ -95,6 +95,7 @@ TextureId image_texture(Context* context, const Definition& definition, TextureU
     read_mapping(context, definition, &node);
     node.scale = parameters.one_float("scale", 1);
     node.invert = parameters.one_bool("invert", false);
+    node.non_negative = use != TextureUse::kFloat || node.invert;
     const std::string wrap = parameters.one_choice("wrap", "repeat", {"repeat", "clamp", "black"});
     node.wrap = wrap == "repeat" ? WrapMode::kRepeat : wrap == "clamp" ? WrapMode::kClamp : WrapMode::kBlack;
     const std::string filter = parameters.one_choice("filter", "bilinear", {"point", "bilinear", "trilinear", "EWA", "ewa"});
@@ -180,7 +181,7 @@ TextureRange range_of(Context* context, const TextureNode& node) {
             if (node.wrap == WrapMode::kBlack) range = hull(range, {0, 0});
             range = product(range, {double(node.scale), double(node.scale)});
             if (node.invert) range = {1 - range.most, 1 - range.least};
-            return {std::fmax(range.least, 0.0), std::fmax(range.most, 0.0)};
+            return node.non_negative ? TextureRange{std::fmax(range.least, 0.0), std::fmax(range.most, 0.0)} : range;
         }
         case TextureKind::kFractal:
         case TextureKind::kWrinkled:

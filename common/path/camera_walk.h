@@ -59,7 +59,7 @@ int trace_camera_path(const Scene& scene, CameraSampler& sampler, int px, int py
             visit(t);
             break;
         }
-        v.bsdf = scene.bsdf_at(point);
+        v.set_bsdf(scene.bsdf_at(point));
         visit(t);
         if (!leave<TransportMode::kRadiance>(&v, &z[t - 2], sampler.scattering(t), &ray)) break;
         if (!survive(rule, t, 1.0f, sampler.roulette(), &ray)) break;

@@ -18,6 +18,7 @@ void view_light_prefix(const Vertex* y, int s, PathView* view) {
         view->fwd[i] = y[i].fwd;
         view->rev[i] = y[i].rev;
         view->delta[i] = y[i].delta;
+        view->lossless[i] = y[i].lossless;
     }
 }
 
@@ -27,6 +28,7 @@ inline void view_camera_suffix(const PathVertex* z, int t, int k, PathView* view
         view->rev[k - j] = z[j].fwd;
         view->fwd[k - j] = z[j].rev;
         view->delta[k - j] = z[j].delta;
+        view->lossless[k - j] = z[j].lossless;
     }
 }
 

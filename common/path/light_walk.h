@@ -36,7 +36,7 @@ inline bool start_light_path(const Scene& scene, LightSampler& sampler, PathVert
     y0->reverse_branch = 0;
     y0->fwd = s.pdf_position;
     y0->rev = 0;
-    y0->delta = false;
+    y0->delta = y0->lossless = false;
     ray->direction = s.direction;
     ray->alpha = s.alpha;
     ray->pdf = s.pdf_direction;
@@ -63,7 +63,7 @@ inline int trace_light_path(const Scene& scene, LightSampler& sampler, int max_v
         PathVertex& v = path[n];
         arrive<TransportMode::kImportance>(ray, path[n - 1].p, path[n - 1].ng, n > 1 || area, point, &v);
         if (!(v.fwd > 0) || !std::isfinite(v.fwd) || !std::isfinite(v.adjoint)) break;
-        v.bsdf = scene.bsdf_at(point);
+        v.set_bsdf(scene.bsdf_at(point));
         ++counters->vertices;
         ++n;
         if (n >= max_vertices) break;

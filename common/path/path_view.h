@@ -20,6 +20,7 @@ struct PathView {
     double rev[kMaxEdges + 1];
     /// x_i's scattering event is a Dirac lobe (0 < i < k); false at both ends.
     bool delta[kMaxEdges + 1];
+    bool lossless[kMaxEdges + 1];  ///< SubPathVertex::lossless of x_i, 0 < i < k.
     /// What follows is filled in by ViewDetail::kSubspace only (connect.h) and, where marked *, by SubspaceLabeller::complete().
     /// F(1) / C(1) and F(2) / C(2) of the light prefixes of one and two vertices: throughput without Russian roulette.
     Rgb start[2];

@@ -52,7 +52,7 @@ void arrive(const WalkRay& ray, const Vec3& previous_p, const Vec3& previous_ng,
     v->alpha = ray.alpha;
     v->emitter = point.emitter;
     v->reach = point.reach;
-    v->delta = false;
+    v->delta = v->lossless = false;
     v->rev = 0;
     v->survival = ray.survival;
     v->label = v->reverse_label = kNoLabel;

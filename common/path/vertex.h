@@ -28,6 +28,7 @@ struct SubPathVertex {
     float to_previous = 0;    ///< Turns a solid-angle density at this vertex towards the predecessor into the predecessor's
                               ///< density: |cos| / d^2, 1 for an infinite light, 0 for a light that cannot be hit.
     bool delta = false;       ///< The sub-path went on through a Dirac lobe.
+    bool lossless = false;    ///< Bsdf::is_lossless(): roulette ends no sub-path here.
     Vec3 ng;                  ///< Geometric normal (at an infinite light's y_0: the direction of travel).
     Vec3 wo;                  ///< Unit, towards the predecessor.
     float reach = 0;          ///< SurfacePoint::reach.
@@ -44,6 +45,10 @@ struct PathVertex : SubPathVertex {
     /// vertex the other way, from the successor to the predecessor (BSDF, adjoint correction, density; see PathView::step).
     Rgb step;
 
+    void set_bsdf(const Bsdf& b) {
+        bsdf = b;
+        lossless = b.is_lossless();
+    }
     const Vec3& shading_normal() const { return shading.n; }
     BsdfEval eval(const Vec3& w, TransportMode mode) const { return bsdf.eval(wo_local, shading.to_local(w), mode); }
 };

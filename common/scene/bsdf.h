@@ -75,6 +75,8 @@ struct Bsdf {
     bool has_smooth_lobe() const;
     /// True if some lobe is a Dirac delta.
     bool has_delta_lobe() const;
+    /// Whether all light that arrives leaves again, but for what a rough interface loses between its facets.
+    bool is_lossless() const { return kind == BsdfKind::kDielectric || kind == BsdfKind::kThinDielectric; }
     /// All zero when both directions are such that no non-delta lobe scatters; never NaN for finite unit directions.
     BsdfEval eval(const Vec3& wo, const Vec3& wi, TransportMode mode) const;
     /// `lobe` in [0,1) picks the lobe, `u` in [0,1)^2 the direction. False when the walk ends here (absorbed or degenerate).

@@ -150,10 +150,11 @@ ContactFinder::Covered ContactFinder::cover(std::vector<Emitter>* emitters, cons
         float reach = e.reach;
         accel_.for_each_near(centre, radius * 1.001f, [&](const RawHit& at) {
             Triangle t;
-            if ((at.instance < 0 && emits(at.geometry)) || !world_triangle(scene_, at, &t)) return;
+            if (!world_triangle(scene_, at, &t) || (at.instance < 0 && emits(at.geometry))) return;
             const double scale = std::max(t.scale(), own.scale());
             if (!coincide(own, t, kZero * scale)) return;
             reach = std::max(reach, float(scale));
+            if (e.hidden) return;  // no ray meets it
             float& gap = at.instance < 0 ? covered.meshes[at.geometry] : covered.instances[size_t(at.instance)];
             gap = std::max(gap, float(4 * kZero) * std::max(float(scale), e.reach));
             covered.any = true;

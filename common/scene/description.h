@@ -2,6 +2,7 @@
 // SceneDescription: what an importer produces and Scene::build() consumes. Plain data, in world space, in the units of the
 // scene file. Every reference is an index into one of the vectors.
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -52,7 +53,8 @@ struct TextureNode {
     int32_t image = kNone;           ///< kImage: index into SceneDescription::images.
     WrapMode wrap = WrapMode::kRepeat;
     bool nearest = false;                          ///< kImage: point lookup; bilinear otherwise.
-    bool invert = false;                           ///< kImage: 1 - the scaled value (pbrt's order); below zero is zero.
+    bool invert = false;                           ///< kImage: 1 - the scaled value (pbrt's order).
+    bool non_negative = true;                      ///< kImage: below zero is zero, as in pbrt for colours and what is inverted.
     TextureMapping mapping = TextureMapping::kUv;  ///< kCheckerboard, kImage, kDots.
     float scale = 1;                               ///< kImage: multiplies the looked-up value. kMarble: multiplies the place.
     float su = 1, sv = 1, du = 0, dv = 0;          ///< TextureMapping::kUv.
@@ -231,8 +233,12 @@ struct SceneDescription {
     std::vector<InfiniteLight> infinite_lights;
     CameraDescription camera;
     FilmDescription film;
-    int max_depth = 5;                  ///< Bounces, as in pbrt: paths have up to max_depth + 1 edges.
-    int samples_per_pixel = 16;         ///< What the file asks for; the command line may override.
+    int max_depth = 5;           ///< Bounces, as in pbrt: paths have up to max_depth + 1 edges.
+    int samples_per_pixel = 16;  ///< What the file asks for; the command line may override.
+    /// What the file calls the scene's origin: its world is moved so far that single precision suffices around the camera.
+    std::array<double, 3> origin{};
+    /// What every light was multiplied by, a power of two, and the film's exposure divided by.
+    double strength_scale = 1;
     std::string integrator;             ///< As in the scene file, empty if it has none; the client takes its default from it.
     std::vector<std::string> warnings;  ///< Named warnings: "file:line: what was ignored and why that matters".
 };

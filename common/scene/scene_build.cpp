@@ -295,7 +295,7 @@ void Scene::summarise() {
         SceneSummary::Light& light = s.lights[size_t(e.light)];
         light.kind = kKinds[int(e.kind)];
         light.where = light_sources_[size_t(e.light)];
-        light.power += emitters_.power(e) / double(scalar_of({1, 1, 1}));
+        light.power += emitters_.power(e) / (double(scalar_of({1, 1, 1})) * description_.strength_scale);
         ++light.primitives;
         s.emissive_triangle_count += e.kind == EmitterKind::kTriangle;
     }

@@ -41,7 +41,7 @@ Rgb image_value(const TextureNode& node, const Image& image, Vec2 st) {
     }
     v *= node.scale;
     if (node.invert) v = Rgb(1.0f) - v;
-    // As in pbrt, an image texture is never negative, whatever its scale or inversion.
+    if (!node.non_negative) return v;
     return {std::max(v.r, 0.0f), std::max(v.g, 0.0f), std::max(v.b, 0.0f)};
 }
 

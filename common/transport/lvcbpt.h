@@ -24,13 +24,14 @@ struct UniformSelection {
 
     struct OnPath : PlainTechniques {
         const UniformSelection& selection;
+        PathSurvival survival;
 
-        double survivors(int s) const { return selection.survival(s) * selection.survival(view.k + 1 - s); }
+        double survivors(int s) const { return survival.light(s) * survival.camera(view.k + 1 - s); }
         double next_event() const { return selection.rays.sigma(view); }
         double connect(int) const { return selection.connection_density; }
         double lens() const { return selection.light_paths_per_iteration; }
     };
-    OnPath on(const PathView& view) const { return {{view}, *this}; }
+    OnPath on(const PathView& view) const { return {{view}, *this, {survival, view}}; }
 };
 
 template <class Selection = UniformSelection>

@@ -68,20 +68,21 @@ struct SubspaceSelection {
 
     struct OnPath : PlainTechniques {
         const SubspaceSelection& selection;
+        PathSurvival survival;
 
         /// Draws among prefixes make up for roulette: a survivor has that much more throughput.
-        double survivors(int s) const { return s == view.k ? selection.survival(s) : selection.survival(view.k + 1 - s); }
+        double survivors(int s) const { return s == view.k ? survival.light(s) : survival.camera(view.k + 1 - s); }
         double next_event() const { return selection.rays.sigma(view); }
         double connections() const { return selection.connections; }
         double connect(int s) const { return connect(s, 1); }
         double connect(int s, double share) const {
             const double target = selection.affinity(view, s, share) * view.light_throughput[s];
             const bool limited = selection.cache_paths > 0 && target > 0;
-            return limited ? 1 / (1 / target + 1 / (selection.cache_paths * selection.survival(s))) : target;
+            return limited ? 1 / (1 / target + 1 / (selection.cache_paths * survival.light(s))) : target;
         }
         double lens() const { return selection.light_paths_per_iteration; }
     };
-    OnPath on(const PathView& view) const { return {{view}, *this}; }
+    OnPath on(const PathView& view) const { return {{view}, *this, {survival, view}}; }
 };
 
 /// The selection of `spcbpt`, corrected for what its connections share.

@@ -109,7 +109,7 @@ inline std::optional<std::vector<PathVertex>> rebuild_light(const Scene& scene, 
     for (int i = 1; i < s; ++i) {
         PathVertex v;
         arrive<TransportMode::kImportance>(ray, y.back().p, y.back().ng, i > 1 || e.is_area(), point_of(path.x[size_t(i)]), &v);
-        v.bsdf = path.x[size_t(i)].bsdf;
+        v.set_bsdf(path.x[size_t(i)].bsdf);
         y.push_back(v);
         if (i + 1 == s) break;
         const Vec3 w = normalize(path.x[size_t(i + 1)].p - path.x[size_t(i)].p);
@@ -136,7 +136,7 @@ inline std::optional<std::vector<PathVertex>> rebuild_camera(const Scene& scene,
         const PathVertex& x = path.x[size_t(k - j)];
         PathVertex v;
         arrive<TransportMode::kRadiance>(ray, z.back().p, z.back().ng, j > 1, point_of(x), &v);
-        v.bsdf = x.bsdf;
+        v.set_bsdf(x.bsdf);
         z.push_back(v);
         const bool last = j + 1 == t;
         if (last && !leaves) break;

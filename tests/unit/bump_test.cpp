@@ -82,6 +82,18 @@ TEST(Bump, OfAKnownSlopeGivesTheExpectedNormal) {
     }
 }
 
+/// A height may be negative: images of floats are not cut off at zero, as colours are.
+TEST(Bump, OfNegativeHeightsTiltsTheOtherWay) {
+    const auto tilted = [](const std::string& scale) {
+        const auto scene =
+            build(kRamp + "\"float scale\" " + scale + " Material \"diffuse\" \"texture displacement\" \"h\" " + quad(1, 1, false));
+        return hit(*scene, {0.4f, 2, -0.6f}, {0, -1, 0}).shading.n;
+    };
+    const Vec3 up = tilted("1"), down = tilted("-1");
+    EXPECT_LT(up.x, -0.1f);
+    EXPECT_LT(length(Vec3{-up.x, up.y, -up.z} - down), 1e-4f);
+}
+
 TEST(Bump, GoesAlongTheSideThatTheNormalsShow) {
     const SurfacePoint turned = hit(*build(kBumped + "ReverseOrientation " + quad(2, 1, false)), {1.1f, 1, -0.4f}, {0, -1, 0});
     expect_vector(turned.shading.n, normalize(Vec3{-kSlopeU / 2, -1, kSlopeV}));
@@ -309,7 +321,7 @@ TEST(Bump, InSceneFiles) {
     expect_warning(R"(Material "diffuse" "string normalmap" "n.tga")", "decoded as sRGB",
                    {{"n.tga", testing::tga(1, 1, "\xff\x80\x80")}});
     expect_warning(R"(Material "interface" "float displacement" 1 Shape "sphere")", "no surface");
-    expect_error(R"(Shape "plymesh" "string filename" "a.ply" "texture displacement" "d")", {"bake it into the mesh"});
+    expect_error(R"(Shape "plymesh" "string filename" "a.ply" "texture displacement" "d")", {"--without displacement"});
 }
 
 }  // namespace

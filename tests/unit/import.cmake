@@ -1,4 +1,5 @@
 lightloom_test(import_test LINK lt_import)
+lightloom_test(import_range_test LINK lt_import)
 lightloom_test(import_shapes_test LINK lt_import)
 lightloom_test(import_film_test LINK lt_import)
 lightloom_test(import_lights_test LINK lt_import)

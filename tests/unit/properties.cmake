@@ -13,3 +13,4 @@ target_sources(catalog_test PRIVATE ${LIGHTLOOM_DUMMY_ALGORITHM} ${LIGHTLOOM_STU
 lightloom_test(streams_test LINK lt_work)
 lightloom_test(both_ends_test LINK lt_transport)
 lightloom_test(contact_test LINK lt_transport)
+lightloom_test(spot_noise_test LINK lt_transport)

@@ -165,6 +165,26 @@ void each_weighted(const Scene& scene, const FullPath& path, Technique own, cons
     });
 }
 
+/// Glass keeps sub-paths alive: of a path of ten edges whose inner vertices x_3 ... x_6 are glass, roulette at those counts for
+/// nothing, from whichever end. Mutation: PathSurvival without mark().
+TEST(TypicalSurvival, LosslessVerticesDoNotCount) {
+    const TypicalSurvival typical(RouletteRule{.first_vertex = 3, .min_survival = 0.5f});
+    PathView view;
+    view.k = 10;
+    for (int i = 0; i <= view.k; ++i) view.lossless[i] = i >= 3 && i <= 6;
+    const PathSurvival survival(typical, view);
+    const auto events = [&](int first, int last) {  // of x_first ... x_last
+        int lossy = 0;
+        for (int i = first; i <= last; ++i) lossy += !view.lossless[i];
+        return std::pow(double(TypicalSurvival::kPerEvent), lossy);
+    };
+    for (int s = 3; s <= view.k; ++s) EXPECT_NEAR(survival.light(s), events(2, s - 2), 1e-9) << s;
+    for (int t = 3; t <= view.k + 1; ++t) EXPECT_NEAR(survival.camera(t), events(view.k - t + 2, view.k - 2), 1e-9) << t;
+    for (int i = 0; i <= view.k; ++i) view.lossless[i] = false;
+    const PathSurvival plain(typical, view);
+    for (int n = 1; n <= view.k; ++n) EXPECT_EQ(plain.light(n), typical(n)), EXPECT_EQ(plain.camera(n), typical(n));
+}
+
 /// Numbers of subspaces are names: the weights do not know them.
 TEST(Labels, PermutedWithTheirRowsKeepEveryWeight) {
     const auto scene = testing::glossy();
