@@ -182,7 +182,10 @@ TEST(TypicalSurvival, LosslessVerticesDoNotCount) {
     for (int t = 3; t <= view.k + 1; ++t) EXPECT_NEAR(survival.camera(t), events(view.k - t + 2, view.k - 2), 1e-9) << t;
     for (int i = 0; i <= view.k; ++i) view.lossless[i] = false;
     const PathSurvival plain(typical, view);
-    for (int n = 1; n <= view.k; ++n) EXPECT_EQ(plain.light(n), typical(n)), EXPECT_EQ(plain.camera(n), typical(n));
+    for (int n = 1; n <= view.k; ++n) {
+        EXPECT_EQ(plain.light(n), typical(n));
+        EXPECT_EQ(plain.camera(n), typical(n));
+    }
 }
 
 /// Numbers of subspaces are names: the weights do not know them.
