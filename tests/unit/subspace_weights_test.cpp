@@ -155,8 +155,7 @@ TEST(Walk, DoesNotFollowDirectionsOfZeroDensity) {
 
 /// Calls visit(technique, view of a, view of b) for every technique of spcbpt that can make the path.
 template <class Visit>
-void each_weighted(const Scene& scene, const FullPath& path, Technique own, const SpcbptWeights& a, const SpcbptWeights& b,
-                   Visit&& visit) {
+void each_weighted(const Scene& scene, const FullPath& path, const SpcbptWeights& a, const SpcbptWeights& b, Visit&& visit) {
     testing::for_each_technique(path.k(), [&](Technique t) {
         if (t.kind == TechniqueKind::kMerge) return;
         const auto ra = rebuild(scene, path, t, &a), rb = rebuild(scene, path, t, &b);
@@ -222,9 +221,9 @@ TEST(Labels, PermutedWithTheirRowsKeepEveryWeight) {
     uint64_t compared = 0;
     testing::for_each_path(
         *scene, 500, 6, 61,
-        [&](const FullPath& path, Technique own, const PathView&, const Rgb&) {
+        [&](const FullPath& path, Technique, const PathView&, const Rgb&) {
             if (path.k() < 2) return;
-            each_weighted(*scene, path, own, a, b, [&](Technique t, const PathView& va, const PathView& vb) {
+            each_weighted(*scene, path, a, b, [&](Technique t, const PathView& va, const PathView& vb) {
                 EXPECT_EQ(a.weight(va, t), b.weight(vb, t));
                 ++compared;
             });
@@ -265,9 +264,9 @@ TEST(Labels, SplitSubspacesWithSharedGammaKeepEveryWeight) {
     uint64_t compared = 0, in_new = 0;
     testing::for_each_path(
         *scene, 500, 6, 62,
-        [&](const FullPath& path, Technique own, const PathView&, const Rgb&) {
+        [&](const FullPath& path, Technique, const PathView&, const Rgb&) {
             if (path.k() < 2) return;
-            each_weighted(*scene, path, own, a, b, [&](Technique t, const PathView& va, const PathView& vb) {
+            each_weighted(*scene, path, a, b, [&](Technique t, const PathView& va, const PathView& vb) {
                 const double weight = a.weight(va, t);
                 EXPECT_NEAR(b.weight(vb, t), weight, 1e-6 * weight);
                 ++compared;
