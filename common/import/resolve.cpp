@@ -127,18 +127,23 @@ void resolve_shapes(Context* context) {
     for (PendingShape& shape : context->shapes) d.guard([&] { add_shape(context, std::move(shape)); });
     context->shapes.clear();
     // Definitions that no shape uses are still checked: a typing error in them should not wait for their first use.
-    for (const auto& [name, definition] : context->named_materials)
-        d.guard([&] { resolve_material_reference(context, {true, name, 0, definition.parameters.where()}); });
+    const auto for_each_definition = [&](const std::map<std::string, Definition>& definitions, const auto& check) {
+        for (const auto& entry : definitions) d.guard([&] { check(entry.first, entry.second.parameters.where()); });
+    };
+    for_each_definition(context->named_materials, [&](const std::string& name, const Location& where) {
+        resolve_material_reference(context, {true, name, 0, where});
+    });
     for (size_t i = 1; i < context->anonymous_materials.size(); ++i)
         d.guard([&] {
             resolve_material_reference(context, {false, "", int(i), context->anonymous_materials[i].parameters.where()});
         });
-    for (const auto& [name, definition] : context->float_textures)
-        d.guard([&] { named_texture(context, definition.parameters.where(), name, TextureUse::kFloat); });
-    for (const auto& [name, definition] : context->spectrum_textures) {
+    for_each_definition(context->float_textures, [&](const std::string& name, const Location& where) {
+        named_texture(context, where, name, TextureUse::kFloat);
+    });
+    for_each_definition(context->spectrum_textures, [&](const std::string& name, const Location& where) {
         const bool used = context->resolved_textures.contains({name, TextureUse::kUnbounded});
-        if (!used) d.guard([&] { named_texture(context, definition.parameters.where(), name, TextureUse::kReflectance); });
-    }
+        if (!used) named_texture(context, where, name, TextureUse::kReflectance);
+    });
 }
 
 }  // namespace lightloom::import
