@@ -30,11 +30,13 @@ struct NextEventRays {
 /// The i-th of `count` points that divide the unit square (and, apart from them, the unit interval) evenly, whichever the first
 /// one is: steps of the generalised golden ratios of the plane and the line, modulo one.
 inline Vec2 evenly_after(Vec2 first, int i) {
+    if (i == 0) return first;
     const auto wrapped = [](float v) { return v < 1 ? v : v - 1; };
     const auto step = [i](double ratio) { return float(i * ratio - double(int(i * ratio))); };
     return {wrapped(first.x + step(0.7548776662466927)), wrapped(first.y + step(0.5698402909980532))};
 }
 inline double evenly_after(double first, int i) {
+    if (i == 0) return first;
     const double moved = first + i * 0.6180339887498949;
     return moved - double(int(moved));
 }
