@@ -64,6 +64,7 @@ Status write_statistics(const std::string& path, const JobInfo& job, const Diges
                  {"dropped_samples", job.dropped_samples},
                  {"duplicates_same", job.duplicates_same},
                  {"duplicates_different", job.duplicates_different}};
+    if (job.rare_light != RareLightReport{}) json["rare_light"] = to_json(job.rare_light);
     if (job.tables.asset.size_bytes > 0) json["tables"] = to_json(job.tables);
     return write_file_atomically(path, json.dump(1) + "\n");
 }
@@ -77,6 +78,26 @@ void report_dropped(const JobInfo& job, const std::string& manifest) {
     for (const Json& sample : json["dropped"]["first"]) {
         const std::string command = sample.value("replay", std::string());
         if (commands.insert(command).second) std::fprintf(stderr, "  %s\n", command.c_str());
+    }
+}
+
+/// What the image does not show of its own error.
+void warn_of_rare_light(const JobInfo& job) {
+    const RareLightReport& rare = job.rare_light;
+    if (rare.mean_error > RareLightReport::kNotableError) {
+        std::fprintf(
+            stderr,
+            "lightloom: warning: about %.0f %% of the light comes through glass or mirrors to where only a chance hit of a "
+            "lamp finds it; %.2g sample(s) of this job can be expected to have done so. The image may be too dark or "
+            "spotted (standard error of its mean %.0f %%); larger lamps or more samples help\n",
+            100 * rare.share, rare.expected_hits, 100 * rare.mean_error);
+    }
+    if (rare.unreachable_share > RareLightReport::kNotableShare) {
+        std::fprintf(
+            stderr,
+            "lightloom: warning: about %.0f %% of the light comes through glass or mirrors from lights that cannot be hit, "
+            "and `%s` cannot find it; a small sphere in place of a point light can be hit\n",
+            100 * rare.unreachable_share, job.algorithm.c_str());
     }
 }
 
@@ -229,6 +250,7 @@ int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTi
                     files.digest.hex().c_str());
         if (!options.png.empty()) std::printf("%s\n", options.png.c_str());
     }
+    if (!options.quiet) warn_of_rare_light(job);
     if (job.dropped_samples > 0) {
         report_dropped(job, files.manifest);
         if (options.strict) return kDroppedSamples;

@@ -146,6 +146,12 @@ Status Coordinator::write_results(JobRecord& job) {
     const auto image = encode_image(spec, *reducer, std::move(layers));
     if (!image.ok()) return image.status();
     const Digest digest = sha256(*image);
+    RareLight rare_light;
+    {
+        const std::lock_guard lock(mutex_);
+        rare_light = job.rare_light;
+    }
+    const RareLightReport rare_light_report = reducer->rare_light_report(rare_light);
 
     Manifest manifest;
     {
@@ -161,6 +167,7 @@ Status Coordinator::write_results(JobRecord& job) {
         for (const UnitTable::Merged& unit : manifest.units) job.workers.insert(unit.worker);
         job.counters = reducer->counters();
         job.dropped = reducer->dropped();
+        job.rare_light_report = rare_light_report;
         manifest.job = job.info(options_.clock());
         manifest.identity = options_.identity;
         manifest.created_at = job.created_at;

@@ -233,6 +233,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     }
     const UnitCounters counters = partial.counters;
     const uint64_t dropped = partial.dropped_count;
+    const RareLight rare_light = partial.rare_light;
     const double splats_per_path =
         unit.render.light_path_count > 0 ? double(partial.splats.size()) / double(unit.render.light_path_count) : 0;
     const auto refused = reducer->add(unit, std::move(partial));
@@ -261,6 +262,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     job->workers.insert(index);
     job->counters += counters;
     job->dropped += dropped;
+    if (unit.key == UnitKey{}) job->rare_light = rare_light;
     const uint32_t groups = reducer->folded_groups();
     if (groups > job->merged_groups) {
         job->merged_groups = groups;

@@ -79,6 +79,7 @@ JobInfo JobRecord::info(TimePoint now) const {
     info.duplicates_same = duplicates_same;
     info.duplicates_different = duplicates_different;
     info.tables = tables;
+    info.rare_light = rare_light_report;
     tell_rendering(*this, now, &info);
     tell_preparation(*this, now, &info);
     return info;

@@ -42,6 +42,8 @@ struct JobRecord {
     std::set<uint32_t> workers;             ///< Indices of those whose units were merged.
     UnitCounters counters;  ///< Of all units that arrived; in the end, of those that are in the image. So is `dropped`.
     uint64_t dropped = 0;
+    RareLight rare_light;               ///< From the first unit, once that is merged.
+    RareLightReport rare_light_report;  ///< Of the finished image.
     uint64_t duplicates_same = 0, duplicates_different = 0, expired_leases = 0, rejected = 0;
     Digest image_digest;
     uint64_t image_size = 0;

@@ -107,4 +107,16 @@ Result<RgbImage> Reducer::variance() const {
     return sums_ ? sums_->complete().variance() : RgbImage();
 }
 
+RareLightReport Reducer::rare_light_report(const RareLight& light) const {
+    if (!light.known()) return {};
+    const auto developed = image();
+    if (!developed.ok()) return {};
+    double sum = 0;
+    const std::vector<float>& pixels = developed->pixels;
+    for (size_t i = 0; i + 2 < pixels.size(); i += 3) sum += double(Rgb(pixels[i], pixels[i + 1], pixels[i + 2]).luminance());
+    const FilmResponse::Triple grey = response_.of(Rgb(1.0f));
+    const double exposure = double(Rgb(float(grey[0]), float(grey[1]), float(grey[2])).luminance());
+    return RareLightReport::of(light, double(counters().camera_samples), 3 * sum / double(pixels.size()), exposure);
+}
+
 }  // namespace lightloom

@@ -47,6 +47,8 @@ class Reducer {
     /// Developed complete groups; kFailedPrecondition before the first.
     Result<RgbImage> image() const;
     Result<RgbImage> variance() const;
+    /// What `light` means for the image of the complete groups.
+    RareLightReport rare_light_report(const RareLight& light) const;
 
   private:
     Result<std::vector<Refusal>> add_locked(const WorkUnit& unit, Partial partial);

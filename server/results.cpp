@@ -76,6 +76,13 @@ Json settings_json(const JobSpec& spec) {
     return fields_json(spec, [](unsigned roles) { return bool(roles & job_role::kSettings); });
 }
 
+Json to_json(const RareLightReport& report) {
+    return {{"share", report.share},
+            {"unreachable_share", report.unreachable_share},
+            {"expected_hits", report.expected_hits},
+            {"mean_error", report.mean_error}};
+}
+
 Json to_json(const TablesInfo& t) {
     return {{"sha256", t.asset.digest.hex()},
             {"size_bytes", t.asset.size_bytes},
@@ -147,6 +154,7 @@ std::string to_json(const Manifest& m) {
                     {"rejected_results", m.rejected_results},
                     {"duplicates_same", m.job.duplicates_same},
                     {"duplicates_different", m.job.duplicates_different}};
+    if (m.job.rare_light != RareLightReport{}) json["rare_light"] = to_json(m.job.rare_light);
     Json dropped = Json::array();
     for (const Reducer::Dropped& d : m.dropped) {
         dropped.push_back({{"unit", {d.unit.group, d.unit.tile}},

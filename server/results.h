@@ -43,6 +43,8 @@ std::string replay_command(const JobSpec& spec, const std::string& scene, const 
                            const std::vector<std::string>& without = {});
 /// What light transport was asked for, as manifests and reports of references show it.
 nlohmann::ordered_json settings_json(const JobSpec& spec);
+/// Light that may not have been found, as manifests, statistics and the status endpoint show it.
+nlohmann::ordered_json to_json(const RareLightReport& report);
 /// Tables as manifests and statistics show them.
 nlohmann::ordered_json to_json(const TablesInfo& tables);
 /// The manifest as JSON text.

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "server/host_port.h"
+#include "server/results.h"
 
 namespace lightloom {
 namespace {
@@ -41,6 +42,7 @@ std::string status_json(const Coordinator& coordinator) {
                         {"render_seconds", j.render_seconds},
                         {"eta_seconds", j.eta_seconds >= 0 ? Json(j.eta_seconds) : Json(nullptr)},
                         {"dropped_samples", j.dropped_samples},
+                        {"rare_light", to_json(j.rare_light)},
                         {"workers", j.worker_count},
                         {"duplicates_different", j.duplicates_different}});
     }

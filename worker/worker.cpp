@@ -196,6 +196,12 @@ Status Worker::render_unit(const UnitLease& lease, std::stop_token unit_stop, st
     const auto seconds = in_turn(lease, unit_stop, drain, [&] { partial = (*renderer)->render(lease.unit.render, unit_stop); });
     if (!seconds.ok()) return seconds.status();
     if (!partial.ok()) return partial.status();
+    // What samples cannot tell of the job's error is estimated once, by whoever renders its first unit.
+    if (lease.unit.key == UnitKey{}) {
+        const auto looked = in_turn(lease, unit_stop, drain, [&] { partial->rare_light = (*renderer)->rare_light(unit_stop); });
+        if (!looked.ok()) return looked.status();
+        if (unit_stop.stop_requested()) return {StatusCode::kCancelled, "given back"};
+    }
     return submit(
         lease, [&](const std::string& worker_id) { return port_.submit_result(worker_id, lease, *partial, *seconds); }, drain);
 }

@@ -74,6 +74,7 @@ Result<PartialBounds> check_partial(const Partial& partial, const FrameLayout& f
             return data_loss("partial: dropped sample in pixel " + std::to_string(dropped.pixel) + " outside the crop");
         }
     }
+    if (!partial.rare_light.is_valid()) return data_loss("partial: its estimate of rare light is negative or not finite");
     return PartialBounds{std::bit_cast<double>(camera_bits), std::bit_cast<double>(splat_bits)};
 }
 

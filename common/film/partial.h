@@ -9,6 +9,7 @@
 
 #include "common/core/result.h"
 #include "common/film/frame.h"
+#include "common/film/rare_light.h"
 
 namespace lightloom {
 
@@ -54,6 +55,7 @@ struct Partial {
     uint64_t dropped_count = 0;          ///< Non-finite samples dropped.
     std::vector<DroppedSample> dropped;  ///< The first of them, at most kMaxDroppedRecords.
     UnitCounters counters;
+    RareLight rare_light;  ///< Of the whole job, from its very first unit; no other one has it.
 
     static constexpr size_t kMaxDroppedRecords = 16;
 };

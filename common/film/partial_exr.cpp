@@ -228,6 +228,7 @@ Result<EncodedPartial> encode_partial(const Partial& partial, const FrameLayout&
     d.dropped_count = partial.dropped_count;
     d.dropped = partial.dropped;
     d.counters = partial.counters;
+    d.rare_light = partial.rare_light;
     d.payload_size = bytes.size();
     d.payload_digest = sha256(bytes);
     return encoded;

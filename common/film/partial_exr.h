@@ -31,6 +31,7 @@ struct PartialDescriptor {
     uint64_t dropped_count = 0;
     std::vector<DroppedSample> dropped;
     UnitCounters counters;
+    RareLight rare_light;
     uint64_t payload_size = 0;  ///< Bytes.
     Digest payload_digest;      ///< SHA-256 of the payload.
 };

@@ -36,6 +36,7 @@ struct Corrected {
         }
     };
     OnPath on(const PathView& view) const { return OnPath{{inner.on(view)}, correction}; }
+    auto next_event_rays() const { return inner.next_event_rays(); }
 };
 
 }  // namespace lightloom

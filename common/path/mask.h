@@ -60,6 +60,7 @@ struct Masked {
         }
     };
     OnPath on(const PathView& view) const { return OnPath{{inner.on(view)}, mask, view.k}; }
+    auto next_event_rays() const { return inner.next_event_rays(); }
 };
 
 }  // namespace lightloom

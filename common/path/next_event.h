@@ -9,9 +9,11 @@ namespace lightloom {
 /// The number that a camera vertex sends to points on lights: more where the camera's first hit is lit directly, which is most of
 /// what an image shows and costs no walk.
 struct NextEventRays {
-    int at_first = 1;  ///< From the first vertex; later ones send one. 0: there is no next event estimation at all.
+    int at_first = 1;  ///< From the first vertex.
+    int later = 1;     ///< From every later one.
 
-    int operator()(int t) const { return t == 2 || at_first == 0 ? at_first : 1; }
+    /// Of the last of a camera sub-path of t vertices, t >= 2.
+    int operator()(int t) const { return t == 2 ? at_first : later; }
     /// sigma / survivors(1) of next event estimation, as the weights ask for it.
     double sigma(const PathView& view) const { return double((*this)(view.k)) * trust(view) * view.next_event / view.fwd[0]; }
 

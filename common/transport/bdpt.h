@@ -31,6 +31,7 @@ struct BdptSelection {
         double lens() const { return light_paths_per_iteration; }
     };
     OnPath on(const PathView& view) const { return {{view}, light_paths_per_iteration, rays}; }
+    NextEventRays next_event_rays() const { return rays; }
 };
 
 /// Traces one camera sample and one light sub-path and calls contribute(contribution, view) for everything that they give.
@@ -67,14 +68,13 @@ template <class Selection = BdptSelection>
 struct BdptAlgorithm {
     Selection selection;
     Heuristic heuristic = Heuristic::kBalance;
-    NextEventRays rays;
 
     float weight(const PathView& view, Technique own) const { return float(mis_weight(view, own, selection.on(view), heuristic)); }
 
     template <class Contribute>
     void trace(SampleContext& context, Contribute&& contribute) const {
         trace_bdpt_sample<ViewDetail::kFull>(
-            context, rays, [](const PathVertex*, int) {}, contribute);
+            context, selection.next_event_rays(), [](const PathVertex*, int) {}, contribute);
     }
 };
 

@@ -3,9 +3,10 @@
 // the cache a camera vertex is connected to, and with what densities the weights reckon:
 //
 //   struct Method {
-//       Selection selection(const UnitScope&) const;   // the densities of one unit's weights (common/path/mis.h), made before its
-//                                                      // first sub-path: what it has to trace itself, it traces from streams of
-//                                                      its own
+//       Selection selection(const UnitScope&) const;   // the densities of one unit's weights (common/path/mis.h) and the rays of
+//                                                      // its next event estimation beside s = 1 from the cache; made before the
+//                                                      // unit's first sub-path: what it has to trace itself, it traces from
+//                                                      // streams of its own
 //       Selection densities;                           // where all units have the same: weights can be asked about single paths
 //       static constexpr bool kUnitSelection;          // optional; whether they depend on more of the unit than its group
 //       static constexpr ViewDetail kDetail;
@@ -33,7 +34,6 @@ struct CachedAlgorithm {
     Method method;
     Heuristic heuristic = Heuristic::kBalance;
     uint64_t minimum_paths = 1;  ///< Of a unit's cache.
-    NextEventRays rays;          ///< Next event estimation beside s = 1 from the cache.
 
     static constexpr bool kUnitSelection = [] {
         if constexpr (requires { Method::kUnitSelection; }) return Method::kUnitSelection;
@@ -83,6 +83,7 @@ struct CachedAlgorithm {
     void trace(SampleContext& context, const State& state, Contribute&& contribute) const {
         constexpr ViewDetail kDetail = Method::kDetail;
         const Scene& scene = context.scene;
+        const NextEventRays rays = state.selection.next_event_rays();
         PathVertex* z = context.camera_path;
         PathView view;
         CameraSampler sampler(context.seed, context.iteration, context.pixel);

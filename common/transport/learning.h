@@ -36,7 +36,7 @@ struct LearningPlan {
     // How the weights of the render will count, where no table decides that.
     int connections = 1;  ///< N
     Correction correction = Correction::kUncorrected;
-    NextEventRays rays{0};
+    NextEventRays rays{0, 0};
 
     /// Samples of the rounds before this one.
     uint64_t first_sample(size_t round) const {

@@ -4,7 +4,7 @@
 //
 // Every camera vertex is connected to N prefixes drawn uniformly from the unit's cache (V prefixes of M paths). Densities:
 //   s = 0          rho = A(0)
-//   s = 1          rho = n next_event A(1)     next event estimation, as in `bdpt`, beside the cache's own
+//   s = 1          rho = n next_event A(1)     next event estimation at the first hit, beside the cache's own
 //   1 <= s <= k-1  rho = N / v  C(s) A(s)       v: expected number of prefixes per light path, a table. The estimator divides by
 //                                               what was really done, V / (M N): the weight must not know the realised V
 //   s = k          rho = N1 |crop| C(k)
@@ -32,6 +32,7 @@ struct UniformSelection {
         double lens() const { return selection.light_paths_per_iteration; }
     };
     OnPath on(const PathView& view) const { return {{view}, *this, {survival, view}}; }
+    NextEventRays next_event_rays() const { return rays; }
 };
 
 template <class Selection = UniformSelection>

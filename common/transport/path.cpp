@@ -13,8 +13,7 @@ constexpr ParameterInfo kParameters[] = {kRouletteStart, kRouletteMin, kHeuristi
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     return make_unit_renderer(r, [&](auto&& select) {
         const auto selection = select(PathSelection{next_event_of(r.settings.algorithm)});
-        return PathAlgorithm<std::remove_cvref_t<decltype(selection)>>{selection, heuristic_of(r.settings.algorithm),
-                                                                       next_event_of(r.settings.algorithm)};
+        return PathAlgorithm<std::remove_cvref_t<decltype(selection)>>{selection, heuristic_of(r.settings.algorithm)};
     });
 }
 

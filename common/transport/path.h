@@ -23,13 +23,13 @@ struct PathSelection {
         double next_event() const { return rays.sigma(view); }
     };
     OnPath on(const PathView& view) const { return {{view}, rays}; }
+    NextEventRays next_event_rays() const { return rays; }
 };
 
 template <class Selection = PathSelection>
 struct PathAlgorithm {
     Selection selection;
     Heuristic heuristic = Heuristic::kBalance;
-    NextEventRays rays;
 
     float weight(const PathView& view, Technique own) const { return float(mis_weight(view, own, selection.on(view), heuristic)); }
 
@@ -37,6 +37,7 @@ struct PathAlgorithm {
     void trace(SampleContext& context, Contribute&& contribute) const {
         constexpr ViewDetail kDetail = ViewDetail::kLightEnd;
         const Scene& scene = context.scene;
+        const NextEventRays rays = selection.next_event_rays();
         CameraSampler sampler(context.seed, context.iteration, context.pixel);
         PathVertex* z = context.camera_path;
         PathView view;

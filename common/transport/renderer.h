@@ -71,6 +71,9 @@ class Renderer {
     virtual Result<Partial> watch(const RenderUnit& work, const std::function<void(const SeenContribution&)>& see,
                                   std::stop_token stop) const = 0;
 
+    /// Of the job as a whole; see estimate_rare_light().
+    virtual RareLight rare_light(std::stop_token stop) const = 0;
+
     /// Null for an algorithm whose weights cannot be asked about single paths (its own loops, weights of the unit's own).
     virtual std::unique_ptr<PathWeights> weights() const = 0;
 };

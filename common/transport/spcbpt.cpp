@@ -63,7 +63,7 @@ LearningPlan plan(const AlgorithmSettings& s) {
             .rounds = rounds_with_pilot(samples, s.value("pilot")),
             .connections = CacheParameters::of(s).connections,
             .correction = correction_of(s),
-            .rays = next_event_of(s)};
+            .rays = next_event_beside_cache_of(s)};
 }
 
 Result<Tables> learn(const LearnRequest& r) {
@@ -98,11 +98,11 @@ Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
                                     .cache_paths = settings.value("ris-aware") != 0 ? double(p.minimum_paths) : 0,
                                     .correction = correction_of(settings),
                                     .roulette = roulette_of(settings),
-                                    .rays = next_event_of(settings)});
+                                    .rays = next_event_beside_cache_of(settings)});
     return make_unit_renderer(r, [&](auto&& select) {
         const auto selection = select(densities);
         return SpcbptAlgorithm<std::remove_cvref_t<decltype(selection)>>{
-            {selection, prepared, p.connections}, heuristic_of(settings), p.minimum_paths, next_event_of(settings)};
+            {selection, prepared, p.connections}, heuristic_of(settings), p.minimum_paths};
     });
 }
 

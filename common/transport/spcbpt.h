@@ -7,7 +7,7 @@
 //     (1 / N) w f / (p(Y) p(Z))  /  (M_i Gamma(i, j) P2(Y))                                       [Eq. 10 with its p(Y)]
 // Effective densities, with F the measurement contribution of a prefix and L its scalar:
 //     s = 0          rho = A(0)
-//     s = 1          rho = n next_event A(1)                     next event estimation, as in `bdpt`, beside the cache's own
+//     s = 1          rho = n next_event A(1)                     next event estimation at the first hit, beside the cache's own
 //     1 <= s <= k-1  rho = N Gamma(i, j) L(F(s)) / Q(i) A(s)                                      [Eq. 11]: the target, not
 //                    what was really drawn; with ris_aware 1 / rho = 1 / rho + 1 / (M C(s) A(s)): a cache of M paths cannot
 //                    deliver more than that; with correlation_aware N c_s stands for N (common/path/correlation.h)
@@ -83,6 +83,7 @@ struct SubspaceSelection {
         double lens() const { return selection.light_paths_per_iteration; }
     };
     OnPath on(const PathView& view) const { return {{view}, *this, {survival, view}}; }
+    NextEventRays next_event_rays() const { return rays; }
 };
 
 /// The selection of `spcbpt`, corrected for what its connections share.

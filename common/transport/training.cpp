@@ -296,7 +296,7 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
                                                                 .correction = plan_.correction,
                                                                 .roulette = roulette_,
                                                                 .rays = plan_.rays});
-    const SpcbptAlgorithm<> generator{{selection, guide_, plan_.connections}, heuristic_, 1, plan_.rays};
+    const SpcbptAlgorithm<> generator{{selection, guide_, plan_.connections}, heuristic_, 1};
     const RenderUnit work = unit.light_work();
     const RenderToCome render = unit.render();
     // Light sub-paths are traced in parallel; what they bring is joined in their order.

@@ -5,6 +5,7 @@
 
 #include "common/core/check.h"
 #include "common/transport/parameters.h"
+#include "common/transport/rare_light.h"
 #include "common/transport/renderer.h"
 #include "common/transport/unit_loop.h"
 
@@ -151,6 +152,8 @@ class UnitRenderer final : public Renderer {
         else
             return run(Watched<A>{algorithm_, see});
     }
+
+    RareLight rare_light(std::stop_token stop) const override { return estimate_rare_light(*scene_, settings_, std::move(stop)); }
 
     std::unique_ptr<PathWeights> weights() const override { return weights_of(algorithm_); }
 

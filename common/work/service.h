@@ -115,6 +115,7 @@ struct JobInfo {
     uint64_t phase_done = 0, phase_total = 0;          ///< Training samples; in kLearning thousandths of the work.
     std::string waits_for;                             ///< The job that makes the tables, in kWaitingForTables.
     TablesInfo tables;
+    RareLightReport rare_light;  ///< Of a finished job.
 };
 /// For people: "waiting for the tables of job-0123".
 std::string phase_text(const JobInfo& job);

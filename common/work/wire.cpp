@@ -213,6 +213,13 @@ void put(const JobInfo& in, v1::Job* out) {
     out->set_phase_total_count(in.phase_total);
     out->set_waits_for(in.waits_for);
     if (in.tables.asset.size_bytes > 0) put_tables(in.tables, out->mutable_tables());
+    if (in.rare_light != RareLightReport{}) {
+        v1::RareLightSummary* rare = out->mutable_rare_light();
+        rare->set_share(in.rare_light.share);
+        rare->set_unreachable_share(in.rare_light.unreachable_share);
+        rare->set_expected_hit_count(in.rare_light.expected_hits);
+        rare->set_mean_error(in.rare_light.mean_error);
+    }
 }
 
 Result<JobInfo> get(const v1::Job& in) {
@@ -239,6 +246,10 @@ Result<JobInfo> get(const v1::Job& in) {
     info.camera_samples = in.camera_sample_count();
     info.light_paths = in.light_path_count();
     info.rays = in.ray_count();
+    info.rare_light = {.share = in.rare_light().share(),
+                       .unreachable_share = in.rare_light().unreachable_share(),
+                       .expected_hits = in.rare_light().expected_hit_count(),
+                       .mean_error = in.rare_light().mean_error()};
     info.worker_count = in.worker_count();
     if (info.state == JobState::kSucceeded) {
         auto digest = get(in.image_digest());
@@ -360,6 +371,28 @@ Result<SubmitAck> get(const v1::SubmitResultResponse& in) {
     return SubmitAck{SubmitOutcome(int(in.outcome()) - 1), in.reason()};
 }
 
+namespace {
+
+void put(const RareLight& in, v1::RareLight* out) {
+    for (int c = 0; c < 3; ++c) {
+        out->add_by_chance(in.by_chance[c]);
+        out->add_unreachable(in.unreachable[c]);
+    }
+    out->set_second_moment(in.second_moment);
+    out->set_merge_count(in.merges);
+}
+
+Result<RareLight> get(const v1::RareLight& in) {
+    if (in.by_chance_size() != 3 || in.unreachable_size() != 3)
+        return invalid_argument("colours of rare light have three channels");
+    return RareLight{{in.by_chance(0), in.by_chance(1), in.by_chance(2)},
+                     {in.unreachable(0), in.unreachable(1), in.unreachable(2)},
+                     in.second_moment(),
+                     in.merge_count()};
+}
+
+}  // namespace
+
 void put(const PartialDescriptor& in, v1::SubmitResultHeader* out) {
     put(in.payload_digest, out->mutable_payload_digest());
     out->set_payload_size_bytes(in.payload_size);
@@ -378,6 +411,7 @@ void put(const PartialDescriptor& in, v1::SubmitResultHeader* out) {
     out->set_ray_count(in.counters.rays);
     out->set_vertex_count(in.counters.vertices);
     out->set_connection_count(in.counters.connections);
+    if (in.rare_light != RareLight{}) put(in.rare_light, out->mutable_rare_light());
 }
 
 Result<PartialDescriptor> get(const v1::SubmitResultHeader& in) {
@@ -399,6 +433,11 @@ Result<PartialDescriptor> get(const v1::SubmitResultHeader& in) {
                     .rays = in.ray_count(),
                     .vertices = in.vertex_count(),
                     .connections = in.connection_count()};
+    if (in.has_rare_light()) {
+        const auto rare_light = get(in.rare_light());
+        if (!rare_light.ok()) return rare_light.status();
+        out.rare_light = *rare_light;
+    }
     return out;
 }
 

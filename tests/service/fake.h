@@ -73,6 +73,7 @@ class FakeRenderer final : public Renderer {
                           std::stop_token stop) const override {
         return render(work, stop);
     }
+    RareLight rare_light(std::stop_token) const override { return {}; }
     std::unique_ptr<PathWeights> weights() const override { return nullptr; }
 
   private:

@@ -55,8 +55,8 @@ TEST(Stubs, NextEventBesideTheCacheHasTheSameMean) {
         const auto scene = make();
         const RegionMeans bdpt = reference(scene);
         for (const int rays : {0, 1, 4}) {
-            const UniformSelection selection{double(scene->frame().crop.area()), 3 / 2.5, survival, {rays}};
-            const LvcbptAlgorithm<> algorithm{{selection, 3}, Heuristic::kBalance, 1000, {rays}};
+            const UniformSelection selection{double(scene->frame().crop.area()), 3 / 2.5, survival, {rays, rays > 0}};
+            const LvcbptAlgorithm<> algorithm{{selection, 3}, Heuristic::kBalance, 1000};
             EXPECT_TRUE(testing::compare(
                 bdpt,
                 testing::replicate(testing::algorithm_image(scene, algorithm, kMaxDepth, 8), scene->frame().crop, kSeeds, 3000),

@@ -50,6 +50,7 @@ struct TrustingSelection {
         double next_event() const { return trust * PathSelection::OnPath::next_event(); }
     };
     OnPath on(const PathView& view) const { return {PathSelection{}.on(view), trust}; }
+    NextEventRays next_event_rays() const { return {}; }
 };
 
 constexpr ParameterInfo kParameters[] = {

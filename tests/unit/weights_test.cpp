@@ -79,7 +79,7 @@ Family family_of_stubs(const Scene& scene) {
     family.push_back({"pairing stub", testing::weights_of(testing::PairingStubSelection{bdpt})});
     for (const int rays : {0, 1, 5})
         family.push_back({std::to_string(rays) + " rays beside the cache",
-                          testing::weights_of(UniformSelection{bdpt.light_paths_per_iteration, 0.37, survival, {rays}})});
+                          testing::weights_of(UniformSelection{bdpt.light_paths_per_iteration, 0.37, survival, {rays, rays > 0}})});
     return family;
 }
 

@@ -1,0 +1,202 @@
+#include "common/transport/rare_light.h"
+
+#include <algorithm>
+#include <boost/geometry.hpp>
+#include <boost/geometry/geometries/point.hpp>
+#include <boost/geometry/index/rtree.hpp>
+#include <iterator>
+#include <utility>
+#include <vector>
+
+#include "common/core/fork_join.h"
+#include "common/path/camera_walk.h"
+#include "common/path/light_walk.h"
+#include "common/transport/catalog.h"
+#include "common/transport/parameters.h"
+
+namespace lightloom {
+namespace {
+
+namespace bg = boost::geometry;
+using Point = bg::model::point<float, 3, bg::cs::cartesian>;
+using Box = bg::model::box<Point>;
+using Entry = std::pair<Point, uint32_t>;
+using PhotonMap = bg::index::rtree<Entry, bg::index::quadratic<16>>;
+
+constexpr size_t kPhotonPaths = 32768, kCameraSamples = 16384, kProbes = 2048, kChunk = 512;
+/// Longer chains of mirrors and glass carry next to nothing, and a closed room would be walked through to the end.
+constexpr int kLongestChain = 12;
+/// Of the length of the camera sub-path: some half degree, as seen from the lens.
+constexpr float kRadiusPerLength = 0.01f;
+
+/// Where light arrived through mirrors and glass alone.
+struct Photon {
+    Vec3 p, ng, wo;
+    Rgb flux;      ///< Per light sub-path.
+    Rgb radiance;  ///< Of the lamp, towards the first mirror or glass, as a camera sub-path from here would see it.
+    int edges = 0;
+    bool can_be_hit = false;
+};
+
+bool is_dirac(const PathVertex& v) { return !v.bsdf.has_smooth_lobe(); }
+
+struct Estimator {
+    const Scene& scene;
+    const uint64_t seed;
+    const int max_edges;
+    const Traces traces;
+    const RouletteRule endless{.first_vertex = kMaxEdges + 2, .min_survival = 1};
+
+    /// The photon of a light sub-path, if it leaves one; whether it met a mirror or glass at all.
+    bool trace_photon(size_t number, std::vector<PathVertex>& y, std::vector<Photon>* out) const {
+        LightSampler sampler({seed, Stage::kLightPool, 1, number});
+        WalkCounters counters;
+        const int n = trace_light_path(scene, sampler, int(y.size()), endless, y.data(), &counters);
+        if (n < 3 || !is_dirac(y[1])) return false;
+        int s = 2;
+        while (s < n && is_dirac(y[size_t(s)])) ++s;
+        if (s == n) return true;
+        const PathVertex &start = y[0], &end = y[size_t(s)];
+        // Where a camera sub-path leaves the glass again, it gets back what refraction took from its radiance.
+        float index_ratio = 1;
+        for (int i = 1; i < s; ++i) {
+            const PathVertex& v = y[size_t(i)];
+            index_ratio *= index_ratio2(v, v.shading.to_local(normalize(y[size_t(i) + 1].p - v.p)));
+        }
+        const EmitterSet& emitters = scene.emitters();
+        const Emitter& e = emitters[uint32_t(start.emitter)];
+        const Vec3 w = e.is_infinite() ? start.ng : normalize(y[1].p - start.p);
+        out->push_back(
+            {end.p, end.ng, end.wo, end.alpha, emitters.emitted(e, start.p, start.ng, w) * index_ratio, s, e.can_be_hit()});
+        return true;
+    }
+
+    /// Whether the camera sub-path z[0 .. t-1], whose end is not a Dirac vertex, goes on to a photon's chain without an edge that
+    /// some other technique connects.
+    bool only_hits_follow(const PathVertex* z, int t) const {
+        if (traces == Traces::kCamera) return true;
+        bool previous_is_dirac = false;  // the lens
+        for (int i = 1; i < t; ++i) {
+            const bool dirac = is_dirac(z[i]);
+            if (!dirac && !previous_is_dirac) return false;
+            previous_is_dirac = dirac;
+        }
+        return true;
+    }
+
+    /// What the camera sub-path z[0 .. t-1] meets.
+    void gather(const PhotonMap& map, const std::vector<Photon>& photons, const PathVertex* z, int t, float length,
+                RareLight* sum) const {
+        const PathVertex& v = z[t - 1];
+        const float radius = kRadiusPerLength * length;
+        const auto corner = [&](float r) { return Point(v.p.x + r, v.p.y + r, v.p.z + r); };
+        const Box box(corner(-radius), corner(radius));
+        for (auto found = map.qbegin(bg::index::intersects(box)); found != map.qend(); ++found) {
+            const Photon& photon = photons[found->second];
+            const Vec3 between = photon.p - v.p;
+            if (dot(between, between) > radius * radius || std::fabs(dot(photon.ng, v.ng)) < 0.8f) continue;
+            if (t - 1 + photon.edges > max_edges) continue;
+            const Scatter event = scatter<TransportMode::kRadiance>(v, photon.wo);
+            const float cosine = abs_dot(photon.wo, v.shading_normal());
+            if (!(event.pdf_fwd > 0) || !(cosine > 1e-3f)) continue;
+            const Rgb density = photon.flux * (1 / (kPi * radius * radius * float(kPhotonPaths)));
+            const Rgb energy = v.alpha * event.value * density * (1 / cosine);
+            if (!is_finite(energy)) continue;
+            ++sum->merges;
+            if (!photon.can_be_hit) {
+                sum->unreachable += energy;
+                continue;
+            }
+            sum->by_chance += energy;
+            // Of the camera sample that goes on through the chain to the lamp; what the chain absorbs, and roulette, is neglected.
+            const Rgb hit = v.alpha * event.value * (1 / event.pdf_fwd) * photon.radiance;
+            sum->second_moment += double(energy.luminance()) * double(hit.luminance());
+        }
+    }
+
+    /// Adds what camera sample number i finds; whether it met a mirror or glass.
+    bool trace_camera(size_t i, const PhotonMap* map, const std::vector<Photon>& photons, std::vector<PathVertex>& z,
+                      RareLight* sum) const {
+        const Rect crop = scene.frame().crop;
+        const Vec2 place = low_discrepancy_point(uint32_t(i), seed);
+        const int px = crop.x0 + std::min(crop.width() - 1, int(place.x * float(crop.width())));
+        const int py = crop.y0 + std::min(crop.height() - 1, int(place.y * float(crop.height())));
+        CameraSampler sampler(seed, uint64_t(i), uint64_t(crop.index(px, py)));
+        WalkCounters counters;
+        bool met_dirac = false;
+        float length = 0;
+        const auto visit = [&](int t) {
+            const PathVertex& v = z[size_t(t) - 1];
+            length += lightloom::length(v.p - z[size_t(t) - 2].p);
+            if (t > max_edges) return;
+            if (is_dirac(v)) {
+                met_dirac = true;
+            } else if (map && only_hits_follow(z.data(), t)) {
+                gather(*map, photons, z.data(), t, length, sum);
+            }
+        };
+        trace_camera_path(scene, sampler, px, py, max_edges, endless, z.data(), &counters, visit, [](int, const WalkRay&) {});
+        return met_dirac;
+    }
+};
+
+/// each(i, worker state) for i in [0, count), in chunks whose results are joined in their order.
+template <class Chunk, class Each>
+std::vector<Chunk> in_chunks(size_t count, size_t room, const Each& each) {
+    std::vector<Chunk> chunks((count + kChunk - 1) / kChunk);
+    fork_join(chunks.size(), [&](size_t first, size_t last) {
+        std::vector<PathVertex> vertices(room);
+        for (size_t c = first; c < last; ++c)
+            for (size_t i = c * kChunk; i < std::min(count, (c + 1) * kChunk); ++i) each(i, vertices, &chunks[c]);
+    });
+    return chunks;
+}
+
+}  // namespace
+
+RareLight estimate_rare_light(const Scene& scene, const RenderSettings& settings, std::stop_token stop) {
+    const AlgorithmInfo& info = settings.algorithm.info();
+    if (info.traces == Traces::kLight || scene.emitters().empty()) return {};
+    const Estimator estimator{scene, settings.seed, settings.max_edges(), info.traces};
+    const size_t light_room = size_t(std::min(settings.max_edges(), kLongestChain)) + 1,
+                 camera_room = size_t(settings.max_edges()) + 2;
+
+    // Most scenes have neither mirrors nor glass: a few sub-paths of both kinds tell.
+    bool met_dirac = false;
+    {
+        std::vector<PathVertex> vertices(std::max(light_room, camera_room));
+        std::vector<Photon> photons;
+        RareLight nothing;
+        std::vector<PathVertex> chain(light_room);
+        for (size_t i = 0; i < kProbes && !met_dirac; ++i)
+            met_dirac =
+                estimator.trace_photon(i, chain, &photons) || estimator.trace_camera(i, nullptr, photons, vertices, &nothing);
+    }
+    if (!met_dirac || stop.stop_requested()) return {};
+
+    std::vector<Photon> photons;
+    for (auto& chunk : in_chunks<std::vector<Photon>>(kPhotonPaths, light_room, [&](size_t i, auto&y, auto*out) {
+             if (!stop.stop_requested()) estimator.trace_photon(i, y, out);
+         }))
+        photons.insert(photons.end(), std::make_move_iterator(chunk.begin()), std::make_move_iterator(chunk.end()));
+    std::vector<Entry> entries;
+    for (size_t i = 0; i < photons.size(); ++i)
+        entries.emplace_back(Point(photons[i].p.x, photons[i].p.y, photons[i].p.z), uint32_t(i));
+    const PhotonMap map(entries.begin(), entries.end());
+
+    RareLight sum;
+    for (const RareLight& chunk : in_chunks<RareLight>(kCameraSamples, camera_room, [&](size_t i, auto&z, RareLight*out) {
+             if (!stop.stop_requested()) estimator.trace_camera(i, &map, photons, z, out);
+         })) {
+        sum.by_chance += chunk.by_chance;
+        sum.unreachable += chunk.unreachable;
+        sum.second_moment += chunk.second_moment;
+        sum.merges += chunk.merges;
+    }
+    if (stop.stop_requested()) return {};
+    const float share = 1 / float(kCameraSamples);
+    sum.by_chance *= share, sum.unreachable *= share, sum.second_moment *= double(share);
+    return sum;
+}
+
+}  // namespace lightloom
