@@ -3,6 +3,8 @@
 // and which algorithms can sample every path of it (the others are left out by construction, never
 // by tolerance).
 
+#include <functional>
+
 #include "tests/support/small_scenes.h"
 
 namespace lightloom::testing {
@@ -325,6 +327,68 @@ inline SceneBuilder empty_box_builder() {
     return b;
 }
 
+/// Shading normals tilted by displacement and normal maps: on a floor, half of a mixed wall, a coated sphere turned inside out, a
+/// sheet that scatters to both sides, and a mirrored instance with normals of its own. (No rough glass: its total reflection
+/// amplifies rounding beyond what the weight suites allow. The tilts are gentle: where they let rays enter solids, short edges
+/// between a solid's faces do the same.)
+inline std::shared_ptr<const Scene> bumped() {
+    SceneBuilder b = empty_box_builder();
+    SceneDescription& d = b.description();
+    const auto image = [&](int channels, const std::function<float(int, int)>& value) {
+        Image picture;
+        picture.width = picture.height = 4;
+        picture.channels = channels;
+        for (int i = 0; i < 16; ++i)
+            for (int c = 0; c < channels; ++c) picture.floats.push_back(value(i, c));
+        d.images.push_back(picture);
+        TextureNode node;
+        node.kind = TextureKind::kImage;
+        node.image = int32_t(d.images.size()) - 1;
+        node.su = node.sv = 2;
+        d.textures.push_back(node);
+        return TextureId(d.textures.size()) - 1;
+    };
+    const TextureId relief = image(1, [](int i, int) { return 0.012f * float(i * 7 % 16) / 15; });
+    const TextureId normals =
+        image(3, [](int i, int c) { return c == 2 ? 0.95f : 0.45f + 0.1f * float((i * 5 + c * 3) % 16) / 15; });
+    const auto rough = [&](MaterialKind kind, float roughness) {
+        Material m;
+        m.kind = kind;
+        m.reflectance = b.constant({0.8f, 0.6f, 0.5f});
+        m.roughness_u = m.base_roughness_u = m.base_roughness_v = b.constant(Rgb(roughness));
+        m.roughness_v = b.constant(Rgb(1.5f * roughness));
+        m.remap_roughness = false;
+        return m;
+    };
+    Material floor, paper, metal = rough(MaterialKind::kConductor, 0.3f), coat = rough(MaterialKind::kCoatedDiffuse, 0.3f);
+    floor.reflectance = b.constant({0.7f, 0.6f, 0.4f});
+    floor.displacement = metal.displacement = paper.displacement = relief;
+    coat.normal_map = normals;
+    paper.kind = MaterialKind::kDiffuseTransmission;
+    paper.reflectance = b.constant({0.3f, 0.4f, 0.3f}), paper.transmittance = b.constant({0.5f, 0.3f, 0.4f});
+    d.meshes[0].attributes.material = b.add(floor);
+    Material half;
+    half.kind = MaterialKind::kMix;
+    half.mix_a = b.add(metal), half.mix_b = b.diffuse(Rgb(0.5f)), half.mix_amount = b.constant(Rgb(0.4f));
+    d.meshes[5].attributes.material = b.add(half);
+    b.sphere({0.4f, 0.4f, 0.3f}, 0.4f, b.add(coat)).attributes.flip_normal = true;
+    b.quad({-0.9f, 0.9f, -0.2f}, {0.6f, 0.3f, 0}, {0, 0, 0.8f}, b.add(paper));
+
+    ObjectDefinition object;
+    TriangleMesh mesh;
+    mesh.positions = {{-0.3f, 0, -0.2f}, {0.3f, 0, -0.2f}, {0.1f, 0, 0.3f}, {0, 0.5f, 0}};
+    mesh.uvs = {{0, 0}, {1, 0}, {0.7f, 0.6f}, {0.4f, 1}};
+    mesh.indices = {0, 1, 2, 1, 0, 3, 2, 1, 3, 0, 2, 3};
+    floor.normal_map = normals;
+    mesh.attributes.material = b.add(floor);
+    mesh.attributes.source = "test object";
+    object.meshes.push_back(std::move(mesh));
+    d.objects.push_back(std::move(object));
+    d.instances.push_back({0, translation(-0.5, 0.2, 0.5), "first"});
+    d.instances.push_back({0, translation(0.3, 1.0, 0.4) * scaling(-0.8f, 1.5f, 0.6f), "mirrored"});
+    return b.build();
+}
+
 /// Diffuse surfaces inside smooth glass: a light sub-path is refracted on its way in and can be connected afterwards, so that the
 /// throughput of light prefixes has to know what a Dirac refraction does to it.
 inline std::shared_ptr<const Scene> spheres_in_glass() {
@@ -453,6 +517,7 @@ inline constexpr NamedScene kScenes[] = {
     {"textured_and_two_sided", textured_and_two_sided, "path light bdpt"},
     {"instances_and_cutouts", instances_and_cutouts, "path light bdpt"},
     {"textures_in_space", textures_in_space, "path light bdpt"},
+    {"bumped", bumped, "path light bdpt"},
     {"smooth_normals_and_lens", smooth_normals_and_lens, "path light bdpt"},
     {"spherical_lights", spherical_lights, "path light bdpt"},
     {"hidden_and_pictured_lamps", hidden_and_pictured_lamps, "path light bdpt"},
