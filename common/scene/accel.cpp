@@ -317,22 +317,26 @@ bool Accel::intersect_apart(const Vec3& o, const Vec3& d, float t_min, float t_m
     return impl_->intersect(impl_->apart, o, d, t_min, t_max, hit);
 }
 
-void Accel::for_each_near(const Vec3& centre, float radius, const std::function<void(const RawHit&)>& visit) const {
+void Accel::for_each_near(const Vec3& centre, float radius, const std::function<bool(const RawHit&)>& visit) const {
     struct Visitor {
         const Impl& impl;
-        const std::function<void(const RawHit&)>& visit;
+        const std::function<bool(const RawHit&)>& visit;
+        bool done = false;
     } visitor{*impl_, visit};
     RTCPointQuery query{centre.x, centre.y, centre.z, 0, radius};
     RTCPointQueryContext context;
     rtcInitPointQueryContext(&context);
     const auto found = [](RTCPointQueryFunctionArguments* args) {
-        const auto& v = *static_cast<const Visitor*>(args->userPtr);
+        auto& v = *static_cast<Visitor*>(args->userPtr);
+        if (v.done) return false;
         RawHit at;
         at.geometry = args->geomID;
         at.primitive = args->primID;
         at.instance = args->context->instStackSize > 0 ? v.impl.instance_of(args->context->instID[0]) : -1;
-        v.visit(at);
-        return false;  // the radius stays what it is
+        v.done = !v.visit(at);
+        if (!v.done) return false;  // the radius stays what it is
+        args->query->radius = 0;
+        return true;
     };
     rtcPointQuery(impl_->world, &query, &context, found, &visitor);
 }

@@ -49,9 +49,9 @@ class Accel {
     /// Gives these world meshes a structure of their own besides.
     Status keep_apart(const SceneDescription& scene, const std::vector<uint32_t>& meshes, Opacity opacity,
                       const void* opacity_user);
-    /// Calls `visit` for every primitive that may be closer to `centre` than `radius` (RawHit::t, u and v mean nothing). For
-    /// building: slow, and one primitive may come several times.
-    void for_each_near(const Vec3& centre, float radius, const std::function<void(const RawHit&)>& visit) const;
+    /// Calls `visit` for every primitive that may be closer to `centre` than `radius` (RawHit::t, u and v mean nothing), as long as
+    /// it returns true. For building: slow, and one primitive may come several times.
+    void for_each_near(const Vec3& centre, float radius, const std::function<bool(const RawHit&)>& visit) const;
     /// Whether anything lies at 0 < t < t_max. Cut-out surfaces let a ray through with probability 1 - opacity, decided by
     /// a hash of the ray, so an opaque answer is reproducible.
     bool occluded(const Vec3& o, const Vec3& d, float t_max) const;

@@ -44,6 +44,14 @@ class Camera {
     /// `*lens` is a point of sample_lens(), and becomes the start of the ray if rays are parallel. False as for project().
     bool see(const Vec3& point, Vec3* lens, Sight* sight) const;
 
+    /// Where parallel rays start, world: the upper left corner and the two edges from there, to the right and down.
+    struct Window {
+        Vec3 corner, right, down;
+    };
+    Window window() const {
+        return {position_ + right_ * x0_ + up_ * y1_, right_ * (pixel_w_ * float(width_)), up_ * (-pixel_h_ * float(height_))};
+    }
+
     /// Centre of the lens, world.
     Vec3 position() const { return position_; }
     /// Unit viewing direction, world.

@@ -122,19 +122,55 @@ float ContactFinder::clearance(const Vec3& p) const {
         if (world_triangle(scene_, at, &t)) {
             const double scale = std::max(t.scale(), t.scale_of(p));
             if (touches(t, p, kZero * scale)) clearance = std::max(clearance, kClearance * std::max(scale, own));
-            return;
+            return true;
         }
         const Instance* instance = at.instance >= 0 ? &scene_.instances[size_t(at.instance)] : nullptr;
         const Sphere& s = (instance ? scene_.objects[size_t(instance->object)].spheres : scene_.spheres)[at.primitive];
         const Vec3 inside = instance ? instance_inverse_[size_t(at.instance)].point(p) : p;
         const Vec3 from_centre = inside - s.centre;
         const float distance = length(from_centre);
-        if (!(distance > 0)) return;
+        if (!(distance > 0)) return true;
         Vec3 nearest = s.centre + from_centre * (s.radius / distance);
         if (instance) nearest = instance->object_to_world.point(nearest);
         const double scale = std::max(own, double(largest_coordinate(nearest)) + double(s.radius));
         if (double(length(nearest - p)) <= kZero * scale) clearance = std::max(clearance, kClearance * scale);
+        return true;
     });
+    return float(clearance);
+}
+
+void ContactFinder::for_each_near(const Vec3 (&corners)[3], int level, const std::function<void(const RawHit&)>& visit) const {
+    constexpr int kLevels = 8;
+    constexpr size_t kMany = 128;
+    const Vec3 centre = (corners[0] + corners[1] + corners[2]) / 3;
+    float radius = float(kZero * double(largest_));
+    for (const Vec3& c : corners) radius = std::max(radius, length(c - centre));
+    std::vector<RawHit> found;
+    accel_.for_each_near(centre, radius * 1.001f, [&](const RawHit& at) {
+        found.push_back(at);
+        return level == kLevels || found.size() <= kMany;
+    });
+    if (level == kLevels || found.size() <= kMany) {
+        for (const RawHit& at : found) visit(at);
+        return;
+    }
+    const Vec3 middle[3] = {(corners[1] + corners[2]) * 0.5f, (corners[2] + corners[0]) * 0.5f, (corners[0] + corners[1]) * 0.5f};
+    for (int i = 0; i < 3; ++i) for_each_near({corners[i], middle[(i + 2) % 3], middle[(i + 1) % 3]}, level + 1, visit);
+    for_each_near(middle, level + 1, visit);
+}
+
+float ContactFinder::clearance(const Vec3& corner, const Vec3& edge1, const Vec3& edge2) const {
+    double clearance = 0;
+    const Vec3 opposite = corner + edge1 + edge2;
+    for (Triangle own : {Triangle{{corner, corner + edge1, opposite}}, Triangle{{corner, opposite, corner + edge2}}}) {
+        own.set_normal();
+        for_each_near(own.corners, 0, [&](const RawHit& at) {
+            Triangle t;
+            if (!world_triangle(scene_, at, &t)) return;
+            const double scale = std::max(t.scale(), own.scale());
+            if (coincide(own, t, kZero * scale)) clearance = std::max(clearance, kClearance * scale);
+        });
+    }
     return float(clearance);
 }
 
@@ -144,11 +180,8 @@ ContactFinder::Covered ContactFinder::cover(std::vector<Emitter>* emitters, cons
         if (e.kind != EmitterKind::kTriangle) continue;
         Triangle own{{e.position, e.position + e.edge1, e.position + e.edge2}};
         own.set_normal();
-        const Vec3 centre = (own.corners[0] + own.corners[1] + own.corners[2]) / 3;
-        float radius = kZero * largest_;
-        for (const Vec3& c : own.corners) radius = std::max(radius, length(c - centre));
         float reach = e.reach;
-        accel_.for_each_near(centre, radius * 1.001f, [&](const RawHit& at) {
+        for_each_near(own.corners, 0, [&](const RawHit& at) {
             Triangle t;
             if (!world_triangle(scene_, at, &t) || (at.instance < 0 && emits(at.geometry))) return;
             const double scale = std::max(t.scale(), own.scale());

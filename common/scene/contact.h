@@ -30,6 +30,9 @@ class ContactFinder {
 
     /// How far around a lens or lamp at `p` surfaces do not exist for its rays: 0 where none touches it.
     float clearance(const Vec3& p) const;
+    /// The same for rays that start anywhere in the parallelogram of `corner` and two edges: 0 where no triangle shares a part of
+    /// it.
+    float clearance(const Vec3& corner, const Vec3& edge1, const Vec3& edge2) const;
 
     /// Shapes that lie in the plane of an emitter and overlap it.
     struct Covered {
@@ -41,6 +44,10 @@ class ContactFinder {
     Covered cover(std::vector<Emitter>* emitters, const std::function<bool(uint32_t mesh)>& emits) const;
 
   private:
+    /// Calls `visit` for every primitive that may touch the triangle; one may come several times. The triangle is divided where
+    /// many primitives lie near it: what is merely in the ball around a large one, a forest under a panel, is left out.
+    void for_each_near(const Vec3 (&corners)[3], int level, const std::function<void(const RawHit&)>& visit) const;
+
     const SceneDescription& scene_;
     const Accel& accel_;
     const std::vector<Mat4>& instance_inverse_;

@@ -181,6 +181,10 @@ float Scene::largest_reach(const Bounds3& bounds) const {
 Status Scene::find_contacts(std::vector<Emitter>* emitters, float largest) {
     const ContactFinder contacts(description_, *accel_, instance_inverse_, largest);
     camera_clearance_ = contacts.clearance(camera_.position());
+    if (camera_.has_parallel_rays()) {
+        const auto [corner, right, down] = camera_.window();
+        camera_clearance_ = std::max(camera_clearance_, contacts.clearance(corner, right, down));
+    }
     for (Emitter& e : *emitters)
         if (e.is_discrete() && !e.is_infinite()) e.clearance = contacts.clearance(e.position);
     const auto emits = [&](uint32_t mesh) { return mesh_first_emitter_[mesh] != kNone; };

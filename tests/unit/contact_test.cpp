@@ -94,6 +94,64 @@ TEST(Contact, ACameraOnASurfaceSeesPastIt) {
     }
 }
 
+/// Rays of an orthographic camera start in a window, which may lie in the plane of a wall that its centre does not touch.
+TEST(Contact, AWindowInAWallsPlaneSeesPastIt) {
+    for (const float size : kSizes) {
+        Placing at{.size = size, .tilt = rotation(25, 0, 1, 0)};
+        auto b = box(at, {0, -0.9f, -1}, {0, -0.9f, 1});
+        // The wall behind the camera has a hole where the window's centre is.
+        TriangleMesh& wall = b.description().meshes[4];
+        for (Vec3& p : wall.positions) p = p + at({0, 0.5f, 0});
+        b.description().camera.kind = CameraKind::kOrthographic;
+        b.description().camera.has_screen_window = true;
+        for (float& edge : b.description().camera.screen_window) edge *= size;
+        const auto scene = b.build();
+        const float clearance = scene->camera_clearance();
+        EXPECT_GT(clearance, 0) << size;
+        EXPECT_LT(clearance, 1e-3f * size) << size;
+        int stuck = 0;
+        for (int i = 0; i < 1000; ++i) {
+            const auto ray = scene->camera().sample_ray({float(i % 32) + 0.3f, float(i / 32 % 32) + 0.6f}, {});
+            SurfacePoint point;
+            stuck += scene->intersect(ray.origin, ray.direction, &point, clearance) && length(point.p - ray.origin) < 0.1f * size;
+        }
+        EXPECT_EQ(stuck, 0) << size;
+    }
+}
+
+/// A panel over a forest: what is merely near it must not be looked through triangle by triangle, which took seconds here.
+TEST(Contact, APanelAboveManyTrianglesFindsWhatItTouches) {
+    testing::SceneBuilder b;
+    const MaterialId grey = b.diffuse(Rgb(0.5f));
+    SceneDescription& d = b.description();
+    ObjectDefinition tree;
+    TriangleMesh leaves;
+    Rng rng({5, Stage::kConnect, 0, 0});
+    for (uint32_t i = 0; i < 3000; ++i) {
+        const Vec2 a = rng.uniform2(), c = rng.uniform2();
+        const Vec3 p{a.x, 4 * a.y, c.x};
+        leaves.positions.insert(leaves.positions.end(), {p, p + Vec3{0.02f, 0, 0.01f}, p + Vec3{0, 0.02f, 0.02f}});
+        leaves.indices.insert(leaves.indices.end(), {3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    leaves.attributes.material = grey;
+    tree.meshes.push_back(std::move(leaves));
+    d.objects.push_back(std::move(tree));
+    for (int i = 0; i < 2500; ++i) d.instances.push_back({0, translation(4 * (i % 50) - 100, 0, 4 * (i / 50) - 100), "tree"});
+    b.quad({-100, 12, -100}, {200, 0, 0}, {0, 0, 200}, grey, b.emission(Rgb(1.0f)));
+    const auto apart = b.description();
+    const auto count = [](const SceneDescription& description) {
+        const auto scene = Scene::build(description);
+        EXPECT_TRUE(scene.ok());
+        SurfacePoint point;
+        // From below, within the part that the ceiling shares.
+        return (*scene)->intersect({3, 8, 3}, {0, 1, 0}, &point) && point.emitter != kNone;
+    };
+    EXPECT_TRUE(count(apart));
+    // A ceiling in the panel's plane, small beside it.
+    b.quad({2, 12, 2}, {3, 0, 0}, {0, 0, 3}, grey);
+    EXPECT_TRUE(count(b.description()));
+}
+
 /// Mutation: an Accel::intersect() alone, without the one among lights, reports the ceiling in a share of these.
 TEST(Contact, ALightInAnotherSurfacesPlaneIsWhatIsThere) {
     for (const float size : kSizes)
