@@ -277,6 +277,7 @@ Result<Partial> decode_partial(const PartialExpectation& expected, const Partial
     partial.dropped_count = d.dropped_count;
     partial.dropped = d.dropped;
     partial.counters = d.counters;
+    partial.rare_light = d.rare_light;
     const Part& camera = layout.parts[0];
     const size_t width = size_t(camera.width);
     partial.camera.resize(size_t(expected.tile.area()) * 3);

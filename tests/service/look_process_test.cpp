@@ -249,5 +249,33 @@ TEST_F(Look, MistakesAreExplained) {
     EXPECT_FALSE(fs::exists(path("x.exr")));
 }
 
+/// A pool under a small lamp (rare_light_test has the figures): a job that has not found most of its light says so wherever its
+/// results are read, in few words, and `-q` has none.
+TEST_F(Look, AJobSaysWhatLightItMayHaveMissed) {
+    const auto pool = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> arguments{"render",       LIGHTLOOM_SOURCE_DIR "/tests/scenes/pool.pbrt",
+                                           "-a",           "bdpt",
+                                           "--spp",        "2",
+                                           "--resolution", "64x36",
+                                           "-o",           path("pool.exr"),
+                                           "--json",       path("pool.json")};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        const Run done = run(arguments);
+        EXPECT_EQ(done.exit_code, 0) << done.output;
+        return done.output;
+    };
+    EXPECT_NE(pool({}).find("only a chance hit of a lamp finds it"), std::string::npos);
+    for (const char* file : {"pool.manifest.json", "pool.json"}) {
+        const Json rare = Json::parse(*read_file(path(file)))["rare_light"];
+        EXPECT_NEAR(rare["share"].get<double>(), 0.25, 0.1) << file;
+        EXPECT_LT(rare["expected_hits"].get<double>(), 0.1) << file;
+        EXPECT_GT(rare["mean_error"].get<double>(), 1) << file;
+        EXPECT_EQ(rare["unreachable_share"].get<double>(), 0) << file;
+    }
+    EXPECT_EQ(pool({"-q"}).find("chance"), std::string::npos);
+    // Glass in a room whose lamp is large needs no word.
+    EXPECT_EQ(run({"render", kScene, "--spp", "2", "-o", path("glass.exr")}).output.find("chance"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace lightloom

@@ -39,6 +39,7 @@ inline Partial random_partial(const FrameLayout& frame, const Rect& tile, uint64
         partial.splats.push_back({pixels[i], {scale * r, scale * g, scale * b}});
     }
     partial.counters = {partial.samples_per_pixel * uint64_t(tile.area()), partial.light_paths, 1000 + seed, 77, 5};
+    partial.rare_light = {{0.5f, 0.25f, 0.125f}, {0, 1e-3f, 0}, 1e9, 77};
     partial.dropped_count = 20;
     partial.dropped = {{seed, 3, true}, {seed + 1, 7, false}};
     return partial;
@@ -52,7 +53,7 @@ inline std::vector<Rect> four_tiles(const Rect& crop) {
 inline bool same(const Partial& a, const Partial& b) {
     return a.tile == b.tile && a.samples_per_pixel == b.samples_per_pixel && a.camera == b.camera &&
            a.light_paths == b.light_paths && a.splats == b.splats && a.dropped_count == b.dropped_count && a.dropped == b.dropped &&
-           a.counters.rays == b.counters.rays;
+           a.counters.rays == b.counters.rays && a.rare_light == b.rare_light;
 }
 
 inline PartialExpectation expectation_of(const Partial& p, const FrameLayout& frame) {

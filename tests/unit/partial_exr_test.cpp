@@ -191,5 +191,15 @@ TEST(PartialExr, IsNotAPicture) {
     EXPECT_EQ(status.message(), "partial.exr: the EXR file has neither channels R, G and B nor Y");
 }
 
+TEST(PartialExr, RefusesAnEstimateThatIsNone) {
+    for (const double bad : {kNan, kInfinity, -1.0}) {
+        Partial p = random_partial(kFrame, kFrame.crop, 1, 5);
+        p.rare_light.second_moment = bad;
+        EXPECT_EQ(encode_partial(p, kFrame).status().code(), StatusCode::kDataLoss);
+        p.rare_light = {{0, float(bad), 0}, {}, 1, 20};
+        EXPECT_EQ(check_partial(p, kFrame).status().code(), StatusCode::kDataLoss);
+    }
+}
+
 }  // namespace
 }  // namespace lightloom

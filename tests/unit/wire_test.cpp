@@ -135,5 +135,27 @@ TEST(Wire, UnitsOfTheImageHaveNoRound) {
     EXPECT_EQ(wire::get(message).status().code(), StatusCode::kInvalidArgument);
 }
 
+TEST(Wire, RareLightSurvivesTheRoundTrip) {
+    PartialDescriptor descriptor;
+    v1::SubmitResultHeader header;
+    wire::put(descriptor, &header);
+    EXPECT_FALSE(header.has_rare_light()) << "most units have none";
+    descriptor.rare_light = {{0.5f, 0.25f, 0.125f}, {1, 2, 3}, 1e9, 77};
+    wire::put(descriptor, &header);
+    auto back = wire::get(header);
+    ASSERT_TRUE(back.ok());
+    EXPECT_EQ(back->rare_light, descriptor.rare_light);
+    header.mutable_rare_light()->add_by_chance(4);
+    EXPECT_EQ(wire::get(header).status().code(), StatusCode::kInvalidArgument);
+
+    JobInfo job;
+    job.rare_light = {0.3, 0.1, 12.5, 0.2};
+    v1::Job message;
+    wire::put(job, &message);
+    const auto shown = wire::get(message);
+    ASSERT_TRUE(shown.ok());
+    EXPECT_EQ(shown->rare_light, job.rare_light);
+}
+
 }  // namespace
 }  // namespace lightloom
