@@ -108,7 +108,7 @@ void print_table(const CompareOptions& options, const Comparison& comparison) {
     std::printf("  %-26s %12.6g\n", "RMSE", m.rmse);
     std::printf("  %-26s %12.6g     (x-r) / ((x+r)/2)\n", "SRRMSE", m.srrmse);
     std::printf("  %-26s %12.6f     1 = equal\n", "SSIM", m.ssim);
-    std::printf("  %-26s %12.6f     clamped to [0,1], 67 pixels per degree\n", "FLIP", m.flip);
+    std::printf("  %-26s %12.6f     clamped to [0,1], 67.02 pixels per degree\n", "FLIP", m.flip);
     std::printf("  %-26s %12.6f     ACES, automatic exposures\n", "HDR-FLIP", m.hdr_flip);
     std::printf("  %-26s %12.6f     sum x / sum r\n", "mean ratio", m.mean_ratio);
     std::printf("  %-26s %12.6g %.6g %.6g\n", "mean R G B, image", m.mean_image[0], m.mean_image[1], m.mean_image[2]);

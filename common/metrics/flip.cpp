@@ -18,13 +18,6 @@ struct Triple {
     double x, y, z;
 };
 
-// Linear sRGB to XYZ (IEC 61966-2-1, D65) and its inverse. The illuminant is the XYZ of RGB white, so that greys have no
-// chroma to the last digit.
-constexpr double kToXyz[3][3] = {
-    {0.4124564, 0.3575761, 0.1804375}, {0.2126729, 0.7151522, 0.0721750}, {0.0193339, 0.1191920, 0.9503041}};
-constexpr Triple kWhite{kToXyz[0][0] + kToXyz[0][1] + kToXyz[0][2], kToXyz[1][0] + kToXyz[1][1] + kToXyz[1][2],
-                        kToXyz[2][0] + kToXyz[2][1] + kToXyz[2][2]};
-
 struct Matrix {
     double m[3][3];
 };
@@ -44,7 +37,31 @@ constexpr Matrix invert(const double (&a)[3][3]) {
     }
     return r;
 }
-constexpr Matrix kFromXyz = invert(kToXyz);
+
+/// Linear sRGB to XYZ, from the primaries of IEC 61966-2-1. White is D65 with five digits, (0.31271, 0.32902), because the
+/// matrix in the authors' code is that one to the last digit.
+constexpr Matrix rgb_to_xyz() {
+    constexpr double kRed[2] = {0.64, 0.33}, kGreen[2] = {0.30, 0.60}, kBlue[2] = {0.15, 0.06}, kD65[2] = {0.31271, 0.32902};
+    constexpr double kPrimaries[3][3] = {
+        {kRed[0], kGreen[0], kBlue[0]},
+        {kRed[1], kGreen[1], kBlue[1]},
+        {1 - kRed[0] - kRed[1], 1 - kGreen[0] - kGreen[1], 1 - kBlue[0] - kBlue[1]},
+    };
+    constexpr double kWhiteXyz[3] = {kD65[0] / kD65[1], 1, (1 - kD65[0] - kD65[1]) / kD65[1]};
+    const Matrix inverse = invert(kPrimaries);
+    Matrix result{};
+    for (int c = 0; c < 3; ++c) {
+        double strength = 0;
+        for (int k = 0; k < 3; ++k) strength += inverse.m[c][k] * kWhiteXyz[k];
+        for (int r = 0; r < 3; ++r) result.m[r][c] = kPrimaries[r][c] * strength;
+    }
+    return result;
+}
+constexpr Matrix kToXyz = rgb_to_xyz();
+constexpr Matrix kFromXyz = invert(kToXyz.m);
+// The illuminant is the XYZ of RGB white, so that greys have no chroma to the last digit.
+constexpr Triple kWhite{kToXyz.m[0][0] + kToXyz.m[0][1] + kToXyz.m[0][2], kToXyz.m[1][0] + kToXyz.m[1][1] + kToXyz.m[1][2],
+                        kToXyz.m[2][0] + kToXyz.m[2][1] + kToXyz.m[2][2]};
 
 inline Triple multiply(const double (&a)[3][3], Triple v) {
     return {a[0][0] * v.x + a[0][1] * v.y + a[0][2] * v.z, a[1][0] * v.x + a[1][1] * v.y + a[1][2] * v.z,
@@ -63,7 +80,7 @@ inline double cube_root(double v) {
 
 /// Opponent space of the contrast sensitivity filters [A20, sec. 4.1.1], a linearised L*a*b*.
 inline Triple to_ycxcz(Triple rgb) {
-    const Triple xyz = multiply(kToXyz, rgb);
+    const Triple xyz = multiply(kToXyz.m, rgb);
     const double x = xyz.x / kWhite.x, y = xyz.y / kWhite.y, z = xyz.z / kWhite.z;
     return {116 * y - 16, 500 * (x - y), 200 * (y - z)};
 }
@@ -75,7 +92,7 @@ inline Triple from_ycxcz(Triple v) {
 
 /// CIE L*a*b* with the Hunt adjustment of its chroma [A20, sec. 4.1.2]: both chroma coordinates times 0.01 L*.
 inline Triple to_hunt_lab(Triple rgb) {
-    const Triple xyz = multiply(kToXyz, rgb);
+    const Triple xyz = multiply(kToXyz.m, rgb);
     const auto f = [](double t) {
         constexpr double kDelta = 6.0 / 29;
         return t > kDelta * kDelta * kDelta ? cube_root(t) : t / (3 * kDelta * kDelta) + 4.0 / 29;

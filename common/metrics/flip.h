@@ -7,12 +7,14 @@
 
 #include <vector>
 
+#include "common/core/math.h"
 #include "common/film/accumulation.h"
 
 namespace lightloom {
 
-/// 0.7 m from a display 0.7 m wide with 3840 pixels: the papers' default.
-inline constexpr double kFlipPixelsPerDegree = 67;
+/// Pixels that one degree of the view spans 0.7 m in front of a display 0.7 m wide with 3840 pixels, 67.02: the papers'
+/// default.
+inline constexpr double kFlipPixelsPerDegree = 0.7 * 3840 / 0.7 * (kPiD / 180);
 
 /// Error per pixel in [0, 1], row-major. Both images are linear RGB and are clamped to [0, 1] first. Images are of equal
 /// size and finite.
@@ -25,8 +27,8 @@ struct HdrFlip {
 };
 
 /// HDR-FLIP [A21] with the ACES curve and the automatic range of exposures: the brightest pixel of the reference, and its
-/// median, are brought to 85 % of white. The median is taken as at least 2^-24 of the maximum, so that a reference which is
-/// mostly black has a finite range.
+/// median, are brought to 85 % of white. Negative values are shown as black. The median is taken as at least 2^-24 of the
+/// maximum, so that a reference which is mostly black has a finite range; the authors' code has no answer there.
 HdrFlip hdr_flip(const RgbImage& image, const RgbImage& reference, double pixels_per_degree = kFlipPixelsPerDegree);
 
 }  // namespace lightloom

@@ -25,8 +25,8 @@ struct Metrics {
     double rmse = 0;        ///< sqrt of the mean of (x - r)^2.
     double srrmse = 0;      ///< sqrt of the mean of [(x - r) / ((|x| + |r|) / 2)]^2 with 0/0 = 0; at most 2.
     double ssim = 0;        ///< See ssim(). 1 for equal images.
-    double flip = 0;        ///< Mean of ldr_flip() at 67 pixels per degree. 0 for equal images, at most 1.
-    double hdr_flip = 0;    ///< Mean of hdr_flip() at 67 pixels per degree.
+    double flip = 0;        ///< Mean of ldr_flip() at kFlipPixelsPerDegree. 0 for equal images, at most 1.
+    double hdr_flip = 0;    ///< Mean of hdr_flip() at kFlipPixelsPerDegree.
     double mean_ratio = 0;  ///< sum x / sum r over all pixels and channels: a sign of bias. 1 if both sums are 0.
     std::array<double, 3> mean_image{}, mean_reference{};  ///< Per channel.
 };
