@@ -1,6 +1,7 @@
 #pragma once
-// Partial: everything that one work unit contributes to the image, as sums and counts. Summed in double, in a fixed order
-// (pixel by pixel in iteration order; splats in path order), so it is the same bytes on any worker and thread count.
+// Partial: everything that one work unit contributes to the image, as sums and counts. Values are summed in double in a
+// fixed order (pixel by pixel in iteration order; splats in path order), so that a partial has the same bytes on every
+// worker and with any number of threads.
 
 #include <array>
 #include <cstdint>
@@ -13,8 +14,8 @@
 
 namespace lightloom {
 
-/// Sum of the splats of a unit in one pixel. Values are in "pixel area 1" units: the image is the sum over all units
-/// divided by the total number of light paths.
+/// Sum of the splats of a unit in one pixel. Values are scaled such that the image is the sum over all units divided by
+/// the total number of light paths.
 struct SplatSum {
     uint32_t pixel = 0;  ///< Row-major in FrameLayout::crop.
     std::array<double, 3> rgb{};
