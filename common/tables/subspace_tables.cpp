@@ -20,7 +20,7 @@ Status positive(const std::vector<float>& values, size_t count, const char* name
     return {};
 }
 
-/// Little-endian, which every supported host is.
+/// The values' bytes in memory, which are little-endian on every supported host.
 template <class T>
 std::string bytes_of(const std::vector<T>& values) {
     static_assert(std::is_trivially_copyable_v<T>);

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::string_view kMagic = "lightloom-tables 2\n";
 static_assert(kMagic.starts_with(kTablesPrefix));
-constexpr std::string_view kAlgorithm = "algorithm";  // no part's name
+constexpr std::string_view kAlgorithm = "algorithm";  // no part has this name
 
 }  // namespace
 

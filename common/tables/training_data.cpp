@@ -64,7 +64,7 @@ Status TrainingData::validate(size_t emitter_count) const {
                 return data_loss("training data with a malformed path");
         }
     }
-    // Classifiers sort by these: an order needs numbers.
+    // Classifiers sort by these values, so that none may be NaN.
     const auto finite = [](const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
     for (const TrainingVertex& v : vertices)
         if (!finite(v.position) || !finite(v.normal)) return data_loss("training data with a vertex that is nowhere");
