@@ -1,5 +1,5 @@
 #pragma once
-// Parameters that several algorithms have, and what they mean: rows of the catalog list them, and read them from here.
+// Parameters that several algorithms have, and how their values are read; the catalog's rows list them.
 
 #include "common/path/mis.h"
 #include "common/path/next_event.h"
@@ -15,9 +15,9 @@ inline constexpr ParameterInfo kRouletteStart{"rr-start",
                                               true,
                                               "sub-path vertices below this index never end by Russian roulette "
                                               "[Pharr, Jakob and Humphreys 2023, 2.2.4]"};
-// The weights know a typical survival at best, so that a technique whose sub-path rarely survives is trusted too much: at 0.05,
-// door needs 1.4 (spcbpt), 1.7 (bdpt) and 2.5 (path) times the processor time for the same relMSE; at 1 the walks cost more than
-// they save.
+// The weights know a typical survival at best, so that they trust a technique too much whose sub-path rarely survives:
+// with 0.05 the scene `door` needs 1.4 (spcbpt), 1.7 (bdpt) and 2.5 (path) times the processor time for the same
+// relMSE; with 1 the walks cost more than they save.
 inline constexpr ParameterInfo kRouletteMin{"rr-min",
                                             0.5,
                                             0.01,
@@ -30,8 +30,8 @@ inline constexpr std::string_view kSwitch[] = {"off", "on"};
 inline constexpr ParameterInfo kHeuristic{
     "heuristic", 0, 0, 2, true, "balance [Veach 1997, eq. 9.8], power with exponent 2, or maximum", kHeuristicNames};
 inline constexpr int kMaxNextEventRays = 64;
-/// Of algorithms that are nothing without next event estimation, and of those that connect to points on lights from a cache as
-/// well.
+/// kNextEvent is for algorithms that cannot do without next event estimation, kNextEventBesideCache for those that also
+/// connect to points on lights from a cache.
 inline constexpr ParameterInfo kNextEvent{
     "next-event",      1,    1,
     kMaxNextEventRays, true, "shadow rays of next event estimation at the camera's first hit; later ones send one"};
@@ -65,7 +65,7 @@ inline constexpr ParameterInfo kConnections{
 /// The size of a training set; a time-limited job may make it smaller.
 inline constexpr std::string_view kTrainingPaths = "training-paths";
 
-/// The defaults for an algorithm without these parameters.
+/// The algorithm's rule for Russian roulette; the defaults if it has no such parameters.
 inline RouletteRule roulette_of(const AlgorithmSettings& s) {
     RouletteRule rule;
     if (!s.has(kRouletteStart.name) || !s.has(kRouletteMin.name)) return rule;
@@ -90,7 +90,7 @@ inline double chosen_light_paths(const AlgorithmSettings& s) { return s.value(kL
 /// What algorithms with a light-vertex cache have in common.
 struct CacheParameters {
     int connections;         ///< N
-    uint64_t minimum_paths;  ///< Of a unit's cache.
+    uint64_t minimum_paths;  ///< Smallest number of light paths in a unit's cache.
 
     static CacheParameters of(const AlgorithmSettings& s) {
         return {int(s.value(kConnections.name)), uint64_t(s.value(kCache.name))};
