@@ -15,7 +15,7 @@ namespace {
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
-/// The words of the header. One blank ends a word; `pos` is left on it.
+/// Reads the words of the header. One blank ends a word; `pos` is left on it.
 struct Header {
     std::string_view text;
     size_t pos = 0;
@@ -27,7 +27,7 @@ struct Header {
             else
                 ++pos;
         }
-        constexpr size_t kLongest = 64;  // What is no PFM need not have a blank anywhere.
+        constexpr size_t kLongest = 64;  // Other kinds of files need not have a blank anywhere.
         const size_t begin = pos;
         while (pos < text.size() && pos - begin < kLongest && !is_blank(text[pos]) && text[pos] != '#') ++pos;
         return text.substr(begin, pos - begin);
@@ -69,7 +69,8 @@ Result<PfmPixels> read_pfm(const std::string& bytes, std::string* warning) {
     const uint64_t size = width * height * channels * sizeof(float);
     uint64_t begin = header.pos;
     if (begin < bytes.size()) ++begin;
-    // A line may end in two characters. The second might also be the first of the pixels, which the file's size tells.
+    // A line may end in two characters. The second might also be the first byte of the pixels; the file's size tells
+    // which.
     if (begin < bytes.size() && bytes[begin - 1] == '\r' && bytes[begin] == '\n' && bytes.size() - begin > size) ++begin;
     const uint64_t present = bytes.size() - begin;
     if (present < size)

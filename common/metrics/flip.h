@@ -1,5 +1,5 @@
 #pragma once
-// FLIP, a perceptual difference between images that are flipped between: our own implementation from the papers
+// FLIP, a perceptual difference between two images that are shown alternately: our own implementation from the papers
 //   [A20] Andersson, Nilsson, Akenine-Moeller, Oskarsson, Astroem, Fairchild: FLIP: A Difference Evaluator for Alternating
 //         Images. HPG 2020.
 //   [A21] Andersson, Nilsson, Shirley, Akenine-Moeller: Visualizing Errors in Rendered High Dynamic Range Images.
@@ -14,13 +14,13 @@ namespace lightloom {
 /// 0.7 m from a display 0.7 m wide with 3840 pixels: the papers' default.
 inline constexpr double kFlipPixelsPerDegree = 67;
 
-/// Error per pixel in [0, 1], row-major. Both images are linear RGB and are clamped to [0, 1] first. Images are of equal
-/// size and finite.
+/// Error per pixel in [0, 1], row-major. Both images are linear RGB and are clamped to [0, 1] first. They must be
+/// finite and of equal size.
 std::vector<float> ldr_flip(const RgbImage& image, const RgbImage& reference, double pixels_per_degree = kFlipPixelsPerDegree);
 
 struct HdrFlip {
     std::vector<float> map;                        ///< Maximum over the exposures of the LDR-FLIP of the tone-mapped images.
-    double start_exposure = 0, stop_exposure = 0;  ///< In stops, found from the reference alone.
+    double start_exposure = 0, stop_exposure = 0;  ///< In stops, computed from the reference alone.
     int exposures = 0;
 };
 
