@@ -38,7 +38,7 @@ in a network in which everybody may render.
 
 Exit codes: 0 stopped as asked, 1 failed to start, 2 bad command line.)";
 
-/// A worker inside of the coordinator's process. Ends, after the unit in work, with its owner.
+/// A worker inside the coordinator's process. It ends with its owner, after the unit that it renders.
 class OwnWorker {
   public:
     OwnWorker(Coordinator& coordinator, const BuildIdentity& identity, uint32_t threads, const std::filesystem::path& cache)

@@ -60,7 +60,7 @@ grpc::Status WorkerServiceImpl::SubmitResult(grpc::ServerContext*, grpc::ServerR
     const auto reference = wire::get(header.unit());
     if (!reference.ok()) return wire::to_grpc(reference.status());
     const UnitReference& unit = *reference;
-    // Nothing is taken in before the unit is known and the size is the one that follows from it.
+    // Nothing is received before the unit is known and the size is the expected one.
     const auto expected = coordinator_.expected_partial(unit);
     if (!expected.ok()) return answer(Result<SubmitAck>(unexpected_result(expected.status())), response);
     if (descriptor->splat_count > uint64_t(expected->frame.crop.area()))
