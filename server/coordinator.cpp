@@ -134,7 +134,8 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     if (auto answer = repeated()) return *answer;
     const auto unended = std::count_if(jobs_.begin(), jobs_.end(), [](const auto& j) { return !is_terminal(j->state); });
     if (size_t(unended) >= options_.max_jobs)
-        return Status(StatusCode::kResourceExhausted, "the coordinator holds as many jobs as it may; submit again when some ended");
+        return Status(StatusCode::kResourceExhausted,
+                      "the coordinator has no room for more jobs; submit again when some have ended");
     auto record = std::make_shared<JobRecord>();
     JobRecord& job = *record;
     job.id = new_id("job");

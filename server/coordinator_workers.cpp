@@ -203,10 +203,10 @@ std::optional<SubmitAck> Coordinator::repeated_result(JobRecord& job, UnitTable&
             ++job.duplicates_different;
             changed(job);
             spdlog::error(
-                "{}: unit {} from {} differs from the bytes taken in before; one of two workers computes wrongly: "
+                "{}: unit {} from {} differs from the bytes accepted before; one of two workers computes wrongly: "
                 "compare their hosts and builds",
                 job.id, unit_name(key), worker.id);
-            return SubmitAck{SubmitOutcome::kDuplicateDifferent, "the unit was taken in before with other bytes"};
+            return SubmitAck{SubmitOutcome::kDuplicateDifferent, "the unit was accepted before with other bytes"};
         case UnitTable::Completion::kFirst: break;
     }
     return std::nullopt;

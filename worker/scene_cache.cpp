@@ -185,7 +185,7 @@ Result<Tables> RendererCache::tables(const UnitLease& lease, const Scene& scene,
     auto tables = parse_tables(*bytes, learning->parts);
     Status status = tables.ok() ? tables->validate(scene.emitters()) : tables.status();
     if (!status.ok())
-        return failed_precondition("the tables " + asset.digest.hex() + " do not serve this scene: " + status.message());
+        return failed_precondition("the tables " + asset.digest.hex() + " do not fit this scene: " + status.message());
     return *std::move(tables);
 }
 

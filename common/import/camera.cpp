@@ -129,7 +129,7 @@ void read_spherical(Context* context, const ParameterList& p, CameraDescription*
     const std::string mapping = p.one_choice("mapping", "equalarea", {"equalarea", "equirectangular"});
     camera->kind = mapping == "equalarea" ? CameraKind::kEqualArea : CameraKind::kEquirectangular;
     for (const std::string_view name : {"lensradius", "focaldistance", "frameaspectratio", "screenwindow"})
-        p.ignore(&context->diagnostics, name, "a camera that sees in all directions has no use for it, in pbrt as well");
+        p.ignore(&context->diagnostics, name, "a camera that sees in all directions does not use it, as in pbrt");
 }
 
 }  // namespace
@@ -183,7 +183,7 @@ void set_film(Context* context, const std::string& kind, const ParameterList& p)
     }
     context->film_colour = sensor_colour(context, p);
     p.ignore(&context->diagnostics, "diagonal", "it matters only for cameras with real lenses");
-    p.ignore(&context->diagnostics, "savefp16", "the output's precision is the command line's business");
+    p.ignore(&context->diagnostics, "savefp16", "the command line selects the output's precision");
     context->scene.film = film;
 }
 

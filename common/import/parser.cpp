@@ -199,7 +199,7 @@ std::string Parser::read_text(const std::string& name, const Location& from) {
         if (!inflated.ok()) fail(from, quoted(name) + ": " + inflated.status().message());
         text = std::move(inflated).value();
     } else if (has_suffix(name, ".gz")) {
-        fail(from, quoted(name) + " is not compressed by gzip, although it is named so");
+        fail(from, quoted(name) + " is not compressed by gzip, although its name says so");
     }
     const Location itself{context_->intern_file_name(name), 0};
     if (is_lfs_pointer(text))
@@ -339,7 +339,7 @@ void Parser::transform(const Location& where, const std::function<Mat4(const Mat
 const Mat4& Parser::static_transform(const Location& where, const std::string& what) {
     const TransformFault& fault = state_.fault[0];
     if (!fault.why.empty())
-        fail(where, what + " cannot be placed with the transformation as it is since " + fault.where.text() + ": " + fault.why +
+        fail(where, what + " cannot be placed with the transformation in force since " + fault.where.text() + ": " + fault.why +
                         "; correct its numbers");
     if (!(state_.ctm[0] == state_.ctm[1]))
         context_->unsupported(where, "motion", what + " moves while the shutter is open (ActiveTransform); motion");

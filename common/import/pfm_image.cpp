@@ -58,11 +58,11 @@ Result<PfmPixels> read_pfm(const std::string& bytes, std::string* warning) {
     uint64_t width = 0, height = 0;
     if (!parse_side(width_word, &width) || !parse_side(height_word, &height))
         return data_loss("the PFM header has " + quoted(width_word) + " and " + quoted(height_word) +
-                         " where its width and height should stand");
+                         " in place of its width and height");
     double scale = 0;
     if (!parse_number(scale_word, &scale) || float(scale) == 0)
         return data_loss("the PFM header has " + quoted(scale_word) +
-                         " where its scale should stand, a number that is not 0 (negative for little-endian)");
+                         " in place of its scale, a number that is not 0 (negative for little-endian)");
     const uint64_t channels = magic == "PF" ? 3 : 1;
     LL_RETURN_IF_ERROR(check_image_size(width, height, channels, bytes.size()));
 
@@ -75,7 +75,7 @@ Result<PfmPixels> read_pfm(const std::string& bytes, std::string* warning) {
     const uint64_t present = bytes.size() - begin;
     if (present < size)
         return data_loss("the PFM image is cut short: " + std::to_string(width) + " x " + std::to_string(height) + " pixels need " +
-                         std::to_string(size) + " bytes behind the header, and " + std::to_string(present) + " are there");
+                         std::to_string(size) + " bytes after the header, and " + std::to_string(present) + " are there");
     if (present > size) *warning = "the last " + std::to_string(present - size) + " bytes, behind the pixels, are ignored";
 
     PfmPixels out;

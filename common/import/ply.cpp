@@ -175,7 +175,7 @@ Status Reader::header_line(const std::vector<std::string_view>& words) {
         if (!type) return invalid_argument("unknown type " + quoted(std::string(words[p.is_list ? 3 : 1])) + " of a PLY property");
         if (!count_type || *count_type >= Scalar::kFloat)
             return invalid_argument("the count of a PLY list has the type " + quoted(std::string(words[2])) +
-                                    ", which is not one of integers");
+                                    ", which is not an integer type");
         p.type = *type;
         p.count_type = *count_type;
         p.name = words.back();

@@ -61,7 +61,7 @@ TriangleMesh place(Context* context, const ParameterList& parameters, TriangleMe
             if (substitutes.empty()) {
                 context->diagnostics.warn(
                     parameters.where(),
-                    parameters.what() + ": a normal has length zero or is no number; the geometry's own is used there");
+                    parameters.what() + ": a normal has length zero or is not finite; the geometry's own is used there");
                 substitutes = geometric_normals(mesh);
             }
             n = mesh.attributes.flip_normal ? -substitutes[i] : substitutes[i];
@@ -153,7 +153,7 @@ TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const S
     mesh.positions = std::move(ply->positions);
     mesh.normals = std::move(ply->normals);
     if (ply->finite_normals == 0 && !mesh.normals.empty()) {
-        context->diagnostics.warn(parameters.where(), quoted(reference) + ": its normals are no numbers and are left out");
+        context->diagnostics.warn(parameters.where(), quoted(reference) + ": its normals are not finite and are left out");
         mesh.normals.clear();
     }
     mesh.uvs = std::move(ply->uvs);

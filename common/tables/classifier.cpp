@@ -57,7 +57,7 @@ SubspaceTree SubspaceTree::compacted() const {
 }
 
 Status SubspaceTree::validate(uint32_t label_count) const {
-    if (nodes_.empty()) return data_loss("a classifier without nodes");
+    if (nodes_.empty()) return data_loss("a classifier has no nodes");
     for (size_t i = 0; i < nodes_.size(); ++i) {
         const Node& n = nodes_[i];
         if (n.axis() == kLeaf) {

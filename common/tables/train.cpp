@@ -234,7 +234,8 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
     if (stop.stop_requested()) return cancelled;
     report->paths = dataset.paths.size(), report->nodes = dataset.nodes.size();
     if (dataset.paths.empty())
-        report->note += std::string(report->note.empty() ? "" : "; ") + "no path of this scene can be connected: uniform tables";
+        report->note +=
+            std::string(report->note.empty() ? "" : "; ") + "no path of this scene can be connected; the tables are uniform";
     GammaOptions gamma;
     gamma.trainer = options.trainer;
     gamma.mix = options.mix;

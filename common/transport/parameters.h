@@ -34,7 +34,7 @@ inline constexpr int kMaxNextEventRays = 64;
 /// connect to points on lights from a cache.
 inline constexpr ParameterInfo kNextEvent{
     "next-event",      1,    1,
-    kMaxNextEventRays, true, "shadow rays of next event estimation at the camera's first hit; later ones send one"};
+    kMaxNextEventRays, true, "shadow rays of next event estimation at the camera's first hit; later hits send one"};
 // The cache serves later vertices as well as a ray of their own would, for less: noise times rays, against none at all, is 0.93
 // with one ray for every vertex, 0.93 with one for the first alone and 0.92 with two (`lvcbpt`), and 1.08, 1.02 and 1.01 (`spcbpt`;
 // geometric means of six scenes). Without any, narrow spots are noisier than with `path`.
@@ -44,7 +44,7 @@ inline constexpr ParameterInfo kNextEventBesideCache{"next-event",
                                                      kMaxNextEventRays,
                                                      true,
                                                      "shadow rays of next event estimation, beside the cache's connections to "
-                                                     "lights, at the camera's first hit; later ones send none"};
+                                                     "lights, at the camera's first hit; later hits send none"};
 inline constexpr ParameterInfo kLightPaths{
     "light-paths",
     0.3,

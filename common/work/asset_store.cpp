@@ -200,7 +200,7 @@ Status AssetStore::Upload::finish() {
     std::error_code error;
     if (*digest != digest_) {
         fs::remove(from, error);
-        return data_loss("the bytes have digest " + digest->hex() + ", declared was " + digest_.hex());
+        return data_loss("the bytes have digest " + digest->hex() + ", but the declared one is " + digest_.hex());
     }
     const fs::path to = store_->path_of(digest_);
     fs::create_directories(to.parent_path(), error);
