@@ -40,7 +40,8 @@ struct JobRecord {
     uint32_t merged_groups = 0;             ///< Complete groups merged so far.
     uint64_t merged_iterations = 0;         ///< Iterations of these groups.
     std::set<uint32_t> workers;             ///< Indices of the workers whose units were merged.
-    UnitCounters counters;                  ///< Of all units that arrived; in the end, of the image's. So is `dropped`.
+    /// Work of all units that arrived; in the end, of those in the image. The same holds for `dropped`.
+    UnitCounters counters;
     uint64_t dropped = 0;
     RareLight rare_light;               ///< From the first unit, once that is merged.
     RareLightReport rare_light_report;  ///< Of the finished image.
@@ -70,7 +71,8 @@ struct JobRecord {
     Digest tables_asset;  ///< Digest of the tables that the job refers to or will refer to; zero before.
 
     std::jthread prepare_task, train_task, finish_task;
-    int running_tasks = 0;  ///< How many run; only without any is a job forgotten, which joins them.
+    /// How many of these run. A job is forgotten only when none does, so that nobody joins a task under the mutex.
+    int running_tasks = 0;
 
     JobInfo info(TimePoint now) const;
     /// The units that can be leased now, or null.

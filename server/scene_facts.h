@@ -16,8 +16,8 @@
 namespace lightloom {
 
 struct SceneFacts {
-    FrameLayout frame;               ///< With the job's resolution.
-    FilmResponse response;           ///< Of the scene's film.
+    FrameLayout frame;               ///< The frame at the job's resolution.
+    FilmResponse response;           ///< The response of the scene's film.
     int max_depth = 5;               ///< Bounces, if the job leaves them to the scene.
     std::vector<ImageLayer> layers;  ///< First-hit layers, if the job asks for them.
     /// Builds the scene, whose lights learning needs. It is called only for a job whose tables have to be made, and

@@ -55,7 +55,7 @@ struct AreaLightDefinition {
 /// A shape with its references still unresolved.
 struct PendingShape {
     std::variant<TriangleMesh, Sphere> geometry;
-    std::vector<uint32_t> faces;  ///< As make_shape() gives them; empty where they are not needed.
+    std::vector<uint32_t> faces;  ///< Faces as make_shape() gives them; empty where they are not needed.
     int32_t object = kNone;       ///< Index into SceneDescription::objects, or kNone.
     MaterialReference material;
     std::shared_ptr<const AreaLightDefinition> area_light;  ///< Null if the shape does not emit.
@@ -106,10 +106,10 @@ struct Context {
     std::map<int, MaterialId> resolved_anonymous_materials;
     std::map<std::tuple<float, float, float>, TextureId> constants;
     std::map<decltype(Mat4::m), int32_t> texture_spaces;
-    std::map<std::string, int32_t> image_index;  ///< By file, encoding and channel choice.
+    std::map<std::string, int32_t> image_index;  ///< Image by file, encoding and channel choice.
     std::map<std::tuple<float, float, float, bool, int32_t>, int32_t> emission_index;
     std::vector<TextureCost> texture_costs;        ///< One per scene texture.
-    std::vector<TextureRange> texture_ranges;      ///< The same.
+    std::vector<TextureRange> texture_ranges;      ///< One per scene texture.
     std::map<int32_t, Rgb> image_means;            ///< Means of the images of area and goniometric lights.
     std::map<int32_t, TextureRange> image_ranges;  ///< Ranges of the one-channel images of textures, by their index.
     std::map<MaterialId, int> mix_levels;          ///< Levels of mix materials; others have none.

@@ -24,7 +24,7 @@ struct ExrPixels {
 
 enum class ExrChannels {
     kColour,      ///< R, G, B and A if there; otherwise Y or the only one.
-    kFirstThree,  ///< In the order of the file, which is alphabetical, as some of pbrt's code takes them.
+    kFirstThree,  ///< The first three in the file's order, which is alphabetical, as some of pbrt's code does.
 };
 
 /// Decodes a scan-line or tiled EXR, of a multi-part file the first part. Primaries that ExrPrimaries does not list are an error.

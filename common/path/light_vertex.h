@@ -14,7 +14,7 @@ namespace lightloom {
 /// these.
 struct LightSurface {
     Bsdf bsdf;
-    Vec3 s, t;  ///< Of the shading frame.
+    Vec3 s, t;  ///< Tangents of the shading frame.
 
     explicit LightSurface(const PathVertex& v) : bsdf(v.bsdf), s(v.shading.s), t(v.shading.t) {}
 };

@@ -23,7 +23,7 @@ class TypicalSurvival {
     /// and `spcbpt` hardly differs; `bdpt` gains nothing and does without.
     static constexpr float kPerEvent = 0.6f;
 
-    /// Without roulette.
+    /// Without roulette every sub-path survives.
     TypicalSurvival() { shares_.fill(1); }
     explicit TypicalSurvival(const RouletteRule& rule) : first_vertex_(rule.first_vertex) {
         const double q = double(std::max(rule.min_survival, kPerEvent));
@@ -52,12 +52,12 @@ class PathSurvival {
         if (any) [[unlikely]]
             mark(view);
     }
-    /// Of light sub-paths x_0 ... x_{s-1}.
+    /// The share of light sub-paths x_0 ... x_{s-1} that survive.
     double light(int s) const {
         const int first = typical_.first_vertex();
         return typical_(any_ && s > first ? s - lossless(first - 1, s - 1) : s);
     }
-    /// Of camera sub-paths x_k ... x_{k-t+1}.
+    /// The share of camera sub-paths x_k ... x_{k-t+1} that survive.
     double camera(int t) const {
         const int first = typical_.first_vertex();
         return typical_(any_ && t > first ? t - lossless(k_ - t + 2, k_ - first + 2) : t);

@@ -81,7 +81,7 @@ float diffuse_coat_pmf(const Bsdf& b, const CoatSide& side) {
     return side.reflected + base > 0 ? side.reflected / (side.reflected + base) : 1.0f;
 }
 
-/// What the lobes of a coated conductor share for one direction.
+/// The values that the lobes of a coated conductor share for one direction.
 struct ConductorSide {
     CoatSide coat;
     float trapped;             ///< W.

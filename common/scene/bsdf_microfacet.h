@@ -44,7 +44,7 @@ struct Ggx {
 /// range.
 inline constexpr float kLeastDenominator = 1e-30f;
 
-/// What a reflecting microfacet lobe shares between its value and its densities, for wo and wi above the surface.
+/// Value and densities of a reflecting microfacet lobe, for wo and wi above the surface.
 struct MicrofacetReflection {
     float value = 0;    ///< D G2 / (4 cos cos): the BRDF without Fresnel.
     float pdf_fwd = 0;  ///< Solid-angle density of wi: visible normal at wo, then mirrored.

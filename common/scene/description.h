@@ -86,7 +86,7 @@ struct Material {
     TextureId base_roughness_u = kNone, base_roughness_v = kNone;  ///< kCoatedConductor's conductor.
     bool remap_roughness = true;              ///< pbrt: alpha = sqrt(roughness) if true, alpha = roughness otherwise.
     float ior = 1.5f;                         ///< Relative index of (thin) dielectric or of the coat.
-    float thickness = 0.01f;                  ///< Of the coat of coated kinds: every crossing transmits exp(-thickness / cos).
+    float thickness = 0.01f;                  ///< Of a coat, optical: every crossing transmits exp(-thickness / cos).
     int layer_events = 10;                    ///< kCoatedDiffuse: scattering events between coat and base that are followed, as
                                               ///< pbrt's "maxdepth"; every other one is a base reflection. 0: all.
     MaterialId mix_a = kNone, mix_b = kNone;  ///< kMix: a with probability 1 - amount, b with probability amount.
@@ -103,7 +103,7 @@ struct AreaEmission {
     int32_t image = kNone;  ///< Index into images; looked up by the shape's (u, v), see SurfaceMap.
 };
 
-/// What all shapes share.
+/// Attributes that all kinds of shapes have.
 struct ShapeAttributes {
     MaterialId material = kNone;
     int32_t emission = kNone;  ///< Index into SceneDescription::emissions.
@@ -156,8 +156,8 @@ struct SpotLight {
     Frame axes;     ///< axes.n is the direction of the axis, away from the light.
     Rgb intensity;  ///< On the axis, W / sr.
     // The next two are 1 - cosine of an angle, which keeps the digits that the cosine of a narrow cone loses.
-    float total_height = 0;    ///< Of the angle beyond which there is no light.
-    float falloff_height = 0;  ///< Of the angle within which it has full intensity; smoothstep between.
+    float total_height = 0;    ///< For the angle beyond which there is no light.
+    float falloff_height = 0;  ///< For the angle within which it has full intensity; smoothstep between.
     std::string source = {};
 };
 
@@ -234,7 +234,7 @@ struct SceneDescription {
     CameraDescription camera;
     FilmDescription film;
     int max_depth = 5;           ///< Bounces, as in pbrt: paths have up to max_depth + 1 edges.
-    int samples_per_pixel = 16;  ///< What the file asks for; the command line may override.
+    int samples_per_pixel = 16;  ///< As the file asks for; the command line may override it.
     /// The scene's origin in the file's coordinates: the world is moved so that single precision suffices around the
     /// camera.
     std::array<double, 3> origin{};

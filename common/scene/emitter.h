@@ -32,7 +32,7 @@ struct Emitter {
     float inv_area = 0;
     float total_height = 0, falloff_height = 0;  ///< kSpot; see SpotLight.
     float reach = 0;                             ///< Area lights: largest coordinate magnitude; see offset_origin().
-    float clearance = 0;                         ///< Of lights at a point: see Scene::intersect().
+    float clearance = 0;                         ///< Clearance of lights at a point: see Scene::intersect().
     bool hidden = false;                         ///< Area lights: no ray meets the surface, which only emits.
     int32_t light = 0;                           ///< Group for reports: the area-light shape or light source it came from.
 

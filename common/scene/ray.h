@@ -10,9 +10,9 @@
 
 namespace lightloom {
 
-/// What the acceleration structure reports.
+/// A hit as the acceleration structure reports it.
 struct RawHit {
-    float t = 0;             ///< In units of the ray's direction length.
+    float t = 0;             ///< Distance, in units of the ray's direction length.
     uint32_t geometry = 0;   ///< Index of the mesh in its object or the world; the number of meshes stands for spheres.
     uint32_t primitive = 0;  ///< Triangle or sphere index.
     int32_t instance = -1;   ///< Index of the instance, or -1.

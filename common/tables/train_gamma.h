@@ -50,10 +50,10 @@ struct GammaOptions {
     std::function<void(double)> progress;  ///< Optional; called now and then with the share of the work that is done.
 };
 
-/// What training found, for reports.
+/// Results of the training, for reports.
 struct GammaReport {
-    double uniform_loss = 0;  ///< Without training: half uniform, half by Q. On the held-out paths (mm) or on all.
-    double loss = 0;          ///< Of the result, on the same paths.
+    double uniform_loss = 0;  ///< Loss of the prior (half uniform, half by Q) on the held-out paths (mm) or all.
+    double loss = 0;          ///< Loss of the result on the same paths.
     double prior_strength = 0;
     uint32_t light_resolution = 1, eye_resolution = 1;  ///< Subspaces that the result tells apart (mm).
 };

@@ -1,6 +1,6 @@
 #pragma once
-// What a bidirectional algorithm finds, one connection at a time, before anything is weighted: renders add it to pixels, training
-// units keep some of it.
+// The contributions that a bidirectional algorithm finds, one connection at a time, before they are weighted: renders
+// add them to pixels, training units keep some of them.
 
 #include "common/path/camera_walk.h"
 #include "common/path/light_walk.h"
@@ -19,7 +19,7 @@ struct PathContribution {
     int t = 0;
     LightSubPath y;
     const PathVertex* z = nullptr;
-    Vec3 position, normal;  ///< Of x_0; for an infinite light a point outside of the scene and the direction of travel.
+    Vec3 position, normal;  ///< x_0's; for an infinite light a point outside the scene and the direction of travel.
     uint32_t emitter = 0;
     Vec2 film;           ///< For connections to the lens only.
     float survival = 1;  ///< Probability that roulette left both sub-paths: `value` was divided by it.

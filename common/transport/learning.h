@@ -33,7 +33,7 @@ struct LearningPlan {
     uint64_t samples = 0;     ///< D: camera samples of all rounds.
     double energy_paths = 1;  ///< M' / D: light sub-paths that measure Q, per sample.
     std::vector<LearningRound> rounds;
-    // What the render's weights depend on besides the tables.
+    // Parameters of the render's weights that are not in the tables.
     int connections = 1;  ///< N
     Correction correction = Correction::kUncorrected;
     NextEventRays rays{0, 0};

@@ -305,7 +305,7 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
     // Light sub-paths are traced in parallel; their results are joined in the order of their numbers.
     struct FromLight {
         Reservoir reservoir;
-        std::vector<std::pair<uint32_t, double>> estimates;  ///< By block.
+        std::vector<std::pair<uint32_t, double>> estimates;  ///< Pairs of block and estimate.
     };
     std::vector<FromLight> from_light(work.light_path_count);
     UnitPreparation preparation;

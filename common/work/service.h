@@ -17,7 +17,7 @@
 
 namespace lightloom {
 
-/// What must be equal on every host for the bytes of an image not to depend on the host.
+/// The identity that must be equal on all hosts, so that the bytes of an image do not depend on the host.
 struct BuildIdentity {
     std::string build_id;      ///< Version and digest of the sources that compute light.
     std::string math_profile;  ///< Compiler, instruction set, ray tracer.
@@ -97,7 +97,7 @@ std::string_view to_string(JobState state);
 struct JobInfo {
     std::string job_id;
     JobState state = JobState::kPreparing;
-    JobSpec spec;           ///< With the catalog's first algorithm where the client does not know the job's.
+    JobSpec spec;           ///< It has the catalog's first algorithm where the client does not know the job's.
     std::string algorithm;  ///< Name of the job's algorithm, also where it is unknown here.
     std::string message;
     uint64_t revision = 0;
@@ -123,7 +123,7 @@ std::string phase_text(const JobInfo& job);
 
 enum class ImageKind { kFinal, kPreview };
 
-/// What a client sees of a coordinator. Errors are those of JobService and AssetService.
+/// A coordinator's interface to clients. Errors are those of JobService and AssetService.
 class JobPort {
   public:
     virtual ~JobPort() = default;
@@ -144,7 +144,7 @@ class JobPort {
     virtual Status upload_bytes(const Digest& digest, std::string_view bytes) = 0;
 };
 
-/// What a worker sees of a coordinator. Errors are those of WorkerService and AssetService.
+/// A coordinator's interface to workers. Errors are those of WorkerService and AssetService.
 class WorkerPort {
   public:
     virtual ~WorkerPort() = default;
