@@ -53,8 +53,8 @@ LightDivision LightDivision::divide(const EmitterSet& emitters, uint32_t cell_co
     }
     std::vector<Cells> cells(power.size());
     if (!(total > 0)) return LightDivision(std::move(cells));
-    // `taken` cells are in use, and the lights in the last one fill `open` of it. A light that would fill less than 2 x
-    // 2 cells, or that has no surface, shares the last cell until it is full.
+    // `taken` cells are in use, and the lights in the last one fill `open` of it. A light that would fill less than four
+    // cells (2 x 2), or that has no surface, shares the last cell until it is full.
     uint32_t taken = 0;
     double open = 1;
     for (size_t i = 0; i < cells.size(); ++i) {

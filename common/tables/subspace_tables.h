@@ -25,9 +25,9 @@ struct SubspaceTables {
     /// Q, light_count entries, all positive: expected scalar throughput of a light path's prefixes in the subspace (W-like
     /// units of the scene), floor included.
     std::vector<float> energy;
-    /// Gamma, eye_count columns of light_count entries each, all positive, every column sums to one: gamma[j *
-    /// light_count + i] is the probability that eye subspace j connects to light subspace i. The conservative share
-    /// (TrainingOptions::mix) is included.
+    /// Gamma, eye_count columns of light_count entries each, all positive, every column sums to one:
+    /// gamma[j * light_count + i] is the probability that eye subspace j connects to light subspace i. The conservative
+    /// share (TrainingOptions::mix) is included.
     std::vector<float> gamma;
     /// J, light_count entries, 1 .. kMaxWindow: from how many windows of light paths a subspace takes its prefixes;
     /// only paths of the first window are splatted. [algorithms.md 1.6]
