@@ -1,8 +1,8 @@
 #pragma once
 // Coordinator: accepts jobs, leases their units to workers, merges each result exactly once, and writes the image. For
 // algorithms that need tables it first lets workers trace the training set, and learns the tables itself
-// (coordinator_learn.cpp). It does not render, and gRPC is kept to its callers (grpc_services.h); leases and durations
-// follow an injected clock. Safe for any number of threads.
+// (coordinator_learn.cpp). It does not render, and gRPC is kept to its callers (grpc_services.h); leases and measured
+// durations follow an injected clock. Safe for any number of threads.
 
 #include <condition_variable>
 #include <filesystem>

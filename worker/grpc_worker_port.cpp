@@ -114,7 +114,7 @@ Status GrpcWorkerPort::goodbye(const std::string& worker_id) {
 }
 
 Status GrpcWorkerPort::read_asset(const Digest& digest, uint64_t offset, const std::function<Status(std::string_view)>& sink) {
-    // The time that an asset takes is unknown before its size is; a call that made progress before its deadline is
+    // The time that an asset takes is unknown before its size is; a call that was fast enough until its deadline is
     // continued.
     for (;;) {
         const uint64_t begin = offset;
