@@ -47,7 +47,7 @@ class Reducer {
     /// Developed complete groups; kFailedPrecondition before the first.
     Result<RgbImage> image() const;
     Result<RgbImage> variance() const;
-    /// What `light` means for the image of the complete groups.
+    /// The consequences of `light` for the image of the complete groups.
     RareLightReport rare_light_report(const RareLight& light) const;
 
   private:

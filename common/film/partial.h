@@ -56,7 +56,7 @@ struct Partial {
     uint64_t dropped_count = 0;          ///< Non-finite samples dropped.
     std::vector<DroppedSample> dropped;  ///< The first of them, at most kMaxDroppedRecords.
     UnitCounters counters;
-    RareLight rare_light;  ///< Of the whole job, from its very first unit; no other one has it.
+    RareLight rare_light;  ///< Describes the whole job; only the job's first unit has it.
 
     static constexpr size_t kMaxDroppedRecords = 16;
 };

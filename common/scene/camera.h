@@ -46,7 +46,8 @@ class Camera {
     /// False as for project().
     bool see(const Vec3& point, Vec3* lens, Sight* sight) const;
 
-    /// Where parallel rays start, world: the upper left corner and the two edges from there, to the right and down.
+    /// The rectangle from which parallel rays start, world space: its upper left corner and the two edges from there,
+    /// to the right and down.
     struct Window {
         Vec3 corner, right, down;
     };

@@ -116,7 +116,7 @@ struct JobInfo {
     uint64_t phase_done = 0, phase_total = 0;          ///< In training samples; thousandths of the work in kLearning.
     std::string waits_for;                             ///< The job that makes the tables, in kWaitingForTables.
     TablesInfo tables;
-    RareLightReport rare_light;  ///< Of a finished job.
+    RareLightReport rare_light;  ///< Set for a finished job.
 };
 /// Text for people, for example "waiting for the tables of job-0123".
 std::string phase_text(const JobInfo& job);

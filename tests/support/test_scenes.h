@@ -328,10 +328,10 @@ inline SceneBuilder empty_box_builder() {
     return b;
 }
 
-/// Shading normals tilted by displacement and normal maps: on a floor, half of a mixed wall, a coated sphere turned inside out, a
-/// sheet that scatters to both sides, and a mirrored instance with normals of its own. (No rough glass: its total reflection
-/// amplifies rounding beyond what the weight suites allow. The tilts are gentle: where they let rays enter solids, short edges
-/// between a solid's faces do the same.)
+/// Shading normals tilted by displacement and normal maps: on a floor, half of a mixed wall, a coated sphere turned
+/// inside out, a sheet that scatters to both sides, and a mirrored instance with normals of its own. (There is no rough
+/// glass, because its total reflection amplifies rounding beyond the tolerance of the weight suites. The tilts are
+/// gentle, because where they let rays enter solids, short edges between the faces of a solid amplify it, too.)
 inline std::shared_ptr<const Scene> bumped() {
     SceneBuilder b = empty_box_builder();
     SceneDescription& d = b.description();
