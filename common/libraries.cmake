@@ -1,7 +1,7 @@
-# What of our own libraries there is, and which of them make light: questions that the build id and some tests ask, so that a new
-# library or source is never forgotten there.
+# Lists of our own libraries, and of those that compute light, for the build id and some tests, so that these never miss
+# a new library or source.
 
-# The static libraries that compute light: what renders, what reads scenes, and all that these link.
+# The static libraries that compute light: those that render or read scenes, and all that these link to.
 function(lightloom_light_libraries out)
     set(open lt_transport lt_import)
     set(seen)

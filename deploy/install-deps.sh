@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what building and testing need and this host lacks, from Debian 12. Silent when there is nothing to do.
+# Installs the packages for building and testing that this host lacks, from Debian 12. Silent when nothing is missing.
 set -euo pipefail
 
 packages=(

@@ -32,7 +32,7 @@ mkdir -p "$output"
 started=()
 stop_all() {
     local pid
-    # Workers first: they give back what they hold to a coordinator that still listens.
+    # Workers stop first, so that they give back their units while the coordinator still listens.
     for ((i = ${#started[@]} - 1; i >= 0; --i)); do
         pid=${started[i]}
         kill "$pid" 2>/dev/null || true

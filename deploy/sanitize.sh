@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds with sanitizers and runs what each of them is for:
+# Builds with sanitizers and runs the tests that suit each of them:
 #
 #   asan   AddressSanitizer, LeakSanitizer, UndefinedBehaviorSanitizer: the whole suite without the statistical tests
 #   tsan   ThreadSanitizer: the service tests, the work plan and the transport of light on several threads; and a control that
@@ -24,7 +24,8 @@ elif [ $# -gt 0 ]; then
     presets=("$1")
     shift
 fi
-# ThreadSanitizer's shadow has fixed addresses, which the widest address randomisation of newer kernels runs into.
+# ThreadSanitizer's shadow memory has fixed addresses, with which the widest address randomisation of newer kernels
+# collides.
 run=()
 if setarch -R true 2>/dev/null; then run=(setarch -R); fi
 
@@ -37,7 +38,8 @@ for preset in "${presets[@]}"; do
         controls=(race_control)
         if [ -z "$quick" ]; then names+=(client job_port training broadcast guided shapes process transport); fi
     elif [ -n "$quick" ]; then
-        # The service runs under ThreadSanitizer, which sees freed memory too: transport need not be built once more for it here.
+        # The service runs under ThreadSanitizer, which also sees freed memory: transport need not be built once more
+        # here.
         names=(check core film image_io import_shapes import_textures import_looks)
     fi
     tests=(-LE "statistical|nightly")

@@ -41,6 +41,6 @@ done
 
 "$root/deploy/sanitize.sh" quick
 
-# Last and alone: the statistical tests use all processors themselves.
+# The statistical tests run last and alone, because they use all processors themselves.
 cd build/release
 ctest --output-on-failure -L statistical

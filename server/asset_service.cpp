@@ -37,7 +37,7 @@ grpc::Status AssetServiceImpl::Write(grpc::ServerContext* context, grpc::ServerR
     if (!upload.ok()) return wire::to_grpc(upload.status());
     const grpc::Status taken = read_chunks(reader, closing_, [&](const v1::Chunk& chunk) -> grpc::Status {
         if (chunk.offset_bytes() != upload->offset())
-            return {grpc::StatusCode::OUT_OF_RANGE, "go on at offset " + std::to_string(upload->offset())};
+            return {grpc::StatusCode::OUT_OF_RANGE, "continue at offset " + std::to_string(upload->offset())};
         return wire::to_grpc(upload->append(chunk.data()));
     });
     if (!taken.ok()) return taken;
@@ -76,7 +76,7 @@ grpc::Status AssetServiceImpl::Read(grpc::ServerContext* context, const v1::Read
         if (!writer->Write(chunk)) break;
         offset += data->size();
     }
-    if (offset < size) return {grpc::StatusCode::UNAVAILABLE, "broken off; read on from there"};
+    if (offset < size) return {grpc::StatusCode::UNAVAILABLE, "the asset was not sent to its end; continue from there"};
     return grpc::Status::OK;
 }
 

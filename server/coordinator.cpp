@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kTick(20);
 
-/// Ids need only be unique, also across restarts of the coordinator.
+/// Ids must be unique, also across restarts of the coordinator.
 std::string new_id(const char* prefix) {
     std::random_device device;
     const uint64_t bits = (uint64_t(device()) << 32) ^ device();
@@ -37,7 +37,7 @@ Coordinator::Coordinator(CoordinatorOptions options)
       table_cache_(options_.table_cache, options_.table_cache_bytes),
       workers_(options_.lease_seconds),
       ticker_([this](std::stop_token stop) { tick(stop); }) {
-    // Jobs do not outlive the coordinator, so nobody names the tables that it finds.
+    // Jobs do not outlive the coordinator, so that nothing refers to tables that are found at the start.
     if (const size_t count = assets_.remove_all_that_begin_with(kTablesPrefix); count > 0)
         spdlog::info("removed the tables of {} earlier job(s)", count);
 }
@@ -54,7 +54,8 @@ Coordinator::~Coordinator() {
     work_changed_.notify_all();
     job_changed_.notify_all();
     ticker_ = {};
-    // Jobs join their tasks when they go, and these still take the mutex and look through the lists: they find them empty.
+    // A job joins its tasks when it is destroyed. These may still take the mutex and look through the lists, which are
+    // empty by then.
     for (;;) {
         std::vector<std::shared_ptr<JobRecord>> jobs;
         std::vector<std::shared_ptr<void>> garbage;
@@ -133,7 +134,8 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     if (auto answer = repeated()) return *answer;
     const auto unended = std::count_if(jobs_.begin(), jobs_.end(), [](const auto& j) { return !is_terminal(j->state); });
     if (size_t(unended) >= options_.max_jobs)
-        return Status(StatusCode::kResourceExhausted, "the coordinator holds as many jobs as it may; submit again when some ended");
+        return Status(StatusCode::kResourceExhausted,
+                      "the coordinator has no room for more jobs; submit again when some have ended");
     auto record = std::make_shared<JobRecord>();
     JobRecord& job = *record;
     job.id = new_id("job");
@@ -230,7 +232,7 @@ void Coordinator::end_job(JobRecord& job, JobState state) {
     }
     discard_training(job);
     if (const auto maker = std::exchange(job.maker, nullptr)) {
-        if (is_terminal(maker->state)) drop_tables(maker->tables_asset);  // kept for this job
+        if (is_terminal(maker->state)) drop_tables(maker->tables_asset);  // they were kept for this job
         discarded_.push_back(maker);
     }
     drop_tables(job.tables_asset);
@@ -252,7 +254,7 @@ void Coordinator::fail_job(JobRecord& job, const Status& why) {
 void Coordinator::unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Failures failures, const Status& why) {
     const std::string unit = unit_name(key);
     spdlog::warn("{}: unit {} failed ({}): {}", job.id, unit, failures.total, why.message());
-    // Units are pure functions: what is wrong with the request is wrong on every worker.
+    // Units are pure functions: a request that is wrong is wrong on every worker.
     if (failures.workers >= kMaxFailedWorkers || failures.total >= kMaxUnitFailures || why.code() == StatusCode::kInvalidArgument)
         fail_job(job, {why.code(), "unit " + unit + ": " + why.message()});
     work_changed_.notify_all();
@@ -263,7 +265,8 @@ void Coordinator::leases_expired(JobRecord& job, UnitTable& units, const std::ve
     spdlog::warn("{}: {} lease(s) ran out; the units go to other workers", job.id, expired.size());
     work_changed_.notify_all();
     for (const UnitTable::Expired& lease : expired) {
-        // Of the units that a silent worker held, the oldest was in work and bears the blame; the others waited behind it.
+        // Of the units that a silent worker held, the oldest was being rendered and counts as the cause; the others
+        // waited behind it.
         if (!workers_.fell_silent(lease.worker, options_.clock())) continue;
         const std::set<uint32_t> lost = units.lose(lease.unit, lease.worker);
         if (lost.size() < kMaxLostWorkers) continue;

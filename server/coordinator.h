@@ -1,7 +1,8 @@
 #pragma once
-// Coordinator: accepts jobs, leases their units to workers, merges what comes back exactly once, and writes the image.
-// Before that it has workers trace the training set of algorithms that need tables, and learns these. It knows neither
-// gRPC nor light transport; time comes from an injected clock. Safe for any number of threads.
+// Coordinator: accepts jobs, leases their units to workers, merges each result exactly once, and writes the image. For
+// algorithms that need tables it first lets workers trace the training set, and learns the tables itself
+// (coordinator_learn.cpp). It does not render, and gRPC is kept to its callers (grpc_services.h); leases and measured
+// durations follow an injected clock. Safe for any number of threads.
 
 #include <condition_variable>
 #include <filesystem>
@@ -26,7 +27,7 @@ struct LearnedTables;
 
 struct CoordinatorOptions {
     std::filesystem::path directory;  ///< Assets and finished images; made if need be.
-    BuildIdentity identity;           ///< What a worker must be equal to.
+    BuildIdentity identity;           ///< A worker must have the same.
     SceneReader read_scene;
     bool scene_files_needed = true;  ///< False where read_scene and the workers have the files by other means.
     double lease_seconds = 10;
@@ -34,18 +35,18 @@ struct CoordinatorOptions {
     std::optional<uint64_t> shuffle_seed;  ///< Lease units in a random order (tests).
     /// Called by any thread at any time.
     std::function<TimePoint()> clock = [] { return std::chrono::steady_clock::now(); };
-    /// Memory of the host, which a frame's sums must fit. 0: what the system says.
+    /// Memory of the host, into which a frame's sums must fit. 0: as the system reports it.
     int64_t memory_bytes = 0;
-    uint64_t waiting_bytes = uint64_t(512) << 20;  ///< Room for partials that wait for earlier groups.
+    uint64_t waiting_bytes = uint64_t(512) << 20;  ///< Most memory of partials that wait for earlier groups.
     std::filesystem::path table_cache;             ///< Tables of earlier jobs; empty: none are kept.
     uint64_t table_cache_bytes = uint64_t(4) << 30;
-    uint64_t training_bytes = uint64_t(8) << 30;  ///< Room for the training data of one job: 5 10^6 samples of a hard interior.
-    size_t max_jobs = 10000;                      ///< That have not ended.
+    uint64_t training_bytes = uint64_t(8) << 30;  ///< Most training data of one job: 5e6 samples of a hard interior.
+    size_t max_jobs = 10000;                      ///< Most jobs that have not ended.
     size_t kept_jobs = 1000;                      ///< Ended jobs that are remembered; the oldest are forgotten, their files stay.
 };
 
-/// The answer to a result of which expected_partial() or expected_training_bytes() knows nothing: one that comes too late is
-/// stale, any other one is rejected.
+/// The answer to a result for which expected_partial() or expected_training_bytes() failed: a result that comes too
+/// late is stale, any other is rejected.
 SubmitAck unexpected_result(const Status& why);
 
 class Coordinator {
@@ -72,23 +73,24 @@ class Coordinator {
     Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running);
     Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why);
     Status goodbye(const std::string& worker_id);
-    /// What the payload of a unit must be; kNotFound if the job or unit is not open. For limits before bytes are taken in.
+    /// What the payload of a unit must be, for limits before bytes are received; kNotFound if the job or unit is not
+    /// open.
     Result<PartialExpectation> expected_partial(const UnitReference& unit) const;
-    /// A partial that came over the wire: checked against the unit before anything reads it.
+    /// Takes a partial that came over the wire; it is checked against the unit before anything reads it.
     Result<SubmitAck> submit_payload(const std::string& worker_id, const UnitReference& unit, const PartialDescriptor& descriptor,
                                      std::string_view payload);
-    /// A partial of this process. `digest` is its payload's.
+    /// Takes a partial from this process. `digest` is its payload's.
     Result<SubmitAck> submit_partial(const std::string& worker_id, const UnitReference& unit, const Digest& digest,
                                      Partial partial);
-    /// What the training data of a unit may be at most; errors as those of expected_partial().
+    /// Most bytes of the training data of a unit; errors as those of expected_partial().
     Result<uint64_t> expected_training_bytes(const UnitReference& unit) const;
-    /// Training data, serialized; checked against digest and unit before they count.
+    /// Takes serialized training data, which are checked against digest and unit before they count.
     Result<SubmitAck> submit_training(const std::string& worker_id, const UnitReference& unit, const Digest& digest,
                                       std::string_view payload, double trace_seconds);
     std::vector<WorkerStatus> workers() const;
 
   private:
-    /// Shared, because a job may be forgotten while a caller works without the mutex.
+    /// The pointer is shared, because a job may be forgotten while a caller works without the mutex.
     std::shared_ptr<JobRecord> find_job(const std::string& job_id) const;
     TimePoint lease_end() const { return seconds_after(options_.clock(), options_.lease_seconds); }
     void changed(JobRecord& job);
@@ -96,23 +98,24 @@ class Coordinator {
     Status check_assets(const JobSpec& spec) const;
     void fail_job(JobRecord& job, const Status& why);
     void end_job(JobRecord& job, JobState state);
-    /// Runs a task on a thread of the job's own. Its error, too little memory for it, or no thread to be had fails the job and
-    /// nothing else; false in the last case. `purpose` completes "the coordinator has too little memory ...". Under mutex_.
+    /// Runs a task on a thread of the job's own. The task's error, too little memory or a missing thread fails this job
+    /// only; returns false if there is no thread. `purpose` completes "the coordinator has too little memory ...". The
+    /// caller holds mutex_.
     bool start_task(JobRecord& job, std::jthread* thread, const char* purpose, std::function<Status(std::stop_token)> task);
     void run_task(JobRecord& job, const char* purpose, const std::function<Status()>& task);
     Status prepare(JobRecord& job, std::stop_token stop);
     void plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables);
     Status prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait);
     std::shared_ptr<JobRecord> find_maker(const JobRecord& job) const;
-    /// True if another job makes the tables of `table_key`: this one waits for them.
+    /// True if another job makes the tables of `table_key`; this job then waits for them.
     bool wait_for_maker(JobRecord& job);
     void resume_waiting(const std::shared_ptr<JobRecord>& job);
-    /// changed(), for those as well that wait for this job's tables.
+    /// Calls changed() for this job and for those that wait for its tables.
     void prepared_further(JobRecord& job);
     Status take_over_tables(JobRecord& job);
     void open_training(JobRecord& job, UnitKind kind, uint32_t round, const TrainingWork& work);
     void open_first_round(JobRecord& job);
-    class Tracing;  ///< What learning asks of the coordinator for one job.
+    class Tracing;  ///< The TracingPort of one job.
     Status learn(JobRecord& job, std::stop_token stop);
     Status finish_tables(JobRecord& job, LearnedTables learned);
     bool adopt_cached_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts);
@@ -127,10 +130,11 @@ class Coordinator {
     Status write_results(JobRecord& job);
     void forget_old_jobs();
     void finish_if_complete(JobRecord& job);
-    /// Enters a result into its table: nothing for the first one, which the caller merges; otherwise the answer.
+    /// Enters a result into its table. Returns nothing for a first result, which the caller merges, and otherwise the
+    /// answer.
     std::optional<SubmitAck> repeated_result(JobRecord& job, UnitTable& units, const UnitKey& key, const WorkerRecord& worker,
                                              const Digest& digest);
-    /// Counts a result that is none against its worker and its unit, which somebody renders again; the answer.
+    /// Counts an invalid result against its worker and its unit, which is rendered again; returns the answer.
     SubmitAck reject_result(JobRecord& job, UnitTable& units, const UnitKey& key, WorkerRecord& worker, const Status& why);
     void unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Failures failures, const Status& why);
     void leases_expired(JobRecord& job, UnitTable& units, const std::vector<UnitTable::Expired>& expired);
@@ -140,7 +144,7 @@ class Coordinator {
     const CoordinatorOptions options_;
     AssetStore assets_;
     const TableCache table_cache_;
-    std::mutex repair_mutex_;  ///< Before mutex_.
+    std::mutex repair_mutex_;  ///< Must be locked before mutex_.
     mutable std::mutex mutex_;
     mutable std::condition_variable work_changed_, job_changed_;
     std::vector<std::shared_ptr<JobRecord>> jobs_;  // oldest first
@@ -148,7 +152,7 @@ class Coordinator {
     std::map<std::string, JobRecord*> requests_;    // by request id
     WorkerRegistry workers_;
     bool closing_ = false;
-    std::jthread ticker_;  // last: stops before anything that it uses goes away
+    std::jthread ticker_;  // last, so that it stops before anything that it uses is destroyed
 };
 
 }  // namespace lightloom

@@ -44,7 +44,7 @@ void Coordinator::run_task(JobRecord& job, const char* purpose, const std::funct
     Status status;
     try {
         status = task();
-    } catch (const std::bad_alloc&) {  // one job too large must not end the coordinator and all others
+    } catch (const std::bad_alloc&) {  // one job that is too large must not end the coordinator and all other jobs
         status = no_memory();
     } catch (const std::length_error&) {
         status = no_memory();
@@ -65,7 +65,8 @@ Status Coordinator::prepare(JobRecord& job, std::stop_token stop) {
     const Rect& crop = facts->frame.crop;
     if (crop.empty() || crop.area() > kMaxPartialPixels)
         return invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) + " pixels");
-    // Before hours of rendering: the system may hand out memory that it does not have, and kill who uses it.
+    // This is checked before hours of rendering, because the system may hand out memory that it does not have and kill
+    // the process that uses it.
     const int64_t memory =
         options_.memory_bytes > 0 ? options_.memory_bytes : int64_t(::sysconf(_SC_PHYS_PAGES)) * ::sysconf(_SC_PAGESIZE);
     if (memory > 0 && crop.area() > memory / kFrameBytesPerPixel)
@@ -107,8 +108,8 @@ void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, Tab
 }
 
 void Coordinator::size_window(JobRecord& job) const {
-    // One group is summed as it comes; the partials of those after it wait as they are. How many splats these hold is known
-    // by experience only; before there is any, it is the most that fits into a partial.
+    // One group is summed as its partials come; those of later groups wait unmerged. How many splats they hold is
+    // estimated from earlier partials; before there is any, it is the most that a partial can hold.
     const double area = double(job.spec.frame.crop.area());
     double splats = 0;
     if (job.unit_light_paths > 0) splats = std::min(area, job.splats_per_path.value_or(area) * job.unit_light_paths);
@@ -156,12 +157,12 @@ Status Coordinator::write_results(JobRecord& job) {
     Manifest manifest;
     {
         const std::lock_guard lock(mutex_);
-        if (job.state != JobState::kFinishing) return {};  // cancelled meanwhile
+        if (job.state != JobState::kFinishing) return {};  // it was cancelled meanwhile
         job.image_digest = digest;
         job.image_size = image->size();
         job.merged_groups = reducer->folded_groups();
         job.merged_iterations = reducer->iterations();
-        // What came of groups that are not in the image is not of the image either; what was summed just before freeze() is.
+        // Results of groups that are not in the image do not count; what was summed just before freeze() does.
         job.units->advance(job.merged_groups);
         manifest.units = job.units->merged();
         for (const UnitTable::Merged& unit : manifest.units) job.workers.insert(unit.worker);

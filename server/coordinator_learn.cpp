@@ -1,5 +1,5 @@
-// The coordinator's side of learning: learn_tables() runs on a thread of the job's own and asks through a TracingPort for what only
-// the coordinator has: units that workers trace, other jobs with the same tables, and the mutex.
+// The coordinator's side of learning: learn_tables() runs on a thread of the job's own. Through a TracingPort it
+// reaches what only the coordinator has: units that workers trace, other jobs with the same tables, and the mutex.
 
 #include <spdlog/spdlog.h>
 
@@ -43,7 +43,7 @@ class Coordinator::Tracing final : public TracingPort {
             const TimePoint begin = job_.round_begin;
             auto parts = round.take();
             lock.unlock();
-            // Digest and size were right; a worker whose data are nonsense all the same loses its unit.
+            // Digest and size were right; a worker whose data are invalid all the same loses its unit.
             std::vector<std::pair<uint32_t, Status>> bad;
             for (uint32_t i = 0; i < parts.size(); ++i)
                 if (Status s = parts[i].data.validate(emitter_count_); !s.ok()) bad.emplace_back(i, std::move(s));
@@ -83,7 +83,7 @@ class Coordinator::Tracing final : public TracingPort {
             job_.table_key = table_key(coordinator_.options_.identity, set.spec);
             facts = job_.facts;
         }
-        // A smaller set makes other tables, which nobody has looked for yet; those of the whole set may be there by now.
+        // A smaller set makes other tables, which have not been looked up yet; those of the whole set may exist by now.
         if (coordinator_.adopt_cached_tables(job_, set.spec, facts)) return false;
         const std::lock_guard lock(coordinator_.mutex_);
         if (!alive()) return over();
@@ -123,7 +123,7 @@ class Coordinator::Tracing final : public TracingPort {
         {
             const std::lock_guard lock(coordinator_.mutex_);
             if (!alive()) return over();
-            replace_guide({digest, bytes->size()}, bytes);  // before they are there, so that no job that ends takes them away
+            replace_guide({digest, bytes->size()}, bytes);  // before they are stored: no job that ends removes them
         }
         LL_RETURN_IF_ERROR(coordinator_.store_tables(digest, *bytes));
         const std::lock_guard lock(coordinator_.mutex_);
@@ -136,13 +136,13 @@ class Coordinator::Tracing final : public TracingPort {
     }
 
   private:
-    /// What the units of the round to come read. Under the mutex.
+    /// Sets the tables that units of the next round read. The caller holds the mutex.
     void replace_guide(const AssetReference& guide, std::shared_ptr<const std::string> bytes) {
         const Digest old = std::exchange(job_.guide, guide).digest;
         job_.guide_bytes = std::move(bytes);
         if (old != guide.digest) coordinator_.drop_tables(old);
     }
-    /// Under the mutex.
+    /// The caller holds the mutex.
     bool alive() const { return job_.state == JobState::kPreparing && !stop_.stop_requested(); }
 
     Coordinator& coordinator_;
@@ -173,7 +173,7 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
 Status Coordinator::finish_tables(JobRecord& job, LearnedTables learned) {
     TablesInfo& info = learned.info;
     info.cache_key = table_key(options_.identity, learned.spec);
-    SceneFacts facts;  // empty if the job ended meanwhile: its tables are kept all the same
+    SceneFacts facts;  // empty if the job ended meanwhile; its tables are kept all the same
     {
         const std::lock_guard lock(mutex_);
         info.capped_by_time_limit = job.capped_by_time_limit;

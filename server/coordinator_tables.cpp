@@ -1,6 +1,6 @@
-// Tables: the part of a job's life in which workers trace its training set and the coordinator learns from it. Training units are
-// leased, renewed, given back and merged exactly once as units of the image are; their order of arrival does not matter, because
-// the data are joined in the order of their numbers.
+// Tables: the part of a job's life in which workers trace its training set and the coordinator learns from it. Training
+// units are leased, renewed, given back and merged exactly once like units of the image; their order of arrival does
+// not matter, because the data are joined in the order of their numbers.
 
 #include <spdlog/spdlog.h>
 
@@ -38,14 +38,15 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
     if (adopt_cached_tables(job, spec, facts)) return {};
     const std::lock_guard lock(mutex_);
     if (job.state != JobState::kPreparing) return {};
-    // Who chose the training set knows what it costs; and what a probe has chosen already stays.
+    // A training set that the user chose is not made smaller, and neither is one that a probe has already chosen.
     const bool chosen = job.submitted.algorithm.chosen(kTrainingPaths) || job.capped_by_time_limit;
     const bool open_size = spec.time_limit_seconds > 0 && !chosen && spec.algorithm.has(kTrainingPaths);
     const uint64_t samples = learning_plan(spec.algorithm).samples;
     job.table_key = table_key(options_.identity, spec);
     job.spec = std::move(spec);
     job.facts = std::move(facts);
-    // What another job makes at leisure may take far longer than this one's limit allows: it probes first, see settle().
+    // Another job may take far longer to make the tables than this one's limit allows: therefore this job probes first,
+    // see settle().
     const bool probes = open_size && samples > kMinTrainingSamples;
     job.may_wait = may_wait;
     if (may_wait && !probes && wait_for_maker(job)) return {};
@@ -62,7 +63,7 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
 
 std::shared_ptr<JobRecord> Coordinator::find_maker(const JobRecord& job) const {
     for (const auto& other : jobs_) {
-        // A probe does not know yet which set it is for.
+        // While it probes, a job does not know yet for which set.
         const bool makes = other->makes_tables && !is_terminal(other->state) && other->phase != PreparePhase::kProbing;
         if (other.get() != &job && makes && other->table_key == job.table_key) return other;
     }
@@ -72,7 +73,7 @@ std::shared_ptr<JobRecord> Coordinator::find_maker(const JobRecord& job) const {
 bool Coordinator::wait_for_maker(JobRecord& job) {
     job.maker = find_maker(job);
     if (!job.maker) return false;
-    // As before its own tracing, should it have to begin again.
+    // The state is that before its own tracing, in case the job has to begin again.
     job.makes_tables = false;
     job.training_begin = {};
     discard_round(job);
@@ -117,7 +118,7 @@ Status Coordinator::take_over_tables(JobRecord& job) {
         job.phase = PreparePhase::kReadingScene;
         changed(job);
     }
-    maker.reset();  // without the mutex: nobody else may know the other job any more, and it joins its tasks
+    maker.reset();  // without the mutex: this may end the other job, which joins its tasks
     if (tables.asset.size_bytes == 0) return prepare_tables(job, std::move(spec), std::move(facts), true);
     const auto bytes = assets_.read(tables.asset.digest);
     if (!bytes.ok()) return prepare_tables(job, std::move(spec), std::move(facts), false);
@@ -142,7 +143,7 @@ bool Coordinator::adopt_cached_tables(JobRecord& job, const JobSpec& spec, const
 Status Coordinator::store_tables(const Digest& digest, std::string_view bytes) {
     if (assets_.contains(digest) && !assets_.read(digest).ok()) assets_.remove(digest);
     Status stored = assets_.put(digest, bytes);
-    // An equal job stores the same bytes at this moment.
+    // Another job with the same tables may be storing them at this moment.
     for (int i = 0; i < 100 && stored.code() == StatusCode::kAborted; ++i) {
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
         stored = assets_.put(digest, bytes);
@@ -157,14 +158,14 @@ Status Coordinator::adopt_tables(JobRecord& job, const JobSpec& spec, const Scen
     {
         const std::lock_guard lock(mutex_);
         if (is_terminal(job.state)) return {};
-        job.tables_asset = digest;  // before the bytes are there, so that no job that ends takes them away
+        job.tables_asset = digest;  // set before the bytes are stored, so that no job that ends removes them
     }
     LL_RETURN_IF_ERROR(store_tables(digest, bytes));
     plan_units(job, spec, facts, std::move(tables));
     const std::lock_guard lock(mutex_);
     job.guide_bytes.reset();
     drop_tables(std::exchange(job.guide, {}).digest);
-    if (is_terminal(job.state)) drop_tables(digest);  // it ended while they were stored
+    if (is_terminal(job.state)) drop_tables(digest);  // the job ended while they were stored
     return {};
 }
 
@@ -215,14 +216,14 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
     if (problem.ok() &&
         (data->samples != unit->training.sample_count || data->light_samples != energy_paths(job->spec, unit->training)))
         problem = data_loss("the training data are those of another unit");
-    // What needs the scene's lights to be checked waits for the task that has built it.
+    // Checks that need the scene's lights are made by the task that has built the scene.
     if (problem.ok()) problem = data->validate(SIZE_MAX);
     if (!problem.ok()) return reject_result(*job, *units, reference.key, *worker, problem);
     if (auto answer = repeated_result(*job, *units, reference.key, *worker, digest)) return *std::move(answer);
     workers_.unit_succeeded(*worker);
     TrainingRound& round = *job->round;
     round.add(reference.key.group, {*std::move(data), payload.size(), trace_seconds});
-    // A set that is far too large shows before hours were spent on it.
+    // A set that is far too large is noticed before hours are spent on it.
     if (round.bytes() > options_.training_bytes || round.projected_bytes() > 1.25 * double(options_.training_bytes)) {
         fail_job(*job, {StatusCode::kResourceExhausted,
                         "the training data need more than the " + std::to_string(options_.training_bytes >> 20) +
@@ -252,7 +253,7 @@ bool Coordinator::repair_tables(const std::string& job_id) {
     const Digest& digest = asset.digest;
     if (asset.size_bytes == 0) return false;
     const std::lock_guard only_one(repair_mutex_);
-    if (assets_.read(digest).ok()) return false;  // the worker's own trouble, or repaired meanwhile
+    if (assets_.read(digest).ok()) return false;  // it is the worker's own trouble, or was repaired meanwhile
     assets_.remove(digest);
     const auto entry = guide ? std::nullopt : table_cache_.find(cache_key, parts);
     const bool cached = entry && entry->info.asset.digest == digest;
@@ -262,7 +263,7 @@ bool Coordinator::repair_tables(const std::string& job_id) {
     if (stored.ok() || stored.code() == StatusCode::kAborted) {
         spdlog::warn("{}: tables {} were damaged on disk and are restored", job_id, digest.hex().substr(0, 12));
         const std::lock_guard lock(mutex_);
-        if (is_terminal(job->state)) drop_tables(digest);  // it ended meanwhile
+        if (is_terminal(job->state)) drop_tables(digest);  // the job ended meanwhile
         return true;
     }
     const std::lock_guard lock(mutex_);

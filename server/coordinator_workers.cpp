@@ -40,11 +40,11 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
     const TimePoint now = options_.clock();
     if (!worker.has_room() || workers_.rests(worker, now)) return std::nullopt;
     const auto anyone_else = [&](const std::set<uint32_t>& but) { return workers_.anyone_else(but, now); };
-    // A second unit only if enough are left for those workers that have none: a unit must not wait behind another one
-    // while somebody idles.
+    // A worker gets a second unit only if enough are left for the workers that have none: a unit must not wait behind
+    // another one while a worker idles.
     const size_t idle = worker.held.empty() ? 0 : workers_.idle();
     for (const auto& in_line : jobs_) {
-        // A job that waits for tables lends its place to the job that makes them, which may be a younger one.
+        // A job that waits for tables gives its turn to the job that makes them, which may be a younger one.
         const std::shared_ptr<JobRecord> job = maker_of_last_resort(in_line);
         if (job != in_line && job->state != JobState::kPreparing) continue;
         UnitTable* const units = job->open_units();
@@ -54,7 +54,8 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
         const bool render = unit->key.kind == UnitKind::kRender;
         if (!render && job->round_begin == TimePoint()) job->round_begin = now;
         if (!render && job->training_begin == TimePoint()) {
-            // Only a job that workers have begun with takes a thread and a built scene; both are made while paths are traced.
+            // Learning takes a thread and a built scene only from the first lease on; both are made while paths are
+            // traced.
             job->training_begin = job->round_begin;
             JobRecord& record = *job;
             if (!start_task(record, &record.train_task,
@@ -114,7 +115,7 @@ Result<std::vector<UnitReference>> Coordinator::heartbeat(const std::string& wor
             changed(*job);
         }
     }
-    // A lease whose answer was lost on the way is not in `running`; it runs out by itself.
+    // A lease whose answer was lost on the way is not in `running`; it expires by itself.
     worker->held = std::move(held);
     return revoked;
 }
@@ -129,13 +130,13 @@ Status Coordinator::release_unit(const std::string& worker_id, const UnitReferen
     const auto job = find_job(unit.job_id);
     UnitTable* const units = job ? job->open_units(unit.key) : nullptr;
     if (!units) return {};
-    // What a network did to a worker says nothing about the unit: it costs time only.
+    // Network errors say nothing about the unit and only cost time.
     const bool blameless = repaired || why.code() == StatusCode::kCancelled || why.code() == StatusCode::kUnavailable ||
                            why.code() == StatusCode::kDeadlineExceeded || why.code() == StatusCode::kAborted;
     if (why.ok() || blameless) {
         units->release(unit.key, worker->index);
     } else {
-        if (why.code() != StatusCode::kInvalidArgument) workers_.unit_failed(*worker, options_.clock());  // otherwise it is the job
+        if (why.code() != StatusCode::kInvalidArgument) workers_.unit_failed(*worker, options_.clock());  // else it is the job
         const UnitTable::Failures failures = units->fail(unit.key, worker->index);
         unit_failed(*job, unit.key, failures, {why.code(), worker->id + ": " + why.message()});
     }
@@ -202,10 +203,10 @@ std::optional<SubmitAck> Coordinator::repeated_result(JobRecord& job, UnitTable&
             ++job.duplicates_different;
             changed(job);
             spdlog::error(
-                "{}: unit {} from {} differs from the bytes taken in before; one of two workers computes wrongly: "
+                "{}: unit {} from {} differs from the bytes accepted before; one of two workers computes wrongly: "
                 "compare their hosts and builds",
                 job.id, unit_name(key), worker.id);
-            return SubmitAck{SubmitOutcome::kDuplicateDifferent, "the unit was taken in before with other bytes"};
+            return SubmitAck{SubmitOutcome::kDuplicateDifferent, "the unit was accepted before with other bytes"};
         case UnitTable::Completion::kFirst: break;
     }
     return std::nullopt;
@@ -246,7 +247,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     }
     Status own;
     for (const Reducer::Refusal& refusal : *refused) {
-        if (job->state != JobState::kRunning) break;  // failed by the one before
+        if (job->state != JobState::kRunning) break;  // the one before has failed the job
         ++job->rejected;
         if (refusal.unit == unit.key) own = refusal.why;
         unit_failed(*job, refusal.unit, job->units->reopen(refusal.unit), refusal.why);

@@ -1,5 +1,5 @@
 #pragma once
-// One coordinator per data directory: two would take each other's uploads and images for their own.
+// Only one coordinator may use a data directory: two would take each other's uploads and images for their own.
 
 #include <filesystem>
 
@@ -7,7 +7,7 @@
 
 namespace lightloom {
 
-/// Held until destruction; the system lets go of it also when the process is killed.
+/// The lock is held until destruction; the system also releases it when the process is killed.
 class DataLock {
   public:
     /// Locks `directory`, which must exist. kFailedPrecondition if another process holds it.

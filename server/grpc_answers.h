@@ -1,5 +1,5 @@
 #pragma once
-// What the handlers of the three services have in common: how a call is answered, and how its chunks are taken in.
+// Common parts of the three services' handlers: answering a call, and receiving its chunks.
 
 #include <grpcpp/support/status.h>
 #include <grpcpp/support/sync_stream.h>
@@ -15,7 +15,7 @@ inline grpc::Status invalid(const std::string& what) { return {grpc::StatusCode:
 
 inline grpc::Status going_down() { return {grpc::StatusCode::UNAVAILABLE, "the coordinator is going down"}; }
 
-/// Puts a value into the response, or makes its error the call's.
+/// Puts a value into the response, or returns its error as the call's status.
 template <class Value, class Message>
 grpc::Status answer(const Result<Value>& value, Message* response) {
     if (!value.ok()) return wire::to_grpc(value.status());

@@ -27,7 +27,7 @@ struct GrpcServer::Services {
 
 namespace {
 
-/// gRPC would take the socket from a server that has it.
+/// Whether a server listens on the socket; gRPC would take the socket away from it.
 bool socket_is_served(const std::string& path) {
     sockaddr_un name{};
     if (path.empty() || path.size() >= sizeof name.sun_path) return false;
@@ -56,7 +56,7 @@ Result<std::unique_ptr<GrpcServer>> GrpcServer::start(Coordinator& coordinator, 
     // One coordinator per port: without this a second one would share it silently.
     builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
     set_keepalive([&](const char* name, int value) { builder.AddChannelArgument(name, value); });
-    // Clients and workers that ask more often than this are cut off.
+    // Clients and workers that send pings more often than this are disconnected.
     builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kKeepaliveMilliseconds / 4);
     builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 64);
     builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &server->port_);
@@ -71,7 +71,7 @@ Result<std::unique_ptr<GrpcServer>> GrpcServer::start(Coordinator& coordinator, 
 GrpcServer::~GrpcServer() {
     if (!server_) return;
     services_->closing = true;
-    // Handlers that wait look at `closing` several times a second; what does not end by itself is cut off.
+    // Waiting handlers check `closing` several times a second; calls that do not end by themselves are cancelled.
     server_->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(3));
 }
 

@@ -1,8 +1,9 @@
 #pragma once
-// The services of proto/lightloom/v1 as thin adapters around a Coordinator: convert, call, convert.
+// The services of proto/lightloom/v1 as thin adapters around a Coordinator: they convert the request, call, and convert
+// the answer.
 //
-// The synchronous API is deliberate: a handler is a plain function, there are two or three calls in flight per worker and client,
-// and rendering, not the number of connections, bounds a coordinator of this design.
+// The synchronous API is deliberate: a handler is a plain function, each worker and client has two or three calls in
+// flight, and a coordinator of this design is limited by rendering and not by the number of connections.
 
 #include <grpcpp/server.h>
 

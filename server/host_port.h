@@ -14,10 +14,10 @@ struct HostPort {
     uint16_t port = 0;  ///< 0: any free one.
 };
 
-/// kInvalidArgument where `text` is anything else; `option` is named in the message.
+/// kInvalidArgument for any other text; the message names `option`.
 Result<HostPort> parse_host_port(std::string_view text, std::string_view option);
 
-/// Whether only processes of this host can reach it.
+/// Whether only processes on this host can reach the address.
 bool is_loopback(const HostPort& address);
 
 }  // namespace lightloom

@@ -5,9 +5,9 @@
 namespace lightloom {
 namespace {
 
-constexpr uint64_t kLearningSteps = 1000;  ///< Into which progress of learning is divided.
+constexpr uint64_t kLearningSteps = 1000;  ///< Steps into which the progress of learning is divided.
 
-/// Of `whole`, with `done` of it done after `seconds` of steady work; nothing before there is any.
+/// Remaining time for `whole` when `done` of it took `seconds` of steady work; nothing while `done` is 0.
 std::optional<double> seconds_left(double seconds, uint64_t done, uint64_t whole) {
     if (done == 0) return std::nullopt;
     return seconds * double(whole - done) / double(done);

@@ -1,6 +1,6 @@
 #pragma once
-// JobRecord: all that the coordinator knows of a job. Its fields are the coordinator's to change, under the coordinator's mutex
-// unless they say otherwise; what can be told from them alone is told here.
+// JobRecord: all that the coordinator knows of a job. The coordinator changes its fields, under the coordinator's mutex
+// unless a field says otherwise; the functions here need the record alone.
 
 #include <filesystem>
 #include <memory>
@@ -20,81 +20,84 @@ namespace lightloom {
 
 struct JobRecord {
     std::string id, request_id;
-    JobSpec submitted;  ///< As it came, to recognise a repeated submission.
+    JobSpec submitted;  ///< As submitted, to recognise a repeated submission.
     JobSpec spec;       ///< Canonical, completed from the scene.
     JobState state = JobState::kPreparing;
     std::string message;
     uint64_t revision = 1;
     TimePoint created, prepared, first_render, finishing, ended;
-    bool rendering = false;          ///< first_render is set.
-    bool closed = false;             ///< The time limit has passed.
+    bool rendering = false;          ///< Whether first_render is set.
+    bool closed = false;             ///< Whether the time limit has passed.
     std::string created_at;          ///< UTC, for the manifest only.
     std::vector<ImageLayer> layers;  ///< First-hit layers, until the image is written.
-    std::optional<UnitTable> units;  ///< Until the job ends; then `ended_units` is left of it.
+    std::optional<UnitTable> units;  ///< Until the job ends; after that `ended_units` holds the counts.
     struct UnitCounts {
         uint64_t total = 0, done = 0;
     } ended_units;
-    double unit_light_paths = 0;            ///< Of a unit of the largest groups, about.
-    std::optional<double> splats_per_path;  ///< The most that a partial had so far.
-    std::shared_ptr<Reducer> reducer;       ///< Has its own lock; used without ours.
+    double unit_light_paths = 0;            ///< Light paths of a unit of the largest groups, approximately.
+    std::optional<double> splats_per_path;  ///< The largest ratio in a partial so far.
+    std::shared_ptr<Reducer> reducer;       ///< It has its own lock and is used without ours.
     uint32_t merged_groups = 0;             ///< Complete groups merged so far.
-    uint64_t merged_iterations = 0;         ///< Iterations of these.
-    std::set<uint32_t> workers;             ///< Indices of those whose units were merged.
-    UnitCounters counters;  ///< Of all units that arrived; in the end, of those that are in the image. So is `dropped`.
+    uint64_t merged_iterations = 0;         ///< Iterations of these groups.
+    std::set<uint32_t> workers;             ///< Indices of the workers whose units were merged.
+    /// Work of all units that arrived; in the end, of those in the image. The same holds for `dropped`.
+    UnitCounters counters;
     uint64_t dropped = 0;
-    RareLight rare_light;               ///< From the first unit, once that is merged.
-    RareLightReport rare_light_report;  ///< Of the finished image.
+    RareLight rare_light;               ///< From the first unit, once it has been merged.
+    RareLightReport rare_light_report;  ///< About the finished image.
     uint64_t duplicates_same = 0, duplicates_different = 0, expired_leases = 0, rejected = 0;
     Digest image_digest;
     uint64_t image_size = 0;
     std::filesystem::path directory;
     PreparePhase phase = PreparePhase::kReadingScene;
     SceneFacts facts;                                ///< From the reading of the scene until the units are planned.
-    std::optional<TrainingRound> round;              ///< In kPreparing, of a job that makes tables.
+    std::optional<TrainingRound> round;              ///< In kPreparing, for a job that makes tables.
     AssetReference guide;                            ///< Tables that the training units read; empty for first rounds and probes.
-    std::shared_ptr<const std::string> guide_bytes;  ///< Of these, should the disk lose them.
+    std::shared_ptr<const std::string> guide_bytes;  ///< The bytes of the guide, in case the disk loses them.
     bool capped_by_time_limit = false;
-    Digest table_key;                  ///< Of the tables that the job needs; set before `makes_tables` or `maker`.
-    bool makes_tables = false;         ///< It probes, traces and learns itself.
-    bool may_wait = true;              ///< For another job's tables: not again for those that were taken over and were damaged.
-    std::shared_ptr<JobRecord> maker;  ///< Makes the same tables; this job waits for them.
-    TimePoint training_begin;          ///< The first training unit was leased; unset before.
-    TimePoint round_begin;             ///< The same of the open round.
+    Digest table_key;                  ///< Key of the tables that the job needs; set before `makes_tables` or `maker`.
+    bool makes_tables = false;         ///< Whether the job probes, traces and learns itself.
+    bool may_wait = true;              ///< Whether it may wait for another job's tables: not after damage.
+    std::shared_ptr<JobRecord> maker;  ///< The job that makes the same tables; this job waits for it.
+    TimePoint training_begin;          ///< When the first training unit was leased; unset before.
+    TimePoint round_begin;             ///< The same for the open round.
     struct Learning {
-        TimePoint begin;   ///< Of the phase kLearning.
-        double share = 0;  ///< Of that phase that is done, about.
-        TimePoint heard;   ///< When the share was that.
+        TimePoint begin;   ///< Begin of the phase kLearning.
+        double share = 0;  ///< Share of the phase that is done, approximately.
+        TimePoint heard;   ///< When `share` was reported.
         std::optional<double> seconds_left(TimePoint now) const;
     } learning;
     TablesInfo tables;
-    Digest tables_asset;  ///< Of the tables that the job names, or is about to; zero before.
+    Digest tables_asset;  ///< Digest of the tables that the job refers to or will refer to; zero before.
 
     std::jthread prepare_task, train_task, finish_task;
-    int running_tasks = 0;  ///< Of these. A job is forgotten only without any, so that nobody waits for one under the mutex.
+    /// How many of these run. A job is forgotten only when none does, so that nobody joins a task under the mutex.
+    int running_tasks = 0;
 
     JobInfo info(TimePoint now) const;
     /// The units that can be leased now, or null.
     UnitTable* open_units();
-    /// The same if the unit is of their kind and round, otherwise null: a late result of one round is none of the next.
+    /// The same if the unit is of their kind and round, otherwise null: a late result of one round does not belong to
+    /// the next.
     UnitTable* open_units(const UnitKey& unit);
 };
 
-/// The job itself, or who makes the tables that it, and those that it waits for, wait for. Jobs never wait in a circle: who waits
-/// makes no tables, and only makers are waited for.
+/// The job itself, or the job at the end of the chain of those that it waits for. There is no circle: a job that waits
+/// makes no tables, and only jobs that make tables are waited for.
 const std::shared_ptr<JobRecord>& maker_of_last_resort(const std::shared_ptr<JobRecord>& job);
 
-/// Behind the word "unit", for people.
+/// Text after the word "unit" in messages.
 inline std::string unit_name(const UnitKey& key) {
     return key.kind == UnitKind::kRender ? std::to_string(key.group) + "/" + std::to_string(key.tile)
                                          : "of training " + std::to_string(key.round) + "/" + std::to_string(key.group);
 }
 
-/// A unit that failed on this many workers fails its job: it is the unit, not the workers.
+/// A unit that failed on this many workers fails its job, because the unit is the cause and not the workers.
 inline constexpr int kMaxFailedWorkers = 3;
-/// The same for a unit that failed this often where there are fewer workers.
+/// So does a unit that failed this often, where there are fewer workers.
 inline constexpr int kMaxUnitFailures = 10;
-/// A unit over which this many workers went silent fails its job: it seems to crash them. More than for failures, because hosts
-/// also go down for reasons of their own.
+/// A unit over which this many workers went silent fails its job: it seems to crash them. The number is larger than for
+/// failures, because hosts also go down for other reasons.
 inline constexpr size_t kMaxLostWorkers = 5;
 
 }  // namespace lightloom

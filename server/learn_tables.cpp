@@ -23,9 +23,9 @@ Result<AffordableSet> affordable_set(const JobSpec& spec, const TracedRound& pro
     set.probe_traced_seconds = probe.worker_seconds;
     set.probe_learned_seconds = seconds_between(begin, clock());
     const double samples = double(std::max<uint64_t>(1, set.probe_samples));
-    const uint32_t threads = std::max(1u, crew.most_threads);  // of the worker that traced the probe: the largest, to be safe
+    const uint32_t threads = std::max(1u, crew.most_threads);  // the largest worker may have traced the probe
     const auto affordable = [&](bool guided, uint64_t most) {
-        // Every round learns once more what the probe's learning cost.
+        // The learning of every round costs at least what that of the probe cost.
         const double budget =
             kTrainingShare * spec.time_limit_seconds - set.probe_traced_seconds - (guided ? 3 : 2) * set.probe_learned_seconds;
         const double per_sample = (guided ? kGuidedCost : 1) * set.probe_traced_seconds / samples;
@@ -36,7 +36,7 @@ Result<AffordableSet> affordable_set(const JobSpec& spec, const TracedRound& pro
     const auto with_samples = [&](uint64_t n) { return spec.algorithm.with(kTrainingPaths, double(n)); };
     const auto has_pilot = [&](uint64_t n) { return learning_plan(with_samples(n)).rounds.size() > 1; };
     set.samples = affordable(has_pilot(set.wanted), set.wanted);
-    // A set too small for two rounds costs what one round costs.
+    // A set that is too small for two rounds costs as much as one round.
     if (has_pilot(set.wanted) && !has_pilot(set.samples))
         set.samples = affordable(false, std::min(set.wanted, kTrainingUnitSamples));
     set.spec = spec;
@@ -48,7 +48,7 @@ Result<AffordableSet> affordable_set(const JobSpec& spec, const TracedRound& pro
 
 Result<std::optional<LearnedTables>> learn_tables(JobSpec spec, const EmitterSet& emitters, TracingPort& port,
                                                   const std::function<TimePoint()>& clock, std::stop_token stop) {
-    TablesInfo info;  // of all rounds
+    TablesInfo info;  // covers all rounds
     Tables guide;
     for (;;) {
         auto round = port.collect();
@@ -89,7 +89,7 @@ Result<std::optional<LearnedTables>> learn_tables(JobSpec spec, const EmitterSet
             return std::optional(LearnedTables{*std::move(tables), std::move(spec), std::move(info)});
         }
         guide = plan.rounds[next].guided ? *std::move(tables) : Tables();
-        round->data = {};  // before the next round's comes
+        round->data = {};  // freed before the next round's data come
         LL_RETURN_IF_ERROR(port.open_round(uint32_t(next), guide, plan.work(next)));
     }
 }

@@ -55,7 +55,8 @@ Result<std::vector<UnitReference>> LocalWorkerPort::heartbeat(const std::string&
 }
 
 Result<SubmitAck> LocalWorkerPort::submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial, double) {
-    // Encoded for the digest, which tells duplicates apart; reading it back would only cost time.
+    // The partial is encoded only for its digest, by which duplicates are recognised; decoding it again would only cost
+    // time.
     const auto encoded = encode_partial(partial, lease.spec.frame);
     if (!encoded.ok()) return encoded.status();
     return coordinator_.submit_partial(worker_id, lease.reference(), encoded->descriptor.payload_digest, std::move(partial));

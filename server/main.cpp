@@ -38,7 +38,7 @@ in a network in which everybody may render.
 
 Exit codes: 0 stopped as asked, 1 failed to start, 2 bad command line.)";
 
-/// A worker inside of the coordinator's process. Ends, after the unit in work, with its owner.
+/// A worker inside the coordinator's process. It ends with its owner, after the unit that it renders.
 class OwnWorker {
   public:
     OwnWorker(Coordinator& coordinator, const BuildIdentity& identity, uint32_t threads, const std::filesystem::path& cache)
@@ -88,7 +88,8 @@ int main(int argc, char** argv) {
                    "least recently go first; 0 keeps none")
         ->check(whole_number_between(0, uint64_t(1) << 30))
         ->capture_default_str();
-    app.add_option("--port-file", port_file, "Write \"GRPC_PORT STATUS_PORT\" here once both listen (a unix: socket has port 0)");
+    app.add_option("--port-file", port_file,
+                   "File for \"GRPC_PORT STATUS_PORT\", written once both listen (a unix: socket has port 0)");
     app.add_flag("--allow-plaintext", plaintext, "Listen on other than loopback addresses");
     add_log_option(app, level);
     app.add_option("--shuffle-leases", shuffle, "")->group("")->check(whole_number());  // tests: lease units in a random order

@@ -43,7 +43,7 @@ Result<std::vector<Reducer::Refusal>> Reducer::add_locked(const WorkUnit& unit, 
         return refused;
     }
     LL_RETURN_IF_ERROR(add_to_current(unit, partial, refused));
-    // A group that has just been folded may have been all that complete later ones waited for.
+    // Complete later groups may have waited only for the group that has just been folded.
     for (auto next = waiting_.find(group_count()); next != waiting_.end(); next = waiting_.find(group_count())) {
         const auto partials = std::move(next->second);
         waiting_.erase(next);

@@ -1,7 +1,7 @@
 #pragma once
-// Reducer: merges the partials of one job. Partials come in any order; groups are folded in ascending order, so that the
-// result has the same bytes whatever the order was. Exactly-once by unit key is the caller's duty. It takes memory (256 bytes a
-// pixel) from the first partial on: jobs that wait for their turn have none.
+// Reducer: merges the partials of one job. Partials come in any order; groups are folded in ascending order, so that
+// the result has the same bytes whatever the order was. The caller makes sure that each unit is added exactly once (by
+// its key). It takes memory (256 bytes per pixel) only from the first partial on, so that waiting jobs take none.
 
 #include <cstdint>
 #include <map>
@@ -19,22 +19,22 @@ class Reducer {
   public:
     Reducer(const FrameLayout& frame, uint32_t tile_count, const FilmResponse& response = {});
 
-    /// A unit whose partial is not part of the sums after all: it has to be rendered again.
+    /// A unit whose partial could not be added to the sums: it has to be rendered again.
     struct Refusal {
         UnitKey unit;
         Status why;
     };
-    /// Takes the partial of `unit` in. Returns the units that were refused: this one, or others that had waited for it, whose
-    /// sums leave the range only now. An error is the end of all sums (a complete group does not fit them, or there is no memory
-    /// for them: kResourceExhausted); kCancelled after freeze().
+    /// Adds the partial of `unit`. Returns the units that were refused: this one, or others that had waited for it and
+    /// whose sums exceed the range only now. After an error nothing more can be added (a complete group does not fit
+    /// them, or there is no memory for them: kResourceExhausted); kCancelled after freeze().
     Result<std::vector<Refusal>> add(const WorkUnit& unit, Partial partial);
-    /// Nothing is merged any more.
+    /// From now on nothing is merged.
     void freeze();
 
     /// Complete groups merged so far: always a prefix of the plan.
     uint32_t folded_groups() const;
     uint64_t iterations() const;
-    /// Work that went into these groups.
+    /// Work for these groups.
     UnitCounters counters() const;
     /// Non-finite samples that were dropped from these groups, and the first few of them.
     uint64_t dropped() const;
@@ -47,7 +47,7 @@ class Reducer {
     /// Developed complete groups; kFailedPrecondition before the first.
     Result<RgbImage> image() const;
     Result<RgbImage> variance() const;
-    /// What `light` means for the image of the complete groups.
+    /// The consequences of `light` for the image of the complete groups.
     RareLightReport rare_light_report(const RareLight& light) const;
 
   private:
@@ -60,9 +60,9 @@ class Reducer {
     const FilmResponse response_;
     mutable std::mutex mutex_;
     std::unique_ptr<GroupedSum> sums_;
-    std::vector<Dropped> dropped_;  ///< Also of the group that is being summed: those are the last ones.
+    std::vector<Dropped> dropped_;  ///< Including those of the group that is being summed, which are the last.
     bool frozen_ = false;
-    /// Partials of later groups wait as they are: a group's sums take four times their room.
+    /// Partials of later groups wait unmerged, because a group's sums would take four times their memory.
     std::map<uint32_t, std::vector<std::pair<WorkUnit, Partial>>> waiting_;
 };
 

@@ -15,7 +15,7 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-/// A word as a POSIX shell takes it for itself.
+/// Quotes a word so that a POSIX shell takes it literally.
 std::string shell_word(const std::string& word) {
     const auto plain = [](char c) {
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
@@ -55,7 +55,7 @@ Json fields_json(const JobSpec& spec, const Chosen& chosen) {
     return json;
 }
 
-/// The settings first, then what is asked for beyond them, last scene and frame.
+/// The settings come first, then the rest of the request, last the scene and the frame.
 Json spec_json(const JobSpec& spec, const std::string& scene) {
     using namespace job_role;
     const auto rest_of_manifest = [&](bool tables) {
@@ -187,7 +187,7 @@ Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, 
     image.frame = spec.frame;
     image.color = std::move(developed.color);
     image.layers = std::move(layers);
-    // Unknown is not zero.
+    // An unknown variance is left out: it is not zero.
     if (!developed.variance.pixels.empty()) image.layers.push_back({"variance", "RGB", std::move(developed.variance.pixels)});
     image.attributes = {{exr_attribute::kAlgorithm, spec.algorithm.name()},
                         {exr_attribute::kParameters, parameters},

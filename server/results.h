@@ -1,6 +1,6 @@
 #pragma once
-// What a finished job leaves behind: the EXR, which holds only what any rendering of the same job would reproduce, and beside
-// it the manifest, which also holds when, where and by whom it was rendered.
+// The results of a finished job: the EXR, which holds only what every rendering of the same job reproduces, and beside
+// it the manifest, which also tells when, where and by whom it was rendered.
 
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
@@ -15,7 +15,7 @@
 namespace lightloom {
 
 struct ManifestWorker {
-    uint32_t index = 0;  ///< In Manifest::units.
+    uint32_t index = 0;  ///< Refers to Manifest::units.
     std::string worker_id, host;
     uint64_t process_id = 0;
     uint32_t thread_count = 0;
@@ -25,23 +25,23 @@ struct Manifest {
     JobInfo job;
     BuildIdentity identity;
     std::string scene_main;               ///< Path of the scene file in its list.
-    std::vector<std::string> without;     ///< What is left out of the scene.
+    std::vector<std::string> without;     ///< Features that are left out of the scene.
     std::string created_at, finished_at;  ///< UTC.
     uint32_t groups = 0;
     uint64_t iterations = 0;
     std::vector<UnitTable::Merged> units;
     std::vector<ManifestWorker> workers;
-    std::vector<Reducer::Dropped> dropped;  ///< The first few.
+    std::vector<Reducer::Dropped> dropped;  ///< The first few of them.
     uint64_t expired_leases = 0, rejected_results = 0;
 };
 
-/// The time of day, UTC, as manifests show it.
+/// The present date and time, UTC, as manifests show it.
 std::string utc_now();
-/// Command line for a shell that renders one dropped sample again; its unit for a splat, which is known only by where it
-/// would have landed.
+/// Command line for a shell that renders one dropped sample again. For a splat it renders the unit, because only the
+/// pixel in which the splat would have landed is known.
 std::string replay_command(const JobSpec& spec, const std::string& scene, const Reducer::Dropped& dropped,
                            const std::vector<std::string>& without = {});
-/// What light transport was asked for, as manifests and reports of references show it.
+/// The settings of light transport, as manifests and reports of references show them.
 nlohmann::ordered_json settings_json(const JobSpec& spec);
 /// Light that may not have been found, as manifests, statistics and the status endpoint show it.
 nlohmann::ordered_json to_json(const RareLightReport& report);
@@ -57,7 +57,8 @@ struct DevelopedImage {
     uint32_t groups = 0;
 };
 
-/// The EXR's bytes: colour, its variance where that is known, and `layers`. Who rendered it, and how, does not enter.
+/// The EXR's bytes: colour, its variance where that is known, and `layers`. They do not depend on who rendered it, and
+/// how.
 Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers);
 /// The same for the merged groups of `reducer`.
 Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, std::vector<ImageLayer> layers);

@@ -1,5 +1,5 @@
 #pragma once
-// What a job needs to know of its scene before units can be planned.
+// What must be known of a job's scene before its units can be planned.
 
 #include <functional>
 #include <memory>
@@ -16,11 +16,12 @@
 namespace lightloom {
 
 struct SceneFacts {
-    FrameLayout frame;               ///< With the job's resolution.
-    FilmResponse response;           ///< Of the scene's film.
+    FrameLayout frame;               ///< The frame at the job's resolution.
+    FilmResponse response;           ///< The response of the scene's film.
     int max_depth = 5;               ///< Bounces, if the job leaves them to the scene.
     std::vector<ImageLayer> layers;  ///< First-hit layers, if the job asks for them.
-    /// The built scene, of which learning needs the lights. Called only for a job whose tables have to be made; holds no scene.
+    /// Builds the scene, whose lights learning needs. It is called only for a job whose tables have to be made, and
+    /// holds no scene itself.
     std::function<Result<std::shared_ptr<const Scene>>()> build_scene;
 };
 

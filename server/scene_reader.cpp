@@ -13,11 +13,11 @@
 namespace lightloom {
 namespace {
 
-/// Lets a few scenes be read at a time: each takes a processor and may take gigabytes, and hundreds of jobs may be submitted at
-/// once.
+/// Lets only a few scenes be read at a time: each takes a processor and perhaps gigabytes, and hundreds of jobs may be
+/// submitted at once.
 class Turns {
   public:
-    /// False if it was asked to stop before it was its turn.
+    /// Waits for a turn. False if a stop was requested first.
     bool take(std::stop_token stop) {
         std::unique_lock lock(mutex_);
         if (!given_back_.wait(lock, stop, [&] { return free_ > 0; })) return false;
@@ -46,7 +46,7 @@ Result<ImportedScene> read_scene(const AssetStore& assets, const Digest& root, c
     std::filesystem::create_directories(scratch, error);
     if (!::mkdtemp(directory.data())) return internal_error(directory + ": cannot be made");
     const Status status = assets.materialise(*manifest, directory);
-    // Never beyond the directory, whatever the files say.
+    // The scene may not refer to files outside of the directory.
     auto scene = status.ok() ? import_pbrt((std::filesystem::path(directory) / manifest->main).string(),
                                            {.root = directory, .without = manifest->without})
                              : Result<ImportedScene>(status);
@@ -79,8 +79,8 @@ SceneReader make_scene_reader(std::filesystem::path scratch) {
         auto facts = scene_facts(scene->description, spec);
         if (!facts.ok()) return facts;
         if (!spec.algorithm.info().learning) return facts;
-        // Read a second time when it is needed, while workers trace: of the jobs that wait for their turn none holds a scene. That
-        // is at once, whatever else is being read: this job is the one that workers wait for.
+        // The scene is read a second time when it is needed, while workers trace, so that no waiting job holds a scene.
+        // This read does not wait for a turn, because workers wait for this job.
         facts->build_scene = [&assets, scratch, root = spec.scene_root, width = spec.width,
                               height = spec.height]() -> Result<std::shared_ptr<const Scene>> {
             auto again = read_scene(assets, root, scratch);

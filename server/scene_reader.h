@@ -1,5 +1,5 @@
 #pragma once
-// Reads what a job needs to know of its scene from the asset store.
+// Reads the facts about a job's scene from the asset store.
 
 #include <filesystem>
 
@@ -8,12 +8,12 @@
 
 namespace lightloom {
 
-/// The facts of an imported scene at the resolution of `spec`, but for what builds it.
+/// The facts of an imported scene at the resolution of `spec`, without build_scene.
 Result<SceneFacts> scene_facts(const SceneDescription& description, const JobSpec& spec);
 
-/// A reader that lays the scene's files out below `scratch` and imports them, so that a scene with an error fails its job
-/// before any worker sees it; a few at a time. The facts keep nothing of the scene, but their build_scene() reads
-/// the asset store again.
+/// A reader that lays the scene's files out below `scratch` and imports them, so that a scene with an error fails its
+/// job before any worker sees it; only a few are read at a time. The facts keep nothing of the scene; their
+/// build_scene() reads the asset store again.
 SceneReader make_scene_reader(std::filesystem::path scratch);
 
 }  // namespace lightloom

@@ -57,7 +57,7 @@ std::string status_json(const Coordinator& coordinator) {
                            {"seconds_since_heard", w.seconds_since_heard},
                            {"lost", w.lost}});
     }
-    // Messages may quote bytes that are not UTF-8 (file names, cut texts); the default of dump() is to throw.
+    // Messages may quote bytes that are not UTF-8 (file names, cut texts), for which dump() would throw by default.
     const Json status{{"jobs", std::move(jobs)}, {"workers", std::move(workers)}};
     return status.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -86,7 +86,7 @@ http::response<http::string_body> respond(const Coordinator& coordinator, const 
     return response;
 }
 
-/// One connection: one request, one answer.
+/// A connection has one request and one answer.
 class Session : public std::enable_shared_from_this<Session> {
   public:
     Session(tcp::socket socket, const Coordinator& coordinator, int& connections)
@@ -132,11 +132,12 @@ struct StatusHttp::Impl {
     void accept() {
         acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
             if (error == asio::error::operation_aborted) return;
-            // Above the limit a connection is closed unanswered: this endpoint must never starve the renderer.
+            // Above the limit a connection is closed without an answer, so that this endpoint never starves the
+            // renderer.
             if (!error && connections < kMaxConnections)
                 std::make_shared<Session>(std::move(socket), coordinator, connections)->start();
             if (!error) return accept();
-            // An error that stays (no descriptor is left) must not make this a busy loop.
+            // A lasting error (no descriptor is left) must not turn this into a busy loop.
             pause.expires_after(kPause);
             pause.async_wait([this](beast::error_code cancelled) {
                 if (!cancelled) accept();
@@ -145,7 +146,7 @@ struct StatusHttp::Impl {
     }
 
     const Coordinator& coordinator;
-    int connections = 0;  // of the one thread; before `context`, whose end destroys the sessions
+    int connections = 0;  // for the one thread; outlives `context`, whose end destroys sessions
     asio::io_context context{1};
     tcp::acceptor acceptor;
     asio::steady_timer pause{context};

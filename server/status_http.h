@@ -1,5 +1,6 @@
 #pragma once
-// The status endpoint: GET /healthz and /api/v1/status over HTTP, for people and monitors. One thread, bounded everything.
+// The status endpoint: GET /healthz and /api/v1/status over HTTP, for people and monitors. It has one thread, and
+// everything about it is bounded.
 
 #include <memory>
 #include <string>

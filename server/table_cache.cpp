@@ -19,10 +19,10 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kMagic = "lightloom-table-cache 1 ";
 constexpr const char* kExtension = ".tables";
-/// In the names under which write_file_atomically() begins an entry.
+/// Part of the names of entries that write_file_atomically() has not completed.
 constexpr const char* kTemporary = ".tables.tmp-";
 
-/// JSON has no other numbers; a null in their place would make the entry a damaged one.
+/// JSON has finite numbers only, and a null in their place would count as damage.
 double finite(double value) { return std::isfinite(value) ? value : 0; }
 
 Json to_json(const TablesInfo& info) {
@@ -52,7 +52,7 @@ bool take(const Json& json, const char* name, T* out) {
     return true;
 }
 
-/// A right digest says only that the entry is what somebody wrote.
+/// Reads every field with a check, because a correct digest only shows that the entry is as it was written.
 Result<TablesInfo> info_from(std::string_view text) {
     const Json json = Json::parse(text, nullptr, false);
     TablesInfo info;
@@ -72,7 +72,7 @@ struct Parts {
     std::string_view key_line, info_line, tables;
 };
 
-/// Magic and digest of the rest, then a line with the key, one with the report, and the tables.
+/// Splits an entry: magic and digest of the rest, then a line with the key, one with the report, and the tables.
 Result<Parts> split(std::string_view bytes) {
     const Status damaged = data_loss("the entry is damaged");
     const size_t digest_end = kMagic.size() + 64;
@@ -91,7 +91,7 @@ Digest table_key(const BuildIdentity& identity, const JobSpec& spec) {
     std::string text = "lightloom-tables-key 2\n";
     append_text(text, "build", identity.build_id);
     append_text(text, "profile", identity.math_profile);
-    append_text(text, "golden", identity.golden_digest.hex());  // builds of the same sources that compute otherwise
+    append_text(text, "golden", identity.golden_digest.hex());  // builds of the same sources may compute differently
     return sha256(text + fields_text<job_role::kTables>(spec));
 }
 
@@ -103,7 +103,7 @@ Result<std::string> tables_of_file(std::string bytes) {
 }
 
 TableCache::TableCache(fs::path directory, uint64_t max_bytes) : directory_(std::move(directory)), max_bytes_(max_bytes) {
-    std::error_code ignored;  // a directory that cannot be made shows as an error of the first entry
+    std::error_code ignored;  // the first write reports a directory that cannot be made
     if (!directory_.empty()) fs::create_directories(directory_, ignored);
 }
 
@@ -139,7 +139,7 @@ std::optional<TableCache::Entry> TableCache::find(const Digest& key, std::span<c
 
 void TableCache::store(const Digest& key, std::string_view bytes, const TablesInfo& info) const {
     if (directory_.empty()) return;
-    // A note may quote bytes that are not UTF-8; the default of dump() is to throw.
+    // A note may quote bytes that are not UTF-8, for which dump() would throw by default.
     std::string rest = key.hex() + "\n" + to_json(info).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
     rest += bytes;
     std::string file = std::string(kMagic) + sha256(rest).hex() + "\n" + rest;

@@ -1,5 +1,5 @@
 #pragma once
-// The coordinator's time: a steady clock that its callers pass in, so that tests can turn it.
+// The coordinator's time: a steady clock that its callers pass in, so that tests can set it.
 
 #include <chrono>
 

@@ -41,7 +41,7 @@ Result<TrainingData> join(std::vector<TrainingRound::Part> parts, std::stop_toke
     for (TrainingRound::Part& part : parts) {
         if (stop.stop_requested()) return Status(StatusCode::kCancelled, "stopped while training data were joined");
         LL_RETURN_IF_ERROR(all.append(part.data));
-        part = {};  // both copies at once are held of one part only
+        part = {};  // so that only one part at a time is held twice
     }
     return all;
 }
@@ -52,8 +52,8 @@ uint64_t energy_paths(const JobSpec& spec, const TrainingWork& work) {
 }
 
 uint64_t largest_training_payload(const JobSpec& spec, const TrainingWork& work) {
-    // The paths of samples, one more that their light sub-path may leave, and the light sub-paths, each of the greatest length,
-    // and a sum per block of the frame.
+    // The bound counts the paths that samples keep, one more for each sample's light sub-path, and the light sub-paths,
+    // all of the greatest length, and a sum per block of the frame.
     const FrameLayout& frame = spec.frame;
     const uint64_t most_blocks = work.total_samples + uint64_t(frame.crop.width() + frame.crop.height() + 1);
     const uint64_t blocks = std::min(uint64_t(frame.crop.area()), most_blocks);

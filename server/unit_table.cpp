@@ -69,7 +69,7 @@ bool UnitTable::has_more_than(size_t n) {
 
 std::optional<WorkUnit> UnitTable::lease(uint32_t worker, TimePoint expiry, const AnyoneElse& anyone_else) {
     if (closed_) return std::nullopt;
-    // A shuffled table first opens several groups, so that whole groups change places too.
+    // A shuffled table first opens several groups, so that whole groups change their order, too.
     (void)has_more_than(shuffle_ ? 8 : 0);
     const auto end = pending_.lower_bound({group_limit_, 0});
     const ptrdiff_t count = std::distance(pending_.begin(), end);
@@ -79,7 +79,7 @@ std::optional<WorkUnit> UnitTable::lease(uint32_t worker, TimePoint expiry, cons
         *shuffle_ = mix64(*shuffle_ + 0x9e3779b97f4a7c15ull);
         std::advance(chosen, ptrdiff_t(*shuffle_ % uint64_t(count)));
     }
-    // One broken worker must not take the same unit again and again while others could render it.
+    // A broken worker must not take the same unit again and again while others could render it.
     const auto fresh = [&](const UnitKey& key) { return !entry(key)->failed_on.contains(worker); };
     if (!fresh(*chosen)) {
         if (const auto other = std::find_if(pending_.begin(), end, fresh); other != end) {
@@ -102,7 +102,7 @@ std::optional<WorkUnit> UnitTable::lease(uint32_t worker, TimePoint expiry, cons
 bool UnitTable::renew(const UnitKey& key, uint32_t worker, TimePoint expiry) {
     Entry* e = entry(key);
     if (!e || e->state == State::kDone) return false;
-    if (e->state == State::kPending) {  // its lease had run out, but the worker lives after all
+    if (e->state == State::kPending) {  // its lease had expired, but the worker is still alive
         pending_.erase(key);
         leased_.insert(key);
         e->state = State::kLeased;

@@ -1,7 +1,7 @@
 #pragma once
-// UnitTable: which units of one job are pending, leased or merged. No locks, no clock of its own: the caller passes the time.
-// Leases only save work; correctness rests on complete() answering "first" exactly once per unit. Memory: a full record for
-// each unit of an open group, 16 bytes for each unit of a merged one.
+// UnitTable knows which units of one job are pending, leased or merged. It has no locks and no clock of its own: the
+// caller passes the time. Leases only save work; correctness rests on complete() answering "first" exactly once per
+// unit. Memory: a full record for each unit of an open group, 16 bytes for each unit of a merged one.
 
 #include <algorithm>
 #include <cstdint>
@@ -19,18 +19,19 @@ namespace lightloom {
 
 class UnitTable {
   public:
-    /// `iterations` 0: unbounded, until close(). At most `window` groups are open at a time: partials of later groups have
-    /// to wait in memory for a straggler of an earlier one. `shuffle_seed` hands units out in a random order (tests).
+    /// `iterations` 0 means unbounded, until close(). At most `window` groups are open at a time: partials of later
+    /// groups have to wait in memory for a straggler of an earlier one. `shuffle_seed` hands units out in a random
+    /// order (tests).
     UnitTable(Plan plan, uint64_t iterations, uint32_t window, std::optional<uint64_t> shuffle_seed);
 
-    /// Whether some other worker than these could render a unit.
+    /// Whether a worker other than these could render a unit.
     using AnyoneElse = std::function<bool(const std::set<uint32_t>& workers)>;
-    /// The next unit for `worker` (an index of the caller's choice), or nothing for now. A unit that failed on the worker comes
-    /// back to it only when nobody else is there to render it.
+    /// Leases the next unit to `worker` (an index of the caller's choice), or nothing for now. A unit that failed on
+    /// the worker comes back to it only if no other worker could render it.
     std::optional<WorkUnit> lease(uint32_t worker, TimePoint expiry, const AnyoneElse& anyone_else = {});
     /// Whether more than `n` units could be leased now.
     bool has_more_than(size_t n);
-    /// True if the unit is not merged yet; then `worker` holds it until `expiry` (unless someone else does already).
+    /// True if the unit is not merged yet; then `worker` holds it until `expiry` (unless another worker already does).
     bool renew(const UnitKey& key, uint32_t worker, TimePoint expiry);
     /// Gives the unit back if `worker` holds it.
     void release(const UnitKey& key, uint32_t worker);
@@ -39,19 +40,21 @@ class UnitTable {
         UnitKey unit;
         uint32_t worker = 0;
     };
-    /// Puts units back whose lease ended before `now`: these, the one that was leased first in front.
+    /// Puts units back whose lease ended before `now`, and returns them in the order in which they were leased.
     std::vector<Expired> expire(TimePoint now);
-    /// `worker` went silent over the unit. All workers that did, but for those that have renewed it since.
+    /// Notes that `worker` went silent while it held the unit. Returns all workers that did, except those that have
+    /// renewed the unit since.
     std::set<uint32_t> lose(const UnitKey& key, uint32_t worker);
 
     enum class Completion { kFirst, kDuplicateSame, kDuplicateDifferent, kUnknown };
-    /// A result arrived. kFirst: the caller merges it and is the only one to be told so, unless it calls reopen().
+    /// Enters a result that arrived. kFirst: the caller merges it; nobody else gets this answer, unless the caller
+    /// calls reopen().
     Completion complete(const UnitKey& key, uint32_t worker, const Digest& digest);
     /// How often a unit failed, and on how many different workers.
     struct Failures {
         int total = 0, workers = 0;
     };
-    /// The result could not be merged after all; leases the unit again.
+    /// The result could not be merged after all: makes the unit pending again.
     Failures reopen(const UnitKey& key);
     /// The same for a unit that a worker could not render; see lease().
     Failures fail(const UnitKey& key, uint32_t worker);
@@ -62,7 +65,7 @@ class UnitTable {
     void advance(uint32_t count);
     /// How many groups may be open from now on; at least 1.
     void set_window(uint32_t window) { window_ = std::max(window, 1u); }
-    /// Leases nothing more.
+    /// From now on nothing is leased.
     void close() { closed_ = true; }
     /// Leases units of the first `count` groups only.
     void limit_groups(uint32_t count) { group_limit_ = count; }
@@ -77,7 +80,7 @@ class UnitTable {
         UnitKey unit;
         uint32_t worker = 0;
     };
-    /// Who rendered what, over the merged groups.
+    /// Which worker rendered which unit, over the merged groups.
     std::vector<Merged> merged() const;
 
   private:
@@ -88,11 +91,12 @@ class UnitTable {
         uint32_t worker = 0;
         int failures = 0;
         std::set<uint32_t> failed_on, lost_with;
-        uint64_t ticket = 0;  ///< Of the lease: these count up.
+        uint64_t ticket = 0;  ///< Number of the lease; later leases have larger ones.
         TimePoint expiry;
         Digest digest;
     };
-    /// What is left of a merged unit: who rendered it, and enough of the digest to tell a repeated result from another one.
+    /// The record of a merged unit: who rendered it, and enough of the digest to tell a repeated result from a
+    /// different one.
     struct Done {
         uint64_t digest_prefix = 0;
         uint32_t worker = 0;
@@ -100,9 +104,9 @@ class UnitTable {
     static uint64_t prefix(const Digest& digest);
     /// Groups opened so far.
     uint32_t opened_groups() const { return merged_groups_ + uint32_t(open_.size()); }
-    /// Group `index` as the job has it: the last one may be cut short.
+    /// Group `index` of the job, whose last group may be cut short.
     Group group(uint32_t index) const;
-    /// Keys come from the network: one of another kind or round must not pass for one of this table's.
+    /// Keys come from the network: a key of another kind or round must not be taken for one of this table.
     bool is_ours(const UnitKey& key) const { return key.tile < tile_count() && key == plan_.key(key.group, key.tile); }
     /// The record of a unit of an open group.
     Entry* entry(const UnitKey& key);

@@ -60,14 +60,14 @@ grpc::Status WorkerServiceImpl::SubmitResult(grpc::ServerContext*, grpc::ServerR
     const auto reference = wire::get(header.unit());
     if (!reference.ok()) return wire::to_grpc(reference.status());
     const UnitReference& unit = *reference;
-    // Nothing is taken in before the unit is known and the size is the one that follows from it.
+    // Nothing is received before the unit is known and the size is the expected one.
     const auto expected = coordinator_.expected_partial(unit);
     if (!expected.ok()) return answer(Result<SubmitAck>(unexpected_result(expected.status())), response);
     if (descriptor->splat_count > uint64_t(expected->frame.crop.area()))
         return invalid("more splat sums than the frame has pixels");
     const uint64_t size = partial_payload_size(expected->frame, expected->tile, descriptor->splat_count);
     if (descriptor->payload_size != size)
-        return invalid("the payload of this unit has " + std::to_string(size) + " bytes, announced were " +
+        return invalid("the payload of this unit has " + std::to_string(size) + " bytes, but the announced size is " +
                        std::to_string(descriptor->payload_size));
     return take_payload(reader, size, response, [&](std::string_view payload) {
         return coordinator_.submit_payload(header.worker_id(), unit, *descriptor, payload);
@@ -86,8 +86,8 @@ grpc::Status WorkerServiceImpl::SubmitTraining(grpc::ServerContext*, grpc::Serve
     const auto limit = coordinator_.expected_training_bytes(*unit);
     if (!limit.ok()) return answer(Result<SubmitAck>(unexpected_result(limit.status())), response);
     if (header.payload_size_bytes() > *limit)
-        return invalid("the training data of this unit have at most " + std::to_string(*limit) + " bytes, announced were " +
-                       std::to_string(header.payload_size_bytes()));
+        return invalid("the training data of this unit have at most " + std::to_string(*limit) +
+                       " bytes, but the announced size is " + std::to_string(header.payload_size_bytes()));
     return take_payload(reader, header.payload_size_bytes(), response, [&](std::string_view payload) {
         return coordinator_.submit_training(header.worker_id(), *unit, *digest, payload, header.trace_seconds());
     });

@@ -24,7 +24,7 @@ class WorkerServiceImpl final : public v1::WorkerService::Service {
     grpc::Status Goodbye(grpc::ServerContext*, const v1::GoodbyeRequest* request, v1::GoodbyeResponse*) override;
 
   private:
-    /// Takes the chunks that follow a header, `size` bytes in all, and answers with what submit(payload) makes of them.
+    /// Receives the chunks that follow a header, `size` bytes in all, and answers with the result of submit(payload).
     template <class Request, class Submit>
     grpc::Status take_payload(grpc::ServerReader<Request>* reader, uint64_t size, v1::SubmitResultResponse* response,
                               const Submit& submit) const;

@@ -1,5 +1,5 @@
 #pragma once
-// A worker with all that it needs: what its units are made from is fetched through its port into a directory, and kept.
+// A complete worker: scenes and tables of its units are fetched through its port into a directory, and kept.
 
 #include "worker/scene_cache.h"
 #include "worker/worker.h"

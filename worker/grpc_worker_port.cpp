@@ -114,7 +114,8 @@ Status GrpcWorkerPort::goodbye(const std::string& worker_id) {
 }
 
 Status GrpcWorkerPort::read_asset(const Digest& digest, uint64_t offset, const std::function<Status(std::string_view)>& sink) {
-    // How long an asset takes is not known before its size is; a call that ran out of time but moved is continued from there.
+    // The time that an asset takes is unknown before its size is; a call that was fast enough until its deadline is
+    // continued.
     for (;;) {
         const uint64_t begin = offset;
         grpc::ClientContext context;

@@ -11,7 +11,7 @@ namespace lightloom {
 
 class GrpcWorkerPort final : public WorkerPort {
   public:
-    /// `read_seconds`: an asset that brings next to nothing for so long is given up with kDeadlineExceeded.
+    /// `read_seconds`: an asset that comes at less than 1 MB/s over this time is given up with kDeadlineExceeded.
     explicit GrpcWorkerPort(const std::shared_ptr<grpc::Channel>& channel, double read_seconds = 60);
     Result<WorkerGrant> register_worker(const WorkerHello& hello) override;
     Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds, std::stop_token stop) override;

@@ -54,7 +54,7 @@ int main(int argc, char** argv) {
     app.add_option("--cache", cache, "Directory for scene files, and for tables up to 1 GB; may be shared by the workers of a host")
         ->capture_default_str();
     add_log_option(app, level);
-    app.add_option("--pretend-golden-digest", golden_override, "")->group("");  // tests of the refusal
+    app.add_option("--pretend-golden-digest", golden_override, "")->group("");  // for tests of the refusal
     if (const auto ended = parse_and_log(app, argc, argv, level)) return *ended;
     std::stop_source stop;
     const auto leave = [stop]() mutable {

@@ -15,12 +15,12 @@ namespace {
 
 constexpr size_t kMaxScenes = 2;
 constexpr size_t kMaxRenderers = 4;
-/// A damaged copy, on disk or on its way, is thrown away and fetched again.
+/// Attempts at getting tables: a copy that was damaged on disk or on its way is thrown away and fetched again.
 constexpr int kTableAttempts = 3;
-/// The list of a scene's files; far above any real scene's.
+/// Largest list of a scene's files, far above any real scene's.
 constexpr uint64_t kMaxManifestBytes = uint64_t(64) << 20;
 
-/// Between looks at what another process has under its hands.
+/// Time between checks of what another process is storing.
 constexpr auto kOtherWorker = std::chrono::milliseconds(50);
 
 /// A process id alone is not enough: containers that share the cache may all run as process 1.
@@ -31,7 +31,8 @@ std::string scratch_name() {
 
 }  // namespace
 
-// "tables" is taken: there the client has the table cache of its own coordinator, by default below the same directory.
+// "tables" is taken: the client keeps the table cache of its own coordinator there, by default below the same
+// directory.
 SceneFetcher::SceneFetcher(WorkerPort& port, std::filesystem::path directory, uint64_t max_table_bytes)
     : port_(port),
       scratch_(directory / scratch_name()),
@@ -59,7 +60,7 @@ Status SceneFetcher::fetch(AssetStore& store, const Digest& digest, uint64_t siz
         if (stop.stop_requested()) return {StatusCode::kCancelled, "stopped"};
         auto upload = store.begin_upload(digest, size_bytes);
         if (!upload.ok() && upload.status().code() == StatusCode::kAborted) {
-            // Another worker of this host fetches the same file into the same directory.
+            // Another worker on this host fetches the same file into the same directory.
             std::this_thread::sleep_for(kOtherWorker);
             continue;
         }
@@ -87,7 +88,7 @@ Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, st
             const Status status = store_.put(root, text);
             if (status.ok()) break;
             if (status.code() != StatusCode::kAborted) return status;
-            // Another worker of this host stores the same list; if it dies over that, the next attempt stores it.
+            // Another worker on this host stores the same list; if it dies meanwhile, the next attempt stores it.
             if (stop.stop_requested()) return Status(StatusCode::kCancelled, "stopped");
             std::this_thread::sleep_for(kOtherWorker);
         }
@@ -100,7 +101,7 @@ Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, st
 
     const std::filesystem::path directory = scratch_ / root.hex();
     LL_RETURN_IF_ERROR(store_.materialise(*manifest, directory));
-    // Never beyond the directory, whatever the files say.
+    // The scene may not refer to files outside of the directory.
     auto imported = import_pbrt((directory / manifest->main).string(), {.root = directory.string(), .without = manifest->without});
     std::error_code ignored;
     std::filesystem::remove_all(directory, ignored);
@@ -116,7 +117,7 @@ Result<std::string> SceneFetcher::tables(const AssetReference& tables, std::stop
     for (int attempt = 0; attempt < kTableAttempts; ++attempt) {
         status = fetch(table_store_, tables.digest, tables.size_bytes, stop);
         if (status.ok()) {
-            auto bytes = table_store_.read(tables.digest);  // which fails if another worker has just trimmed them away
+            auto bytes = table_store_.read(tables.digest);  // fails if another worker has just trimmed them away
             if (bytes.ok()) {
                 table_store_.touch(tables.digest);
                 table_store_.trim(max_table_bytes_, tables.digest);
@@ -125,7 +126,8 @@ Result<std::string> SceneFetcher::tables(const AssetReference& tables, std::stop
             status = bytes.status();
             table_store_.remove(tables.digest);
         } else if (status.code() == StatusCode::kInvalidArgument || status.code() == StatusCode::kOutOfRange) {
-            // More or fewer bytes than announced: the file was cut short there, or what is left of an earlier attempt here.
+            // More or fewer bytes than announced: the coordinator's file was cut short, or the rest of an earlier
+            // attempt is wrong.
             status = data_loss("the tables have the wrong size: " + status.message());
         } else if (status.code() != StatusCode::kDataLoss) {
             return status;
@@ -183,7 +185,7 @@ Result<Tables> RendererCache::tables(const UnitLease& lease, const Scene& scene,
     auto tables = parse_tables(*bytes, learning->parts);
     Status status = tables.ok() ? tables->validate(scene.emitters()) : tables.status();
     if (!status.ok())
-        return failed_precondition("the tables " + asset.digest.hex() + " do not serve this scene: " + status.message());
+        return failed_precondition("the tables " + asset.digest.hex() + " do not fit this scene: " + status.message());
     return *std::move(tables);
 }
 
@@ -203,7 +205,7 @@ Result<std::shared_ptr<const Renderer>> RendererCache::renderer(const UnitLease&
     if (!renderer.ok()) return renderer.status();
     std::shared_ptr<const Renderer> shared = std::move(renderer).value();
     renderer_entries_.push_front({image, lease.tables.digest, shared});
-    tracer_ = {};  // it keeps a scene and tables, and whoever renders has traced
+    tracer_ = {};  // it holds a scene and tables, and a job that renders has finished tracing
     if (renderer_entries_.size() > kMaxRenderers) renderer_entries_.pop_back();
     return shared;
 }

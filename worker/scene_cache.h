@@ -19,13 +19,13 @@ using TableSource = std::function<Result<std::string>(const AssetReference& tabl
 /// A table source without a directory, for workers in the coordinator's process. `port` must outlive it.
 TableSource direct_tables(WorkerPort& port);
 
-/// Fetches from the coordinator behind `port`. `directory` may be shared by several workers of a host. Of the tables in it, those
-/// that were used least recently are removed above `max_table_bytes`.
+/// Fetches from the coordinator behind `port`. `directory` may be shared by several workers of a host. Above
+/// `max_table_bytes`, the least recently used tables in it are removed.
 class SceneFetcher {
   public:
     SceneFetcher(WorkerPort& port, std::filesystem::path directory, uint64_t max_table_bytes = uint64_t(1) << 30);
     ~SceneFetcher();
-    /// Whether files can be kept there: a worker without that fails every unit that it gets.
+    /// Whether files can be stored there; a worker that cannot fails every unit that it gets.
     Status check_directory() const;
     Result<std::shared_ptr<const Scene>> scene(const JobSpec& spec, std::stop_token stop);
     Result<std::string> tables(const AssetReference& tables, std::stop_token stop);
@@ -34,8 +34,8 @@ class SceneFetcher {
     Status fetch(AssetStore& store, const Digest& digest, uint64_t size_bytes, std::stop_token stop);
 
     WorkerPort& port_;
-    std::filesystem::path scratch_;  ///< Of this process; removed at the end.
-    AssetStore store_;               ///< Of scene files, and of the lists of them.
+    std::filesystem::path scratch_;  ///< Belongs to this process; removed at the end.
+    AssetStore store_;               ///< Scene files, and the lists of them.
     AssetStore table_store_;
     const uint64_t max_table_bytes_;
 };
@@ -44,11 +44,11 @@ class SceneFetcher {
 class RendererCache {
   public:
     RendererCache(SceneSource scenes, TableSource tables) : scenes_(std::move(scenes)), tables_(std::move(tables)) {}
-    /// Fails, naming the tables, when they cannot be had or do not fit the scene.
+    /// Fails, naming the tables, when these are unavailable or do not fit the scene.
     Result<std::shared_ptr<const Renderer>> renderer(const UnitLease& lease, std::stop_token stop);
     /// The same for the tables that guide a training unit, if it has any.
     Result<TrainingTracer> tracer(const UnitLease& lease, std::stop_token stop);
-    /// The two as a Worker takes them; the cache must outlive it.
+    /// Both functions in the form that a Worker takes; the cache must outlive it.
     RendererSource renderer_source() {
         return [this](const UnitLease& lease, std::stop_token stop) { return renderer(lease, std::move(stop)); };
     }

@@ -12,7 +12,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Full-jitter exponential back-off: workers that lost the same coordinator must not come back all at once.
+/// Full-jitter exponential back-off: workers that lost the same coordinator must not all come back at once.
 class Backoff {
   public:
     double next() {
@@ -28,7 +28,7 @@ class Backoff {
 
 constexpr double kLeaseWaitSeconds = 1;
 constexpr int kSubmitAttempts = 40;
-/// Of a probe's samples, so many are traced before it is timed; enough for every thread to get some.
+/// Share of a probe's samples that is traced before it is timed, and the least number per thread.
 constexpr uint64_t kWarmUpShare = 8, kWarmUpPerThread = kTrainingChunkSamples;
 
 std::string name_of(const UnitReference& unit) {
@@ -71,7 +71,7 @@ Status Worker::sign_in(std::stop_token stop, const std::string& stale_id) {
             return {};
         }
         const StatusCode code = grant.status().code();
-        // Anything else, like a stream that broke, may be better the next time.
+        // After any other error, like a broken stream, the next attempt may succeed.
         if (code == StatusCode::kFailedPrecondition || code == StatusCode::kInvalidArgument || code == StatusCode::kUnimplemented ||
             code == StatusCode::kPermissionDenied) {
             const std::lock_guard lock(mutex_);
@@ -92,7 +92,7 @@ Status Worker::run(std::stop_token stop) {
     {
         std::jthread beats([this](std::stop_token beat_stop) { heartbeats(beat_stop); });
         const auto drain_guard = [&](std::stop_token guard_stop) {
-            // Waits for the stop, then grants the running unit its time.
+            // Waits for the stop, then gives the running unit its time to finish.
             std::unique_lock lock(mutex_);
             wake_.wait(lock, guard_stop, [&] { return internal.stop_requested(); });
             if (guard_stop.stop_requested()) return;
@@ -129,7 +129,7 @@ void Worker::lane(std::stop_token stop) {
         const std::string worker_id = id();
         const auto leases = port_.lease_units(worker_id, kLeaseWaitSeconds, stop);
         if (leases.ok()) {
-            // A worker that cannot render (its disk is full, say) must not burn through the units of the farm.
+            // A worker that cannot render (its disk is full, say) must not use up the units of the whole farm.
             for (const UnitLease& lease : *leases) {
                 if (run_unit(lease, stop))
                     backoff.reset();
@@ -151,8 +151,7 @@ bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
     {
         const std::lock_guard lock(mutex_);
         const auto [item, fresh] = running_.try_emplace(reference);
-        if (!fresh)
-            return true;  // the other lane has it: its lease came back to us, and if its result fails, that lane gives it back
+        if (!fresh) return true;  // the other lane has it and gives it back if its result fails
         unit_stop = item->second.stop.get_token();
     }
     const bool training = reference.key.kind != UnitKind::kRender;
@@ -164,8 +163,8 @@ bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
     }
     const bool able = made.ok() || made.code() == StatusCode::kCancelled;
     if (!able) spdlog::error("{}: {}", name_of(reference), made.message());
-    // A heartbeat that still named a unit which is given back would take it again, and nobody would render it until that
-    // lease ran out.
+    // A heartbeat that still named a unit that is being given back would renew its lease, and nobody would render it
+    // until that lease expired.
     std::unique_lock beat(beat_mutex_, std::defer_lock);
     if (!made.ok()) beat.lock();
     {
@@ -211,8 +210,9 @@ Status Worker::trace_unit(const UnitLease& lease, std::stop_token unit_stop, std
     if (!tracer.ok()) return tracer.status();
     Result<TrainingData> data = internal_error("not traced");
     if (lease.unit.key.kind == UnitKind::kProbe) {
-        // A probe measures what a sample costs. The first ones also pay for threads, page faults and cold caches, a tenth of
-        // a second that the job pays once and that would make a short probe call every sample several times too dear.
+        // A probe measures what a sample costs. The first ones also pay for threads, page faults and cold caches, a
+        // tenth of a second that the job pays only once. In a short probe it would make every sample seem several times
+        // too expensive.
         TrainingWork first = lease.unit.training;
         first.sample_count =
             std::min(first.sample_count, std::max(first.sample_count / kWarmUpShare, kWarmUpPerThread * options_.thread_count));
@@ -236,7 +236,8 @@ Status Worker::submit(const UnitLease& lease, const Send& send, std::stop_token 
         if (ack.ok()) {
             if (ack->outcome == SubmitOutcome::kDuplicateDifferent)
                 spdlog::error("{}: {}", name_of(lease.reference()), ack->reason);
-            // The coordinator has counted that. But a heartbeat may have taken the unit back for us meanwhile, or our other lane.
+            // The coordinator has counted the failure, but a heartbeat or our other lane may have leased the unit again
+            // meanwhile.
             if (ack->outcome == SubmitOutcome::kRejected) return {StatusCode::kAborted, ack->reason};
             return {};
         }
@@ -260,7 +261,7 @@ void Worker::announce_rendering(const UnitReference& unit) {
         running_[unit].rendering = true;
         first = unit.key.kind == UnitKind::kRender && announced_jobs_.insert(unit.job_id).second;
     }
-    // The clock of a time-limited job starts here: the coordinator must hear of it at once.
+    // The clock of a time-limited job starts here: the coordinator must know at once.
     if (first) send_heartbeat();
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-// Worker: leases units from a coordinator, renders them one at a time on all of its threads, and submits the partials. Knows
-// neither gRPC (that is the port) nor light transport (that is the renderer source).
+// Worker: leases units from a coordinator, renders them one at a time on all of its threads, and submits the partials.
+// gRPC is hidden behind the port; sources of renderers and tracers hide how scenes and tables are fetched and kept.
 
 #include <condition_variable>
 #include <functional>
@@ -29,8 +29,8 @@ using TracerSource = std::function<Result<TrainingTracer>(const UnitLease& lease
 struct WorkerOptions {
     BuildIdentity identity;
     uint32_t thread_count = 1;
-    std::string host;           ///< For people.
-    uint64_t process_id = 0;    ///< For people.
+    std::string host;           ///< For display only.
+    uint64_t process_id = 0;    ///< For display only.
     double drain_seconds = 20;  ///< How long a stopping worker may take to finish the unit that it renders.
 };
 

@@ -25,7 +25,7 @@ Status failure(const std::string& path, const char* what, int error) {
 
 Status write_file_atomically(const std::string& path, std::string_view bytes) {
     static std::atomic<uint64_t> counter{0};
-    // What a link points to is replaced, not the link; a pipe or a device is written to.
+    // A symbolic link stays and the file that it points to is replaced; a pipe or a device is written to directly.
     std::error_code none;
     const std::filesystem::path resolved = std::filesystem::canonical(path, none);
     const std::string target = none ? path : resolved.string();
@@ -43,7 +43,7 @@ Status write_file_atomically(const std::string& path, std::string_view bytes) {
             error = errno;
         }
     }
-    if (error == 0 && fsync(file) != 0 && errno != EINVAL) error = errno;  // EINVAL: not a thing that can be flushed.
+    if (error == 0 && fsync(file) != 0 && errno != EINVAL) error = errno;  // EINVAL: such a file cannot be flushed.
     if (close(file) != 0 && error == 0) error = errno;
     if (!stream && error == 0 && std::rename(temporary.c_str(), target.c_str()) != 0) error = errno;
     if (error != 0) {

@@ -1,5 +1,5 @@
 #pragma once
-// Files that appear whole or not at all.
+// Reads whole files, and writes files that appear whole or not at all.
 
 #include <string>
 #include <string_view>
@@ -8,11 +8,12 @@
 
 namespace lightloom {
 
-/// Writes `bytes` under a temporary name in the same folder, flushes it to disk and renames it to `path`; an existing file
-/// is replaced, through symbolic links. After an error nothing new is left behind. A pipe or a device is written to as it is.
+/// Writes `bytes` under a temporary name in the same folder, flushes it to disk and renames it to `path`; an existing
+/// file is replaced, and symbolic links are followed. After an error no new file is left behind. A pipe or a device is
+/// written to directly.
 Status write_file_atomically(const std::string& path, std::string_view bytes);
 
-/// The whole file. kNotFound or kInvalidArgument names the path.
+/// Reads the whole file. The error, kNotFound or kInvalidArgument, names the path.
 Result<std::string> read_file(const std::string& path);
 
 }  // namespace lightloom

@@ -1,6 +1,6 @@
 #pragma once
-// Checks of what only a mistake in this program can violate; errors of input, files and networks are Status. A failed check prints
-// file, line, the expression and the values on both sides, and aborts.
+// These checks guard what only a mistake in this program can violate; errors of input, files and networks are a Status
+// instead. A failed check prints file, line, the expression and the values on both sides, and aborts.
 //
 //   LL_CHECK(condition), LL_CHECK(condition, text)
 //   LL_CHECK_EQ(a, b), and the same with NE, LT, LE, GT, GE
@@ -21,7 +21,7 @@ std::string text_of(unsigned long long value);
 std::string text_of(const void* value);
 std::string text_of(std::string_view value);
 
-/// Of what has no text, the type alone says nothing either; the expression has to do.
+/// The value as text, or "?" for a type that has no text; then the printed expression has to suffice.
 template <typename T>
 std::string describe(const T& value) {
     if constexpr (std::is_enum_v<T>) {
@@ -43,7 +43,7 @@ std::string describe(const T& value) {
     }
 }
 
-/// Out of line, so that a check costs its caller a comparison and a call.
+/// This function is not inlined, so that a check costs its caller only a comparison and a call.
 template <typename A, typename B>
 [[noreturn, gnu::noinline, gnu::cold]] void fail_values(const char* file, int line, const char* expression, const A& a,
                                                         const B& b) {
@@ -73,7 +73,8 @@ template <typename A, typename B>
 #define LL_CHECK_GT(a, b) LL_CHECK_VALUES(a, >, b)
 #define LL_CHECK_GE(a, b) LL_CHECK_VALUES(a, >=, b)
 
-// Without code the expression is still compiled, so that it stays right and what it names counts as used.
+// Where a check generates no code, its expression is still compiled, so that it stays valid and its variables count as
+// used.
 #ifdef NDEBUG
 #define LL_IN_DEBUG(check)     \
     do {                       \

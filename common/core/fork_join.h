@@ -1,8 +1,9 @@
 #pragma once
-// A parallel loop whose fork and join a race detector can see. Distributions ship TBB without instrumentation, but its
-// templates are compiled with our code: ThreadSanitizer sees tasks written by one thread and run by another and nothing of the
-// atomics that hand them over. Under it, and only then, the loop runs on threads of its own, whose creation and end it knows;
-// the bodies of one loop are unordered among themselves in both, so that a race between two of them is found.
+// A parallel loop whose fork and join a race detector can see. Linux distributions ship TBB without instrumentation,
+// but its templates are compiled with our code: ThreadSanitizer sees one thread write a task and another run it, but
+// not the atomics that hand the task over. In builds with ThreadSanitizer, and only there, the loop runs on threads of
+// its own, whose start and end the detector sees. In both cases the calls of the body are unordered, so that a race
+// between two of them is found.
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -20,8 +21,8 @@
 
 namespace lightloom {
 
-/// body(begin, end) for disjoint parts of [0, count), in any order, on as many threads as the caller's arena has; returns when
-/// all are done.
+/// Calls body(begin, end) for disjoint parts of [0, count), in any order, on as many threads as the caller's arena has;
+/// returns when all calls are done.
 template <class Body>
 void fork_join(size_t count, const Body& body) {
 #ifdef __SANITIZE_THREAD__

@@ -8,7 +8,8 @@ namespace {
 
 constexpr size_t kMostKept = HugePage::kMostKeptBytes / HugePage::kBytes;
 
-/// Pages without an owner. Never destroyed: owners may outlive whatever order static objects end in.
+/// Pages that have no owner at present. This object is never destroyed, because owners of pages may outlive static
+/// objects.
 struct Spare {
     std::mutex mutex;
     std::vector<std::byte*> pages;
@@ -24,7 +25,7 @@ HugePage::HugePage() : memory_(nullptr) {
     {
         Spare& s = spare();
         const std::lock_guard lock(s.mutex);
-        s.pages.reserve(kMostKept);  // so that giving back cannot fail
+        s.pages.reserve(kMostKept);  // so that giving a page back cannot fail
         if (!s.pages.empty()) {
             memory_ = s.pages.back();
             s.pages.pop_back();

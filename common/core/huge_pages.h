@@ -1,6 +1,7 @@
 #pragma once
-// Memory for arrays that are large and read at random: asks for huge pages, without which most reads of a light-vertex cache miss
-// the translation buffer before they miss the cache. Where the system has none to give, it is ordinary memory.
+// Memory for large arrays that are read at random. It asks the kernel for huge pages, because with small ones most
+// reads of a light-vertex cache miss the translation buffer before they miss the cache. Where the system has no huge
+// pages to give, this is ordinary memory.
 
 #include <sys/mman.h>
 
@@ -24,21 +25,22 @@ struct HugePageAllocator {
         const size_t bytes = (count * sizeof(T) + kPage - 1) / kPage * kPage;
         void* memory = std::aligned_alloc(kPage, bytes);
         if (!memory) throw std::bad_alloc();
-        (void)madvise(memory, bytes, MADV_HUGEPAGE);  // advice: failing costs time only
+        (void)madvise(memory, bytes, MADV_HUGEPAGE);  // only advice: a failure costs nothing but time
         return static_cast<T*>(memory);
     }
     void deallocate(T* memory, size_t) { std::free(memory); }
     friend bool operator==(const HugePageAllocator&, const HugePageAllocator&) { return true; }
 };
 
-/// A huge page of its own, uninitialised. What is given back is kept for the next owner, up to a bound: the kernel clears every
-/// page that it hands out, which takes a tenth of the time in which a light-vertex cache is traced into it. Throws std::bad_alloc.
+/// Owns one huge page, uninitialised. Pages that are given back are kept for the next owner, up to a bound: the kernel
+/// clears every page that it hands out, which takes a tenth of the time in which a light-vertex cache is traced into
+/// it. Throws std::bad_alloc.
 class HugePage {
   public:
     static constexpr size_t kBytes = HugePageAllocator<std::byte>::kPage;
-    /// Of a process, without an owner.
+    /// How much memory without an owner a process keeps at most.
 #ifdef __SANITIZE_ADDRESS__
-    static constexpr size_t kMostKeptBytes = 0;  // memory that passes from hand to hand would hide reads of what is gone
+    static constexpr size_t kMostKeptBytes = 0;  // reused pages would hide reads of released memory
 #else
     static constexpr size_t kMostKeptBytes = size_t(128) << 20;
 #endif

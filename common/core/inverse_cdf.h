@@ -1,7 +1,7 @@
 #pragma once
-// Many discrete distributions over the same outcomes, drawn by inversion with cutpoints [Chen and Asau 1974]. Neighbouring
-// numbers give neighbouring outcomes, so points that are stratified over [0, 1) are stratified over the outcomes, which an alias
-// table would scatter.
+// Many discrete distributions over the same outcomes, drawn by inversion of the distribution function with cutpoints
+// [Chen and Asau 1974]. Neighbouring numbers give neighbouring outcomes, so that points stratified over [0, 1) are
+// stratified over the outcomes; an alias table would scatter them.
 
 #include <algorithm>
 #include <cstdint>
@@ -16,8 +16,8 @@ class InverseCdfTable {
   public:
     struct Draw {
         uint32_t outcome;
-        float probability;  ///< What the table really gives the outcome.
-        double rest;        ///< Where in the outcome's part of [0, 1) the number lies: uniform in [0, 1).
+        float probability;  ///< The outcome's exact probability in the table, a multiple of 2^-31.
+        double rest;        ///< Relative position of the number in the outcome's interval: uniform in [0, 1).
     };
 
     class Column {
@@ -29,8 +29,8 @@ class InverseCdfTable {
             draw_strata(u, 1, &draw);
             return draw;
         }
-        /// (u + n) / count for n = 0 .. count - 1, count <= kMaxStrata. A large table lies far from the processor, and the draws
-        /// wait for it together.
+        /// Draws with the numbers (u + n) / count, n = 0 .. count - 1, count <= kMaxStrata. A large table lies in main
+        /// memory; the draws prefetch from it first, so that they wait for it together.
         void draw_strata(double u, int count, Draw* out) const {
             double scaled[kMaxStrata];
             uint32_t cut[kMaxStrata];
@@ -56,13 +56,14 @@ class InverseCdfTable {
 
     static constexpr uint32_t kMaxOutcomes = 65536;
 
-    /// At most kMaxOutcomes.
+    /// `outcomes` is at most kMaxOutcomes.
     InverseCdfTable(uint32_t outcomes, uint32_t columns)
         : outcomes_(outcomes),
           first_(size_t(outcomes + 1) * columns),
           cutpoints_(size_t(kCuts) * columns) {}
 
-    /// `weights`: finite, non-negative, with a positive sum. Each positive one gets at least 2^-31.
+    /// The weights are finite and non-negative, and their sum is positive. Each positive one gets a probability of at
+    /// least 2^-31.
     void set(uint32_t column, std::span<const float> weights) {
         uint32_t* first = &first_[size_t(column) * (outcomes_ + 1)];
         double total = 0, sum = 0;
@@ -87,9 +88,9 @@ class InverseCdfTable {
     static constexpr uint32_t kCuts = 256, kCutShift = 31 - 8;
 
     uint32_t outcomes_;
-    /// Of each column, where in units of 2^-31 its outcomes begin, and one more.
+    /// For each column: where its outcomes' intervals begin, in units of 2^-31, and where the last one ends.
     std::vector<uint32_t, HugePageAllocator<uint32_t>> first_;
-    /// The outcome at each 256th of the unit interval.
+    /// For each column: the outcomes at the multiples of 1/256.
     std::vector<uint16_t, HugePageAllocator<uint16_t>> cutpoints_;
 };
 

@@ -28,8 +28,9 @@ constexpr uint32_t scramble_reversed(uint32_t x, uint32_t seed) {
     return x;
 }
 
-/// Second dimension of the Sobol' sequence, bit-reversed. Its generator matrix is Pascal's triangle modulo 2, whose entry (i, j) is
-/// odd where the bits of i are among those of j: a sum over supersets, taken for one bit of the positions at a time.
+/// Second dimension of the Sobol' sequence, bit-reversed. Its generator matrix is Pascal's triangle modulo 2, whose
+/// entry (i, j) is odd where the bits of i are among those of j. The product is a sum over supersets, which is computed
+/// for one bit of the positions at a time.
 constexpr uint32_t sobol_second_reversed(uint32_t index) {
     index ^= (index >> 1) & 0x55555555u;
     index ^= (index >> 2) & 0x33333333u;

@@ -50,7 +50,7 @@ inline SinCos sincos(double x) {
     return rotate_quadrant(sincos_reduced(r), int64_t(q));
 }
 
-/// Sine and cosine of 2 pi u: the hot form, for azimuths.
+/// Sine and cosine of 2 pi u; azimuths, which are needed most often, use this form.
 inline SinCos sincos_turns(double u) {
     const double q = std::floor(u * 4 + 0.5);
     return rotate_quadrant(sincos_reduced((u - q * 0.25) * 6.28318530717958647692), int64_t(q));

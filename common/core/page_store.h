@@ -1,6 +1,6 @@
 #pragma once
-// PageStore: many objects that are written once by several threads and read at random after that, in huge pages. Where an object
-// lies never changes, also when the store moves.
+// PageStore keeps many objects in huge pages. Several threads write them, each object once, and they are read at random
+// after that. An object never changes its address, even when the store is moved.
 
 #include <bit>
 #include <cstdint>
@@ -14,8 +14,9 @@
 
 namespace lightloom {
 
-/// Objects are appended in runs of at most kLongest, each in one piece, and are numbered: those of a run one after the other, runs
-/// in no order. Nothing is destroyed. Throws std::bad_alloc, also when the numbers end (after half a terabyte of 128-byte objects).
+/// Objects are appended in runs of at most kLongest, which are contiguous in memory. Numbers are consecutive within a
+/// run; the order of runs is unspecified. Nothing is destroyed. Throws std::bad_alloc, also when the 32-bit numbers are
+/// used up (after half a terabyte of 128-byte objects).
 template <class T, uint32_t kLongest>
 class PageStore {
   public:
@@ -26,7 +27,8 @@ class PageStore {
         T* data = nullptr;
         uint32_t first = 0;  ///< Number of data[0].
     };
-    /// Where one thread puts its runs. Several may write at a time; what is left of a page is given back.
+    /// Appends the runs of one thread. Several writers may be in use at a time; when one ends, the rest of its page
+    /// goes to the next.
     class Writer {
       public:
         explicit Writer(PageStore& store) : store_(store) {}
@@ -58,7 +60,7 @@ class PageStore {
     static_assert(kCapacity > kLongest && std::is_trivially_copyable_v<T>);
 
     T* page(size_t i) const { return reinterpret_cast<T*>(pages_[i].data()); }
-    /// A place with room for any run.
+    /// Returns a place with room for a run of any length.
     Place take() {
         const std::lock_guard lock(*mutex_);
         if (!open_.empty()) {
@@ -69,7 +71,7 @@ class PageStore {
         if (pages_.size() >> (32 - kPageBits)) throw std::bad_alloc();
         const uint32_t first = uint32_t(pages_.size()) << kPageBits;
         pages_.emplace_back();
-        open_.reserve(pages_.capacity());  // giving back happens in destructors and must not fail
+        open_.reserve(pages_.capacity());  // so that give_back(), which destructors call, cannot fail
         return {{page(pages_.size() - 1), first}, kCapacity};
     }
     void give_back(const Place& place) noexcept {
@@ -80,7 +82,7 @@ class PageStore {
 
     std::vector<HugePage> pages_;
     std::vector<Place> open_;
-    std::unique_ptr<std::mutex> mutex_ = std::make_unique<std::mutex>();  ///< Guards the two while objects are written.
+    std::unique_ptr<std::mutex> mutex_ = std::make_unique<std::mutex>();  ///< Guards pages_ and open_.
 };
 
 }  // namespace lightloom

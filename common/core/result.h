@@ -59,7 +59,7 @@ class [[nodiscard]] Result {
 
     bool ok() const { return value_.has_value(); }
     const Status& status() const { return status_; }
-    // All of these want a value to be there; debug builds say which status is there instead.
+    // All of these require a value; debug builds abort with the status if there is none.
     T& value() & { return *checked(); }
     const T& value() const& { return *checked(); }
     T&& value() && { return *std::move(checked()); }
@@ -67,7 +67,7 @@ class [[nodiscard]] Result {
     const T* operator->() const { return &*checked(); }
     T& operator*() & { return *checked(); }
     const T& operator*() const& { return *checked(); }
-    T&& operator*() && { return *std::move(checked()); }  // as of std::optional: *std::move(r) moves
+    T&& operator*() && { return *std::move(checked()); }  // like std::optional: *std::move(r) moves
 
   private:
     std::optional<T>& checked() {

@@ -15,7 +15,8 @@ constexpr uint64_t mix64(uint64_t z) {
     return z ^ (z >> 31);
 }
 
-/// Which part of the computation a stream of random numbers belongs to. Values are part of the image: never renumber.
+/// Which part of the computation a stream of random numbers belongs to. Images depend on these values: never renumber
+/// them.
 enum class Stage : uint32_t {
     kCamera = 1,
     kLight = 2,

@@ -17,8 +17,8 @@ Mat4 operator*(const Mat4& a, const Mat4& b) {
 }
 
 std::optional<Mat4> inverse(const Mat4& source) {
-    // Gauss-Jordan with partial pivoting; a pivot is singular relative to the size of the matrix, so that a scene in
-    // micrometres is as invertible as one in kilometres.
+    // Gauss-Jordan with partial pivoting; whether a pivot counts as zero depends on the largest entry of the matrix, so
+    // that a scene in micrometres is as invertible as one in kilometres.
     auto a = source.m;
     Mat4 inv;
     double size = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// 4x4 affine and projective transformations in double: scene files compose many of them.
+// 4x4 affine and projective transformations in double, because scene files compose many of them.
 
 #include <array>
 #include <cmath>
@@ -38,13 +38,14 @@ struct Mat4 {
 };
 
 Mat4 operator*(const Mat4& a, const Mat4& b);
-/// Nothing when the matrix is singular or not finite.
+/// Returns nothing when the matrix is singular or not finite.
 std::optional<Mat4> inverse(const Mat4& m);
 Mat4 translation(double x, double y, double z);
 Mat4 scaling(double x, double y, double z);
 /// Rotation by `degrees` about an axis that need not be of unit length.
 Mat4 rotation(double degrees, double x, double y, double z);
-/// World-to-camera matrix looking along +z with `up` towards +y (pbrt's convention). Nothing when degenerate.
+/// World-to-camera matrix looking along +z with `up` towards +y (pbrt's convention). Returns nothing when the
+/// directions are degenerate.
 std::optional<Mat4> look_at(const Vec3& eye, const Vec3& target, const Vec3& up);
 
 }  // namespace lightloom

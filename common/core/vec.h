@@ -87,8 +87,8 @@ constexpr Rgb operator*(float s, const Rgb& a) { return a * s; }
 constexpr Rgb operator/(const Rgb& a, float s) { return a * (1.0f / s); }
 inline bool is_finite(const Rgb& a) { return std::isfinite(a.r) && std::isfinite(a.g) && std::isfinite(a.b); }
 
-/// The one positive linear functional L(.) used wherever a colour must become a scalar (resampling weights, Q, Gamma, the
-/// weights): Rec.709 luminance plus a little of the mean, so that no visible colour has weight zero.
+/// The one positive linear functional L(.) used wherever a colour must become a scalar (resampling weights, Q, Gamma,
+/// MIS weights): Rec.709 luminance plus a little of the mean, so that no visible colour has weight zero.
 constexpr float scalar_of(const Rgb& c) { return c.luminance() + 1e-3f * c.average(); }
 
 /// Right-handed orthonormal frame around a unit normal `n` (the local z axis).

@@ -8,12 +8,12 @@ namespace {
 
 constexpr double kRange = FixedSums::kRange;
 
-/// Rounded up a little, so that sums of bounds stay bounds.
+/// Rounds a bound up a little, so that sums of bounds stay bounds.
 double loosened(double bound) { return bound * (1 + 0x1p-40) + 0x1p-44; }
 
 Status out_of_range() { return data_loss("the light in a pixel adds up to more than 1e25 radiance units; scale the lights down"); }
 
-/// Value of one channel of a group or of the whole: camera mean plus splats per light path.
+/// Value of one channel, of a group or of all groups: camera mean plus splats per light path.
 inline double pixel_value(double camera, uint64_t count, double splat, uint64_t light_paths) {
     double value = 0;
     if (count != 0) value += camera / double(count);
@@ -39,7 +39,7 @@ Status GroupSum::add(const Partial& partial) {
     const size_t row_values = size_t(tile.width()) * 3;
     const auto row_of = [&](int y) { return size_t(frame_.crop.index(tile.x0, y)); };
 
-    // The bounds settle nearly every case; only where they might be reached is each sum looked at.
+    // The bounds settle nearly every case; the sums are checked one by one only where a bound may be reached.
     if (camera_bound_ + camera_largest >= kRange) {
         const double* source = partial.camera.data();
         for (int y = tile.y0; y < tile.y1; ++y, source += row_values) {

@@ -1,8 +1,9 @@
 #pragma once
-// Accumulation: the exact sum of the partials of complete full-frame groups, and what develops from it.
+// Accumulation: the exact sum of the partials of complete full-frame groups, and the image that is developed from it.
 //
-// Addition is in 128-bit integers with step 2^-44 (range about 1e25 radiance units), so the order of arrival does not matter
-// and merging is exact. Nothing is divided before develop(). One Accumulation holds one (epoch, algorithm, N1).
+// Sums are 128-bit integers with step 2^-44 (range about 1e25 radiance units), so that their order does not matter and
+// merging is exact. The sums are not divided before develop(). One Accumulation holds one job with one set of
+// parameters.
 
 #include <array>
 #include <cstdint>
@@ -25,8 +26,8 @@ struct RgbImage {
 class GroupSum {
   public:
     explicit GroupSum(const FrameLayout& frame);
-    /// kDataLoss if the partial does not fit the frame, holds a non-finite value, or exceeds the range; then nothing was
-    /// added. Exactly-once is the caller's duty (by unit key).
+    /// kDataLoss if the partial does not fit the frame, holds a non-finite value, or exceeds the range; then nothing
+    /// was added. The caller makes sure that each unit is added exactly once (by its key).
     Status add(const Partial& partial);
 
   private:
@@ -36,10 +37,10 @@ class GroupSum {
     std::vector<uint64_t> camera_count_;  // samples per pixel
     uint64_t light_paths_ = 0;
     uint64_t dropped_ = 0;
-    double camera_bound_ = 0, splat_bound_ = 0;  // No sum can be larger: sums of the partials' largest magnitudes.
+    double camera_bound_ = 0, splat_bound_ = 0;  // Sums of the partials' largest magnitudes, which bound every sum.
 };
 
-/// The exact sums of the complete groups of one (epoch, algorithm, N1).
+/// The exact sums of a job's complete groups.
 class Accumulation {
   public:
     explicit Accumulation(const FrameLayout& frame, const FilmResponse& response = {});
@@ -54,11 +55,11 @@ class Accumulation {
     uint64_t iterations() const { return iterations_; }
     uint64_t dropped() const { return dropped_; }
 
-    /// camera sum / camera count + splat sum / light paths, per pixel, as the film responds to it.
+    /// camera sum / camera count + splat sum / light paths, per pixel, after the film's response.
     RgbImage develop() const;
     /// Variance of each developed pixel and channel, from the second moments of whole group images (never of single
-    /// samples, which share light paths): sum_g n_g (X_g - mean)^2 / ((G - 1) sum n_g). Empty for fewer than
-    /// two groups, which say nothing of it.
+    /// samples, which share light paths): sum_g n_g (X_g - mean)^2 / ((G - 1) sum n_g). Empty for fewer than two
+    /// groups, from which no variance can be estimated.
     RgbImage variance() const;
 
   private:
@@ -71,8 +72,9 @@ class Accumulation {
     uint64_t iterations_ = 0;
     uint32_t group_count_ = 0;
     double camera_bound_ = 0, splat_bound_ = 0;
-    // Of the X_g after white balance, which mixes channels (variances alone could not follow it), before the exposure.
-    std::vector<double> mean_;    // Their mean with weights n_g, 3 per pixel.
+    // Both describe X_g, the groups' images after white balance and before exposure: white balance mixes channels, and
+    // variances alone could not follow it.
+    std::vector<double> mean_;    // Mean with weights n_g, 3 per pixel.
     std::vector<double> moment_;  // sum_g n_g (X_g - mean_)^2, updated as groups come [West 1979].
 };
 

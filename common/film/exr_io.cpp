@@ -41,7 +41,7 @@ Status check_values(const std::vector<float>& values, size_t channels, const Rec
         const std::string where = "EXR " + what + ": pixel (" + std::to_string(crop.x0 + int(p % size_t(crop.width()))) + ", " +
                                   std::to_string(crop.y0 + int(p / size_t(crop.width()))) + ")";
         if (!std::isfinite(v)) return data_loss(where + " is NaN or infinite");
-        return invalid_argument(where + " is " + std::to_string(v) + ", beyond the 65504 of half");
+        return invalid_argument(where + " is " + std::to_string(v) + ", above 65504, the largest value of half");
     }
     return Status::ok_status();
 }

@@ -1,6 +1,7 @@
 #pragma once
-// The final image as EXR: written with fixed settings, so that the same image gives the same bytes wherever and with
-// however many threads it is written; and read back, from our own or any other scanline or tiled EXR.
+// The final image as EXR. It is written with fixed settings: the same image gives the same bytes with any number of
+// threads, as long as the versions of OpenEXR and its compressor are the same. Images are read from our own files and
+// from other flat EXR files; see decode_exr() for what is refused.
 
 #include <string>
 #include <string_view>
@@ -13,7 +14,7 @@
 
 namespace lightloom {
 
-/// A named set of 32-bit float planes that lies beside the colour: "variance", "albedo", "normal", "depth".
+/// A named set of 32-bit float planes beside the colour: "variance", "albedo", "normal", "depth".
 struct ImageLayer {
     std::string name;
     std::string channels;       ///< One letter each, for example "RGB", "XYZ" or "Z"; the EXR channel is name.letter.
@@ -44,16 +45,19 @@ struct ExrImage {
 /// Storage of the colour channels. Layers are always float: half has no room for a variance or a depth.
 enum class ExrPixelType { kFloat, kHalf };
 
-/// The file's bytes: scanlines, ZIP compression of fixed level. Refused with one line: a size that does not fit the frame, a
-/// NaN or infinite value, a value beyond half's 65504 where half was asked for (never clamped: that would change the
-/// mean), an attribute name that EXR uses itself.
+/// Returns the file's bytes: scanlines with ZIP compression of a fixed level. kInvalidArgument for a size that does not
+/// fit the frame, for a colour beyond half's 65504 where half was asked for (it is not clamped, which would change the
+/// mean), and for an attribute name that EXR uses itself; kDataLoss for a NaN or infinite value. The message is one
+/// line.
 Result<std::string> encode_exr(const ExrImage& image, ExrPixelType type = ExrPixelType::kFloat);
-/// encode_exr to a file that appears whole or not at all.
+/// Writes encode_exr()'s bytes to a file that appears whole or not at all.
 Status write_exr(const std::string& path, const ExrImage& image, ExrPixelType type = ExrPixelType::kFloat);
 
-/// Reads a flat scanline or tiled EXR (its first part) with channels R, G, B of half, float or uint, or with Y alone, which
-/// is repeated. Other channels become layers: the part of the name before the last dot is the layer, a channel without a
-/// dot becomes a layer of its own name. NaN and infinities are passed on. `name` is for messages.
+/// Reads a flat scanline or tiled EXR (its first part) with channels R, G, B of half, float or uint, or with Y alone,
+/// which is repeated. Other channels become layers: the layer's name is the part before the last dot, or the whole name
+/// where there is no dot; of the channel's name its last letter is kept. NaN and infinities are passed on. `name` is
+/// for messages. kInvalidArgument for deep images, subsampled channels, luminance with chroma (RY, BY), and files that
+/// have neither R, G, B nor Y.
 Result<ExrImage> decode_exr(std::string_view bytes, const std::string& name);
 Result<ExrImage> read_exr(const std::string& path);
 

@@ -1,6 +1,6 @@
 #pragma once
-// OpenEXR reads from and writes to memory through these. They are inline, so that the importer can use them without linking to
-// the film: its fuzz targets do without.
+// Streams through which OpenEXR reads from and writes to memory. They are inline, so that the importer and its fuzz
+// targets can use them without linking to the film library.
 
 #include <ImfIO.h>
 
@@ -29,7 +29,8 @@ class ExrMemoryOutput final : public Imf::OStream {
     uint64_t position_ = 0;
 };
 
-/// The bytes outlive the stream. A position beyond the end is as good as in a file: only reading there is an error.
+/// The bytes must outlive the stream. As in a file, a position beyond the end is allowed; only reading there is an
+/// error.
 class ExrMemoryInput final : public Imf::IStream {
   public:
     ExrMemoryInput(const char* name, std::string_view bytes) : Imf::IStream(name), bytes_(bytes) {}
@@ -48,7 +49,7 @@ class ExrMemoryInput final : public Imf::IStream {
     uint64_t position_ = 0;
 };
 
-/// The text of one of OpenEXR's errors as one line.
+/// Turns the text of an OpenEXR error into one line.
 inline std::string one_line(std::string text) {
     for (char& c : text)
         if (c == '\n' || c == '\r') c = ' ';

@@ -11,8 +11,8 @@ namespace lightloom {
 
 using Int128 = __int128;
 
-/// The lower and upper words live in arrays of their own: the upper one hardly ever changes, and leaving it alone halves
-/// the memory that an addition touches, which is what bounds it.
+/// The lower and upper words live in separate arrays: the upper word hardly ever changes, and leaving it alone halves
+/// the memory that an addition touches, which is what limits its speed.
 class FixedSums {
   public:
     /// |sum| stays below 2^127 steps.
@@ -28,7 +28,7 @@ class FixedSums {
     /// Adds `count` values, each rounded to the nearest step (ties to even), from sum `first` on. No magnitude exceeds
     /// `largest`, which is finite and below kRange, and no sum may leave the range.
     void add(size_t first, const double* values, size_t count, double largest) {
-        if (largest < kFastLimit) {  // Nearly always.
+        if (largest < kFastLimit) {  // This is nearly always so.
             for (size_t i = 0; i < count; ++i) {
                 const int64_t steps = std::llrint(values[i] * kStepsPerUnit);
                 const uint64_t sum = low_[first + i] + uint64_t(steps);
@@ -48,11 +48,11 @@ class FixedSums {
     bool would_overflow(size_t i, double value) const { return overflows(steps(i), to_steps(value)); }
     bool would_overflow(size_t i, const FixedSums& other) const { return overflows(steps(i), other.steps(i)); }
 
-    /// |value| below kRange, in steps.
+    /// Converts a value to steps; |value| must be below kRange.
     static Int128 to_steps(double value) {
-        const double steps = value * kStepsPerUnit;  // Exact: a power of two, and far from overflow.
+        const double steps = value * kStepsPerUnit;  // Exact: the factor is a power of two and overflow is far away.
         if (std::fabs(value) < kFastLimit) return std::llrint(steps);
-        // From 2^53 on every double is an integer: its mantissa, shifted.
+        // From 2^53 on every double is an integer, namely its mantissa, shifted.
         const uint64_t bits = std::bit_cast<uint64_t>(steps);
         const int shift = int((bits >> 52) & 0x7ff) - 1075;
         const Int128 magnitude = Int128((bits & 0xfffffffffffffull) | 0x10000000000000ull) << shift;

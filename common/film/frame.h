@@ -20,13 +20,14 @@ struct Rect {
     friend bool operator==(const Rect&, const Rect&) = default;
 };
 
-/// Largest crop window: so many pixels are numbered in 32 bits, and what a pixel has of values, too.
+/// Most pixels of a crop window: with so many, 32 bits can still number the pixels and the values of all pixels.
 inline constexpr int64_t kMaxPartialPixels = int64_t(1) << 28;
 
-/// Memory that a job's sums take while it is rendered: of all groups and of the one that is not complete yet.
+/// Memory that a job's sums take per pixel while it is rendered, for the sums of all complete groups and of the
+/// incomplete one.
 inline constexpr int64_t kFrameBytesPerPixel = 256;
 
-/// "P pixels, which take G GB of memory while they are rendered (256 bytes each)"
+/// Returns "P pixels, which take G GB of memory while they are rendered (256 bytes each)".
 inline std::string pixels_and_memory(int64_t pixels) {
     return std::to_string(pixels) + " pixels, which take " +
            std::to_string((pixels * kFrameBytesPerPixel + 999999999) / 1000000000) + " GB of memory while they are rendered (" +

@@ -13,7 +13,7 @@ Status GroupedSum::add(const Partial& partial) {
 }
 
 Result<GroupSum> GroupedSum::fold(uint32_t iterations) {
-    if (!current_) current_.emplace(frame_);  // an empty group, which is refused like any other that is not complete
+    if (!current_) current_.emplace(frame_);  // An empty group is refused like any other incomplete one.
     LL_RETURN_IF_ERROR(complete_.fold(*current_, iterations));
     counters_ += current_counters_;
     GroupSum group = *std::move(current_);

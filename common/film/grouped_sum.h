@@ -1,7 +1,7 @@
 #pragma once
-// GroupedSum: an image that grows by complete groups, one after the other. Everything that renders or merges a whole job keeps its
-// sums in one of these, so that what counts as part of the image is decided once: a group does as a whole or not at all, with its
-// counters and its dropped samples.
+// GroupedSum: an image that grows by complete groups, one after the other. Everything that renders or merges a whole
+// job keeps its sums in a GroupedSum, so that one place decides what is part of the image: a group counts as a whole or
+// not at all, including its counters and dropped samples.
 
 #include <cstdint>
 #include <optional>
@@ -12,16 +12,16 @@ namespace lightloom {
 
 class GroupedSum {
   public:
-    /// `response` develops the image.
+    /// `response` is applied when the image is developed.
     explicit GroupedSum(const FrameLayout& frame, const FilmResponse& response = {}) : frame_(frame), complete_(frame, response) {}
 
-    /// Adds a unit of the group that is being summed; units come in any order, each once. An error refuses this unit alone: the
-    /// sums are as they were, and it may be rendered again. As GroupSum::add(); takes the memory of a group's sums
-    /// (std::bad_alloc).
+    /// Adds a unit of the group that is being summed; units may come in any order, each once. Errors are those of
+    /// GroupSum::add(); an error leaves the sums unchanged, and the unit may be rendered again. The first unit of a
+    /// group allocates its sums (std::bad_alloc).
     Status add(const Partial& partial);
-    /// Ends the group, all of whose units have been added: it becomes part of the image. Gives its own sums. An error: the group
-    /// does not fit and the image is as it was. Later groups would leave a hole where it belongs, so this is the end of all sums.
-    /// As Accumulation::fold().
+    /// Ends the group, all of whose units have been added: it becomes part of the image, and its own sums are returned.
+    /// Errors are those of Accumulation::fold(); an error leaves the image unchanged, and no further group may be
+    /// added, because this one would be missing.
     Result<GroupSum> fold(uint32_t iterations);
     /// Forgets the units of the group that is being summed.
     void drop_current();
@@ -36,7 +36,7 @@ class GroupedSum {
   private:
     FrameLayout frame_;
     Accumulation complete_;
-    std::optional<GroupSum> current_;  ///< From its first unit on: renderings that wait for their turn have none.
+    std::optional<GroupSum> current_;  ///< Made with the group's first unit, so that waiting jobs take no memory.
     uint32_t current_units_ = 0;
     UnitCounters counters_, current_counters_;
 };

@@ -1,6 +1,7 @@
 #pragma once
-// Partial: everything that one work unit contributes to the image, as sums and counts. Summed in double, in a fixed order
-// (pixel by pixel in iteration order; splats in path order), so it is the same bytes on any worker and thread count.
+// Partial: everything that one work unit contributes to the image, as sums and counts. Values are summed in double in a
+// fixed order (pixel by pixel in iteration order; splats in path order), so that a partial has the same bytes on every
+// worker and with any number of threads.
 
 #include <array>
 #include <cstdint>
@@ -13,8 +14,8 @@
 
 namespace lightloom {
 
-/// Sum of the splats of a unit in one pixel. Values are in "pixel area 1" units: the image is the sum over all units
-/// divided by the total number of light paths.
+/// Sum of the splats of a unit in one pixel. Values are scaled such that the image is the sum over all units divided by
+/// the total number of light paths.
 struct SplatSum {
     uint32_t pixel = 0;  ///< Row-major in FrameLayout::crop.
     std::array<double, 3> rgb{};
@@ -55,7 +56,7 @@ struct Partial {
     uint64_t dropped_count = 0;          ///< Non-finite samples dropped.
     std::vector<DroppedSample> dropped;  ///< The first of them, at most kMaxDroppedRecords.
     UnitCounters counters;
-    RareLight rare_light;  ///< Of the whole job, from its very first unit; no other one has it.
+    RareLight rare_light;  ///< Describes the whole job; only the job's first unit has it.
 
     static constexpr size_t kMaxDroppedRecords = 16;
 };

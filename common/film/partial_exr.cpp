@@ -37,7 +37,7 @@ struct Layout {
     std::vector<Part> parts;
     std::string prologue;             // Everything before the first chunk: headers and offset tables.
     std::vector<size_t> first_chunk;  // Per part: offset of its first chunk; the others follow at chunk_bytes().
-    size_t size = 0;                  // Of the whole file.
+    size_t size = 0;                  // Bytes of the whole file.
 };
 
 template <typename T>
@@ -159,7 +159,7 @@ bool is_zero(const std::array<double, 3>& rgb) { return rgb[0] == 0 && rgb[1] ==
 
 Status check_frame(const FrameLayout& frame, const Rect& tile) {
     const Rect& crop = frame.crop;
-    constexpr int64_t kMaxPixels = kMaxPartialPixels;  // part of every bound below
+    constexpr int64_t kMaxPixels = kMaxPartialPixels;  // keeps all sizes below in range
     if (crop.empty() || crop.x0 < 0 || crop.y0 < 0 || crop.x1 > frame.width || crop.y1 > frame.height || crop.area() > kMaxPixels) {
         return invalid_argument("partial: the crop window is empty, outside the frame or larger than " +
                                 std::to_string(kMaxPixels) + " pixels");

@@ -23,7 +23,7 @@
 
 namespace lightloom {
 
-/// Everything in a partial that is not a sum, and what the payload must be.
+/// Everything in a partial that is not a sum, and the payload's size and digest.
 struct PartialDescriptor {
     uint64_t splat_count = 0;  ///< Pixels with a non-zero splat sum. Decides the layout of the splat part.
     uint32_t samples_per_pixel = 0;
@@ -41,7 +41,7 @@ struct EncodedPartial {
     std::string payload;  ///< The EXR file.
 };
 
-/// What the receiver knows about a unit without being told: it follows from the plan.
+/// What the receiver knows about a unit beforehand, because it follows from the plan.
 struct PartialExpectation {
     FrameLayout frame;
     Rect tile;
@@ -52,12 +52,12 @@ struct PartialExpectation {
 /// Size in bytes of the payload for `splat_count` splat sums; for size limits and admission. The tile and crop are valid.
 uint64_t partial_payload_size(const FrameLayout& frame, const Rect& tile, uint64_t splat_count);
 
-/// Splat sums that are zero in all channels are left out: they carry nothing. kDataLoss if check_partial() refuses the
+/// Encodes a partial. Splat sums that are zero in all channels are left out. kDataLoss if check_partial() refuses the
 /// partial.
 Result<EncodedPartial> encode_partial(const Partial& partial, const FrameLayout& frame);
 
-/// Safe on any bytes: kDataLoss, naming what differs, unless the payload is exactly what encode_partial() makes for the
-/// expected unit.
+/// Decodes any bytes safely: kDataLoss, naming what differs, unless the payload is exactly what encode_partial() makes
+/// for the expected unit.
 Result<Partial> decode_partial(const PartialExpectation& expected, const PartialDescriptor& descriptor, std::string_view payload);
 
 }  // namespace lightloom

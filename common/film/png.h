@@ -1,5 +1,5 @@
 #pragma once
-// 8-bit sRGB preview.
+// 8-bit sRGB pictures in PNG format, for previews.
 
 #include <cstdint>
 #include <string>
@@ -18,9 +18,9 @@ uint8_t srgb_code(float linear);
 
 /// The PNG file's bytes for `image` times 2^exposure (in stops), clipped to [0, 1].
 Result<std::string> encode_png(const RgbImage& image, double exposure = 0);
-/// encode_png to a file that appears whole or not at all.
+/// Writes encode_png()'s bytes to a file that appears whole or not at all.
 Status write_png(const std::string& path, const RgbImage& image, double exposure = 0);
-/// The same for ready 8-bit sRGB values, 3 * width * height.
+/// Does the same for 8-bit sRGB values, 3 * width * height.
 Status write_png8(const std::string& path, int width, int height, const std::vector<uint8_t>& rgb);
 
 }  // namespace lightloom

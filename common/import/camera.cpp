@@ -1,4 +1,4 @@
-// Camera, film, and the directives that say how pbrt samples: Sampler, PixelFilter, Integrator.
+// Camera, film, and the directives for pbrt's sampling: Sampler, PixelFilter, Integrator.
 
 #include <algorithm>
 #include <array>
@@ -16,7 +16,7 @@ void check_camera(const ParameterList& p, const CameraDescription& camera) {
     const auto& m = camera.camera_to_world.m;
     if (!within_bounds({float(m[0][3]), float(m[1][3]), float(m[2][3])}))
         fail(p.where(), p.what() + ": its position lies beyond 1e15; scale the scene down");
-    constexpr double kLongest = 1.001 * double(kMaxCoordinate), kShortest = 1 / kLongest;  // what rounds to the bounds too
+    constexpr double kLongest = 1.001 * double(kMaxCoordinate), kShortest = 1 / kLongest;  // with room for rounding
     const auto usable = [](double length) { return length >= kShortest && length <= kLongest; };
     double scale = 0;
     for (int j = 0; j < 3; ++j) {
@@ -27,7 +27,8 @@ void check_camera(const ParameterList& p, const CameraDescription& camera) {
     if (!keeps_angles(camera.camera_to_world))
         fail(p.where(), p.what() + ": its transformation shears or scales axes differently; use fov or screenwindow instead");
     if (camera.kind == CameraKind::kEqualArea || camera.kind == CameraKind::kEquirectangular) return;
-    // Steeper rays than this come from no pixel of a usable picture, and the renderer takes them for sideways ones.
+    // Steeper rays than this come from no pixel of a usable picture, and the renderer would treat them as sideways
+    // ones.
     constexpr double kSteepest = 1e6;
     if (camera.lens_radius > 0) {
         const double radius = camera.lens_radius * scale, focus = camera.focal_distance * scale;
@@ -36,7 +37,7 @@ void check_camera(const ParameterList& p, const CameraDescription& camera) {
                                 ": lensradius and focaldistance must lie between 1e-15 and 1e15, and lensradius must not "
                                 "exceed a million times focaldistance; set lensradius to 0 for a pinhole");
     }
-    // The image on a plane at distance 1, of a square film if nothing here says more.
+    // The image on a plane at distance 1; the film is square unless the following says otherwise.
     double x[2] = {-1, 1}, y[2] = {-1, 1};
     const double aspect = camera.frame_aspect_ratio;
     if (camera.has_screen_window)
@@ -46,7 +47,7 @@ void check_camera(const ParameterList& p, const CameraDescription& camera) {
     else if (aspect > 0)
         y[0] = -1 / aspect, y[1] = 1 / aspect;
     if (camera.kind == CameraKind::kOrthographic) {
-        constexpr double kLeast = 1e-9;  // of which a pixel's area is still a number
+        constexpr double kLeast = 1e-9;  // a pixel of this size still has an area in single precision
         for (const double* side : {x, y})
             if (!(std::fmax(std::fabs(side[0]), std::fabs(side[1])) * scale <= kLongest) ||
                 !((side[1] - side[0]) * scale >= kLeast))
@@ -64,8 +65,8 @@ void check_camera(const ParameterList& p, const CameraDescription& camera) {
                                 "times or narrower than 1e-9 times its distance; correct them");
 }
 
-/// "pixelbounds" or "cropwindow", whether there is one. pbrt-v4 turns inverted ranges round and cuts what lies outside; those
-/// are mistakes all the same.
+/// Reads "pixelbounds" or "cropwindow"; false if there is neither. pbrt-v4 swaps inverted ranges and cuts off what lies
+/// outside; here both are errors.
 bool read_crop(const ParameterList& p, FilmDescription* film) {
     const Parameter *bounds = p.find("integer", "pixelbounds"), *window = p.find("float", "cropwindow");
     if (!bounds && !window) return false;
@@ -91,7 +92,7 @@ bool read_crop(const ParameterList& p, FilmDescription* film) {
     return true;
 }
 
-/// Where the picture is cut from, for the cameras that have one in a plane.
+/// Reads the screen window of cameras that have one in a plane.
 void read_window(const ParameterList& p, CameraDescription* camera) {
     camera->frame_aspect_ratio = p.one_float("frameaspectratio", 0);
     if (p.find("float", "frameaspectratio") && !(camera->frame_aspect_ratio > 0))
@@ -120,7 +121,7 @@ void read_orthographic(const ParameterList& p, CameraDescription* camera) {
     camera->kind = CameraKind::kOrthographic;
     if (p.one_float("lensradius", 0) != 0)
         fail(p.where(), p.what() + ": a lens is not supported here; remove lensradius, or use a far \"perspective\" camera");
-    p.accept("float", "focaldistance");  // Means nothing without a lens.
+    p.accept("float", "focaldistance");  // It has no effect without a lens.
     read_window(p, camera);
 }
 
@@ -128,7 +129,7 @@ void read_spherical(Context* context, const ParameterList& p, CameraDescription*
     const std::string mapping = p.one_choice("mapping", "equalarea", {"equalarea", "equirectangular"});
     camera->kind = mapping == "equalarea" ? CameraKind::kEqualArea : CameraKind::kEquirectangular;
     for (const std::string_view name : {"lensradius", "focaldistance", "frameaspectratio", "screenwindow"})
-        p.ignore(&context->diagnostics, name, "a camera that sees in all directions has no use for it, in pbrt as well");
+        p.ignore(&context->diagnostics, name, "a camera that sees in all directions does not use it, as in pbrt");
 }
 
 }  // namespace
@@ -182,7 +183,7 @@ void set_film(Context* context, const std::string& kind, const ParameterList& p)
     }
     context->film_colour = sensor_colour(context, p);
     p.ignore(&context->diagnostics, "diagonal", "it matters only for cameras with real lenses");
-    p.ignore(&context->diagnostics, "savefp16", "the output's precision is the command line's business");
+    p.ignore(&context->diagnostics, "savefp16", "the command line selects the output's precision");
     context->scene.film = film;
 }
 

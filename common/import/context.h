@@ -1,6 +1,6 @@
 #pragma once
 // What the parts of the importer share: the scene under construction, the files, the diagnostics, and the tables that
-// map names to what they stand for.
+// map names to definitions.
 
 #include <array>
 #include <cstdint>
@@ -26,26 +26,26 @@ namespace lightloom::import {
 /// A material that absorbs nothing and scatters nothing: the shape does not exist for light ("interface").
 inline constexpr MaterialId kInterfaceMaterial = -2;
 
-/// Farthest that anything may lie from the origin, and longest length: its square, and an area times a squared distance
-/// over another, stay far from the end of single precision (Embree gives up beyond 1.8e18).
+/// Largest distance from the origin, and largest length: its square, and an area times a squared distance over another,
+/// stay within single precision (Embree gives up beyond 1.8e18).
 inline constexpr float kMaxCoordinate = 1e15f;
-inline constexpr int kMaxDepth = 255;  ///< Edges of a path but one; see kMaxEdges.
+inline constexpr int kMaxDepth = 255;  ///< Edges of a path minus one; see kMaxEdges.
 
 /// A material as a shape names it: a named one, or an anonymous one by its index.
 struct MaterialReference {
     bool named = false;
-    std::string name;   ///< Of a named material.
+    std::string name;   ///< Name of a named material.
     int anonymous = 0;  ///< Index into Context::anonymous_materials; 0 is pbrt's default, diffuse.
     Location where;
 };
 
 /// A Texture, Material or MakeNamedMaterial directive, interpreted when everything has been read (pbrt allows
-/// references to what comes later).
+/// references to later definitions).
 struct Definition {
     std::string kind;  ///< "imagemap", "diffuse", ...
     ParameterList parameters;
-    Mat4 to_world = {};  ///< Of a texture: the transformation in force at its directive.
-    bool moves = false;  ///< Whether that changes while the shutter is open.
+    Mat4 to_world = {};  ///< For a texture: the transformation in force at its directive.
+    bool moves = false;  ///< Whether the transformation changes while the shutter is open.
 };
 
 struct AreaLightDefinition {
@@ -55,7 +55,7 @@ struct AreaLightDefinition {
 /// A shape with its references still unresolved.
 struct PendingShape {
     std::variant<TriangleMesh, Sphere> geometry;
-    std::vector<uint32_t> faces;  ///< As make_shape() gives them; empty if nothing asks for them.
+    std::vector<uint32_t> faces;  ///< Faces as make_shape() gives them; empty where they are not needed.
     int32_t object = kNone;       ///< Index into SceneDescription::objects, or kNone.
     MaterialReference material;
     std::shared_ptr<const AreaLightDefinition> area_light;  ///< Null if the shape does not emit.
@@ -65,19 +65,19 @@ struct PendingShape {
     Location where;
 };
 
-/// What evaluating a texture takes.
+/// The cost of evaluating a texture.
 struct TextureCost {
-    int levels = 1;     ///< Of recursion.
-    double visits = 1;  ///< Nodes looked at.
+    int levels = 1;     ///< Levels of recursion.
+    double visits = 1;  ///< Nodes that are evaluated.
 };
 
-/// Bounds of a texture's first channel, which float textures consist of; it need not reach them.
+/// Bounds of a texture's first channel (float textures have no other); the texture need not reach them.
 struct TextureRange {
     double least = 0, most = 0;
 };
 
-/// What the numbers of a texture are decides what they may be and how a spectrum is reduced (spectra.h). A spectrum texture may
-/// be used both as a reflectance and as an index of refraction; then it is two.
+/// What a texture is used for decides which values it may have and how a spectrum is reduced (spectra.h). A spectrum
+/// texture that is used both as a reflectance and as an index of refraction becomes two textures.
 enum class TextureUse { kFloat, kReflectance, kUnbounded };
 
 struct Context {
@@ -106,31 +106,32 @@ struct Context {
     std::map<int, MaterialId> resolved_anonymous_materials;
     std::map<std::tuple<float, float, float>, TextureId> constants;
     std::map<decltype(Mat4::m), int32_t> texture_spaces;
-    std::map<std::string, int32_t> image_index;  ///< By file, encoding and channel choice.
+    std::map<std::string, int32_t> image_index;  ///< Image by file, encoding and channel choice.
     std::map<std::tuple<float, float, float, bool, int32_t>, int32_t> emission_index;
     std::vector<TextureCost> texture_costs;        ///< One per scene texture.
-    std::vector<TextureRange> texture_ranges;      ///< The same.
-    std::map<int32_t, Rgb> image_means;            ///< Of the images of area and goniometric lights.
-    std::map<int32_t, TextureRange> image_ranges;  ///< Of the one-channel images of textures, by their index.
-    std::map<MaterialId, int> mix_levels;          ///< Of mix materials; others have none.
-    int texture_depth = 0, material_depth = 0;     ///< Of the definitions being resolved.
+    std::vector<TextureRange> texture_ranges;      ///< One per scene texture.
+    std::map<int32_t, Rgb> image_means;            ///< Means of the images of area and goniometric lights.
+    std::map<int32_t, TextureRange> image_ranges;  ///< Ranges of the one-channel images of textures, by their index.
+    std::map<MaterialId, int> mix_levels;          ///< Levels of mix materials; others have none.
+    int texture_depth = 0, material_depth = 0;     ///< Nesting of the definitions that are being resolved.
 
-    float exposure_time = 1, iso = 100;       ///< Of the camera's shutter; of the film.
-    std::optional<float> film_exposure_time;  ///< Of a film that says it itself, as pbrt-v4's did at first.
+    float exposure_time = 1, iso = 100;       ///< Exposure time of the camera's shutter; ISO value of the film.
+    std::optional<float> film_exposure_time;  ///< Exposure time that the film gives, as in early versions of pbrt-v4.
     FilmResponse::Matrix film_colour = FilmResponse::kNeutral;
     bool has_pixel_filter = false;
 
-    /// Says that the scene has an unsupported feature: it is left out if the options say so, and a fault otherwise.
+    /// Reports an unsupported feature: it is left out if the options say so, and is a fault otherwise.
     void unsupported(const Location& where, const std::string& feature, const std::string& what);
-    /// Whether the options leave the feature out; counts it.
+    /// Whether the options leave the feature out; counts the occurrence if so.
     bool leaves_out(const Location& where, std::string_view feature);
-    /// A fault in `resolve` gives the placeholder where faults are collected, so that each definition is judged once.
+    /// Returns what `resolve` gives. Where faults are collected, a fault in it yields the placeholder instead, so that
+    /// each definition is reported once.
     template <typename Id>
     Id resolve_or(const std::function<Id()>& placeholder, const std::function<Id()>& resolve);
 
     /// Reads a file that a parameter names. Fails at `where`.
     std::string read_file(const Location& where, const std::string& reference, std::string* normalised = nullptr);
-    /// Index of the decoded image in the scene; every file is decoded once per way of using it.
+    /// Index of the decoded image in the scene; a file is decoded once for each kind of request.
     int32_t load_image(const Location& where, const std::string& reference, const ImageRequest& request);
     /// Mean of an image of the scene, which many shapes may ask for.
     const Rgb& image_mean(int32_t image);
@@ -160,18 +161,18 @@ TextureId spectrum_texture_parameter(Context* context, const ParameterList& para
 
 /// The temperature of a parameter of type "blackbody"; fails if it is not one or out of range. `what` names the directive.
 double kelvin_of(const Parameter& p, const std::string& what);
-/// Parameter `name` as the texture that another one is made of; `fallback` if absent.
+/// Parameter `name` as an operand of another texture; `fallback` if absent.
 TextureId texture_operand(Context* context, const ParameterList& parameters, std::string_view name, TextureUse use, float fallback);
 
 /// Parameter `name` of type "spectrum" read from its values or file; nothing if absent.
 std::optional<Spectrum> spectrum_parameter(Context* context, const ParameterList& parameters, std::string_view name);
 
 // procedural.cpp
-/// The 2D mapping of a texture: from (u, v), or from the place in the space of its transformation.
+/// The 2D mapping of a texture: from (u, v), or from the position in the space of its transformation.
 void read_mapping(Context* context, const Definition& definition, TextureNode* node);
 /// A checkerboard, dots, fbm, wrinkled, windy or marble; nothing for another kind.
 std::optional<TextureId> procedural_texture(Context* context, const Definition& definition, TextureUse use);
-/// Of one of these, but for those of float textures that consist of others.
+/// Bounds of one of these textures, except of float textures that consist of others.
 TextureRange noise_range(const TextureNode& node);
 /// Noise evaluations of one look-up.
 double noise_cost(const TextureNode& node);
@@ -180,21 +181,21 @@ double noise_cost(const TextureNode& node);
 MaterialId resolve_material_reference(Context* context, const MaterialReference& reference);
 
 // lights.cpp
-/// Transformation in force at a directive.
+/// Adds a light; `light_to_world` is the transformation in force at its directive.
 void add_light(Context* context, const std::string& kind, const ParameterList& parameters, const Mat4& light_to_world);
 /// Whether no coordinate is beyond kMaxCoordinate (or not a number).
 bool within_bounds(const Vec3& position);
 
-/// Radiance of an area light on a surface of `area`, in world space: its "power" is what each primitive emits, however that is
-/// scaled. (pbrt-v4 divides by the area that a sphere or disk has before its transformation.) Where an image gives the light, the
-/// power is that of a primitive that shows all of the image evenly, as in pbrt-v4.
+/// Radiance of an area light on a surface of `area`, in world space: its "power" is emitted by each primitive, however
+/// the primitive is scaled. (pbrt-v4 divides by the area that a sphere or disk has before its transformation.) Where an
+/// image modulates the light, the power is that of a primitive that shows all of the image evenly, as in pbrt-v4.
 AreaEmission area_emission(Context* context, const AreaLightDefinition& definition, double area);
 bool area_light_uses_power(const AreaLightDefinition& definition);
 
 // camera.cpp
 void set_camera(Context* context, const std::string& kind, const ParameterList& parameters, const Mat4& camera_to_world);
 void set_film(Context* context, const std::string& kind, const ParameterList& parameters);
-/// What the sensor and the white balance of a film do to colours (sensor.cpp).
+/// The effect of a film's sensor and white balance on colours (sensor.cpp).
 FilmResponse::Matrix sensor_colour(Context* context, const ParameterList& parameters);
 void set_pixel_filter(Context* context, const std::string& kind, const ParameterList& parameters);
 void set_sampler(Context* context, const std::string& kind, const ParameterList& parameters);

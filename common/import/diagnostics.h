@@ -1,7 +1,7 @@
 #pragma once
-// Where something was said in a scene file, and what the importer has to say about it. Inside common/import an error is
-// thrown as an ImportFailure (a parser that is thirty calls deep has nothing else to do with it); import_pbrt() turns
-// it into a Status, so no exception leaves the module.
+// Places in scene files, and the importer's messages about them. Inside common/import an error is thrown as an
+// ImportFailure (a parser that is thirty calls deep could only pass it on); import_pbrt() turns it into a Status, so
+// that no exception leaves the module.
 
 #include <map>
 #include <string>
@@ -32,15 +32,15 @@ struct ImportFailure {
 /// Ends the import: "file:line: what". Where faults are collected it ends the directive or definition, see Diagnostics::guard().
 [[noreturn]] void fail(const Location& where, const std::string& what);
 
-/// `text` in double quotes, fit for one line of a message: shortened, control characters escaped.
+/// `text` in double quotes, made fit for one line of a message: shortened, control characters escaped.
 std::string quoted(const std::string& text);
 
-/// Messages of which repetitions are counted, not repeated.
+/// A list of messages in which repetitions are counted instead of repeated.
 class MessageList {
   public:
     /// Messages of one `key` count as repetitions of the first.
     void add(const Location& where, const std::string& what, const std::string& key);
-    /// "first file:line: message", in order of first occurrence, with the number of further ones.
+    /// Lines "first file:line: message" in order of first occurrence, each with the number of its repetitions.
     std::vector<std::string> text() const;
     bool empty() const { return entries_.empty(); }
 
@@ -53,17 +53,18 @@ class MessageList {
     std::map<std::string, size_t> index_;
 };
 
-/// Collects named warnings and, if it is asked to, faults: what would end the import, which then goes on as if it had not been.
+/// Collects warnings and, if asked to, faults. A fault would end the import; where it is collected, the import goes on
+/// as if there were none.
 class Diagnostics {
   public:
     explicit Diagnostics(bool strict, bool collects_faults = false) : strict_(strict), collects_faults_(collects_faults) {}
 
-    /// A fault instead when the import is strict.
+    /// Adds a warning; in a strict import it is a fault instead.
     void warn(const Location& where, const std::string& what);
     std::vector<std::string> messages() const { return warnings_.text(); }
 
     bool collects_faults() const { return collects_faults_; }
-    /// Ends the import, or is collected. Faults of one feature and key count as one.
+    /// Ends the import, or collects the fault. Faults of one feature and key count as one.
     void fault(const ImportFailure& failure);
     /// Runs `f`; a fault in it is collected. False if there was one.
     template <typename F>

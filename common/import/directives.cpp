@@ -19,13 +19,13 @@ std::string read_name(Tokenizer* tokens, const Location& where, const std::strin
     return std::string(token.text);
 }
 
-/// Whether lengths change, by as much as pbrt-v4 warns of.
+/// Whether the transformation changes lengths by as much as pbrt-v4 warns of.
 bool has_scale(const Mat4& m) {
     const std::optional<double> scale = similarity_scale(m);
     return !scale || !(std::fabs(*scale * *scale - 1) <= 1e-3);
 }
 
-/// An Option's value: a word, a string or a number.
+/// Reads an Option's value: a word, a string or a number.
 std::string read_value(Tokenizer* tokens, const Location& where) {
     const bool bracketed = tokens->peek().kind == TokenKind::kOpen;
     if (bracketed) tokens->next();
@@ -44,7 +44,7 @@ void Parser::option(Tokenizer* tokens, const Location& where) {
     const size_t space = declaration.find(' ');
     const std::string name = space == std::string::npos ? declaration : declaration.substr(space + 1);
     const std::string shown = "Option " + quoted(declaration);
-    // These steer how pbrt computes, writes or displays, not what the picture converges to.
+    // These options affect how pbrt computes, writes or displays, but not what the picture converges to.
     constexpr std::array<std::string_view, 8> kHarmless{"seed",
                                                         "rendercoordsys",
                                                         "msereferenceimage",
@@ -124,7 +124,7 @@ bool Parser::world_item(Tokenizer* tokens, const std::string& word, const Locati
         note_old_syntax(where, word, kind, {});
         if (kind != "diffuse") fail(where, "AreaLightSource " + quoted(kind) + " is not supported; the only kind is \"diffuse\"");
         ParameterList list = parameters(tokens, where, word, kind, "light");
-        // Now, not when a shape emits: none might.
+        // This is checked now and not when a shape emits, because there may be no such shape.
         list.check(kAreaLightParameters);
         state_.area_light = std::make_shared<AreaLightDefinition>(AreaLightDefinition{std::move(list)});
     } else if (word == "ObjectInstance") {
@@ -161,7 +161,7 @@ void Parser::texture(Tokenizer* tokens, const Location& where) {
         fail(where, "Texture " + quoted(name) + " has the type " + quoted(type) + "; it must be float or spectrum");
     ParameterList list(where, "Texture " + quoted(name) + " of kind " + quoted(kind));
     const bool good = context_->diagnostics.guard([&] { list = ParameterList::parse(tokens, where, list.what()); });
-    if (!good) {  // It exists all the same for those who refer to it.
+    if (!good) {  // The texture exists all the same, so that references to it are no further faults.
         skip_to_directive(tokens);
         kind = "constant";
     }
@@ -199,7 +199,8 @@ void Parser::shape(Tokenizer* tokens, const Location& where) {
         pending.alpha = list.one_float("alpha", 1);
         if (pending.alpha < 0 || pending.alpha > 1) fail(where, list.what() + ": alpha must be between 0 and 1");
     }
-    // Where faults are collected, those of its light and material shall be found, too, though they shine and lie on nothing.
+    // Where faults are collected, those of the shape's light and material are to be found, too, although there is no
+    // geometry for them.
     const bool good = context_->diagnostics.guard([&] {
         const Mat4 to_scene = static_transform(where, list.what());
         // An object has a space of its own, which its instances place.

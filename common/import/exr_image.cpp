@@ -17,7 +17,7 @@
 namespace lightloom::import {
 namespace {
 
-/// Primaries and white, as red x, red y, ... white y.
+/// Chromaticities of primaries and white: red x, red y, ... white y.
 struct NamedPrimaries {
     ExrPrimaries primaries;
     float xy[8];

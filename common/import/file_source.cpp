@@ -33,7 +33,7 @@ Result<std::string> FileSource::normalise(std::string_view reference, size_t lev
                     " leaves the scene's root directory, so a worker could not get it; move the file, or name a "
                     "directory that holds everything with --root");
         } else if (parts.empty() && up > 0 && part == above_[up - 1]) {
-            --up;  // Back down towards the main file.
+            --up;  // Goes back down towards the main file.
         } else if (!part.empty() && part != ".") {
             parts.push_back(part);
         }

@@ -1,8 +1,8 @@
 #pragma once
-// Where the importer's bytes come from. A scene names its files relative to the directory of its main file, or to one above it,
-// as far up as the scene's root, which it may not leave: what a worker receives is exactly that directory's content. pbrt-v4
-// looks below the main file's directory and then below the current one, which is above it where scenes rely on that; going up
-// finds the same files wherever the command is given.
+// Where the importer's bytes come from. A scene names its files relative to the directory of its main file or to one
+// above it, up to the scene's root, which it may not leave: a worker receives exactly that directory's content. pbrt-v4
+// looks below the main file's directory and then below the current one, which for scenes that rely on this is above the
+// main file's. Going up finds the same files wherever the command is given.
 
 #include <cstdint>
 #include <map>
@@ -17,19 +17,19 @@ namespace lightloom::import {
 
 class FileSource {
   public:
-    /// `above`: the names of the main file's directory, of the one above it, and so on, up to below the scene's root. Empty: the
-    /// main file lies directly in the root.
+    /// `above`: the names of the main file's directory, of the one above it, and so on, as far as the one just below
+    /// the scene's root. Empty if the main file lies directly in the root.
     explicit FileSource(std::vector<std::string> above = {}) : above_(std::move(above)) {}
     virtual ~FileSource() = default;
 
-    /// The file that a reference in the scene ("textures/./wood.png") means, as a normalised path relative to the main file's
-    /// directory, which may begin with "..". It is the nearest one, see above; one that does not exist may be named, too. Fails
+    /// The file that a reference in the scene ("textures/./wood.png") means, as a normalised path relative to the main
+    /// file's directory, which may begin with "..". It is the nearest such file, see above; it need not exist. Fails
     /// for an empty or absolute path and for one that leaves the scene's root.
     Result<std::string> resolve(std::string_view reference);
     /// Bytes of the file `name`, which resolve() has given. The message of an error names the file.
     Result<std::string> read(const std::string& name);
 
-    /// How many directories above the main file's references have gone: the root of all that was read.
+    /// How many directories above the main file's the references went: that directory is the root of all that was read.
     size_t levels() const { return levels_; }
     /// Every file read so far, in order of first use, as paths relative to the directory that is levels() above the main file's.
     std::vector<std::string> files() const;
@@ -37,7 +37,8 @@ class FileSource {
   private:
     virtual Result<std::string> read_bytes(const std::string& name) = 0;
     virtual bool exists(const std::string& name) const = 0;
-    /// As from the directory `level` above the main file's; `*highest` is how far up the way led.
+    /// Normalises a reference relative to the directory `level` above the main file's; `*highest` receives how far up
+    /// it went.
     Result<std::string> normalise(std::string_view reference, size_t level, size_t* highest) const;
 
     std::vector<std::string> above_;
@@ -82,7 +83,7 @@ bool has_suffix(std::string_view text, std::string_view suffix);
 /// The file name's extension in lower case without the dot; empty if there is none.
 std::string lower_extension(std::string_view name);
 
-/// Inflates gzip data; the output grows as data are seen and may not exceed `max_bytes`.
+/// Inflates gzip data; the output grows with the data and may not exceed `max_bytes`.
 Result<std::string> inflate_gzip(const std::string& bytes, uint64_t max_bytes);
 
 }  // namespace lightloom::import

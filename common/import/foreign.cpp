@@ -57,7 +57,7 @@ std::string message(const char* what, const char* advice) {
 
 bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
-/// `text` from its first word on that is not in a comment ('#' to the end of the line).
+/// The rest of `text` from its first word outside of comments ('#' to the end of the line).
 string_view first_word_on(string_view text) {
     size_t i = 0;
     while (i < text.size() && (is_space(text[i]) || text[i] == '#')) {
@@ -80,7 +80,7 @@ std::optional<std::string> zip_archive(string_view name) {
     return message("a ZIP archive", "; unpack it and give the .pbrt file");
 }
 
-/// Of text that begins with '<'.
+/// The XML format of text that begins with '<'.
 std::string xml(string_view text) {
     const string_view head = text.substr(0, 4096);
     const auto has = [&](string_view part) { return head.find(part) != string_view::npos; };

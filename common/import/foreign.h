@@ -1,5 +1,5 @@
 #pragma once
-// Files that are no pbrt-v4 scenes although they were given as such.
+// Recognises files that are not pbrt-v4 scenes although they were given as such.
 
 #include <optional>
 #include <string>
@@ -9,18 +9,19 @@
 
 namespace lightloom::import {
 
-/// For contents that another program's format is recognised by: which one, and what to do. Nothing for what may be pbrt's own.
-/// `name` is the file's, whose extension decides between formats that begin alike.
+/// For contents in another program's format: which format it is, and what to do. Nothing for contents that may be
+/// pbrt's. `name` is the file's; its extension decides between formats that begin alike.
 std::optional<std::string> foreign_scene(std::string_view name, std::string_view bytes);
 
-/// Whether `bytes` are what Git leaves in place of a file that it keeps elsewhere (Git LFS).
+/// Whether `bytes` are the pointer that Git LFS leaves in place of a file that is kept elsewhere.
 bool is_lfs_pointer(std::string_view bytes);
 
 /// Whether a directive exists only in pbrt before version 4: by its word ("SurfaceIntegrator"), or by its word and kind
 /// ("Material", "matte"). `kind` may be empty.
 bool is_old_directive(std::string_view word, std::string_view kind);
 
-/// Whether the directive has a parameter that it had only before version 4: LightSource with "mapname", Material with "Kd".
+/// Whether the directive has a parameter that exists only before version 4: LightSource with "mapname", Material with
+/// "Kd".
 bool has_old_parameter(std::string_view word, const ParameterList& parameters);
 
 /// What to do about such a file.

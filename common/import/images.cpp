@@ -11,7 +11,7 @@
 #include "common/import/file_source.h"
 #include "common/import/pfm_image.h"
 
-// The decoder for the small formats; everything that would touch files or allocate without bound is switched off.
+// The decoder for the small formats; everything that would open files or allocate without bound is switched off.
 #define STB_IMAGE_STATIC
 #define STB_IMAGE_IMPLEMENTATION
 #define STBI_ONLY_PNG
@@ -20,8 +20,8 @@
 #define STBI_ONLY_HDR
 #define STBI_NO_STDIO
 #define STBI_MAX_DIMENSIONS 16384
-// Its conversions between 8-bit and floating-point pixels take a power: ours, because libm's depends on the host. (The
-// standard header is included above already, so that only the decoder sees the macro.)
+// Its conversions between 8-bit and floating-point pixels use pow(); it is replaced by ours, because libm's depends on
+// the host. (The standard header is included above already, so that only the decoder sees the macro.)
 #define pow(base, exponent) ::lightloom::math::pow(double(base), double(exponent))
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-function"
@@ -93,10 +93,10 @@ void fill(Image* image, const T* raw, int channels, bool has_alpha, const ImageR
     }
 }
 
-/// To the renderer's primaries. Colours outside of them end at its border at equal luminance.
+/// Converts to the renderer's primaries. Colours outside of the gamut are moved to its border at equal luminance.
 void to_srgb_primaries(ExrPrimaries from, Image* image, bool* clipped) {
     if (from == ExrPrimaries::kRec709) return;
-    // Both have the white D65 (SMPTE EG 432-1, ITU-R BT.2020).
+    // Both spaces have the white D65 (SMPTE EG 432-1, ITU-R BT.2020).
     constexpr double kP3[3][3] = {{1.2249402, -0.2249402, 0.0}, {-0.0420569, 1.0420569, 0.0}, {-0.0196376, -0.0786361, 1.0982736}};
     constexpr double kRec2020[3][3] = {
         {1.6604910, -0.5876411, -0.0728499}, {-0.1245505, 1.1328999, -0.0083494}, {-0.0181508, -0.1005789, 1.1187297}};
@@ -120,8 +120,8 @@ std::vector<float> decoding_table(size_t codes, const ImageRequest& request) {
     return table;
 }
 
-/// Colour type "truecolour with alpha" of a PNG's header, or another format. The alpha that the decoder makes of a palette or
-/// of a transparent colour is none to pbrt-v4.
+/// Whether a PNG's header has the colour type "truecolour with alpha". For pbrt-v4, the alpha that the decoder makes of
+/// a palette or of a transparent colour does not count.
 bool is_rgba_png(const std::string& bytes) {
     constexpr size_t kColourType = 25;
     return bytes.size() > kColourType && bytes.compare(1, 3, "PNG") == 0 && bytes[kColourType] == 6;

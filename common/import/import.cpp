@@ -16,7 +16,7 @@ namespace lightloom {
 namespace import {
 namespace {
 
-/// Calls visit(colour, image) for everything that lights are as strong as; the image, or kNone, multiplies the colour.
+/// Calls visit(colour, image) for the strength of every light; the image, or kNone, multiplies the colour.
 template <typename Visit>
 void for_each_strength(SceneDescription* scene, Visit&& visit) {
     for (AreaEmission& e : scene->emissions) visit(e.radiance, e.image);
@@ -27,8 +27,9 @@ void for_each_strength(SceneDescription* scene, Visit&& visit) {
     for (InfiniteLight& l : scene->infinite_lights) visit(l.radiance, l.image);
 }
 
-/// Sums of samples are kept in steps of 2^-44, and throughputs in single precision: light that is very weak or strong as a whole is
-/// brought to about 1, and the film's exposure takes it back. Powers of two, so that nothing is rounded.
+/// Sums of samples are kept in steps of 2^-44, and throughputs in single precision: if the light as a whole is very
+/// weak or strong, it is scaled to about 1, and the film's exposure reverses that. The factor is a power of two, so
+/// that nothing is rounded.
 void bring_strength_into_range(Context* context) {
     SceneDescription* scene = &context->scene;
     float strongest = 0;
@@ -46,7 +47,7 @@ void bring_strength_into_range(Context* context) {
     scene->film.response.exposure = std::ldexp(scene->film.response.exposure, exponent);
 }
 
-/// Fills the context's scene. Without collected faults it is whole.
+/// Fills the context's scene, which is complete unless faults are collected.
 void read_scene(Context* context, const std::string& name) {
     const Location main{context->intern_file_name(name), 0};
     if (const Status s = check_scene_features(context->options.without); !s.ok()) throw ImportFailure{main, s.message(), {}};
@@ -67,7 +68,7 @@ void read_scene(Context* context, const std::string& name) {
     });
 }
 
-/// What is said of a file in an older syntax, of which an error is only a consequence.
+/// The message for a file in an older syntax, which replaces the errors that follow from it.
 std::string old_syntax(const Context& context) {
     return context.old_syntax->where.text() + ": " + context.old_syntax->what + ": " + kUpgrade;
 }
@@ -115,14 +116,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A scene file on disk: its directory as it was given, its name, and the names of the directories from there up to below the
-/// root.
+/// A scene file on disk: its directory as given, its name, and the names of the directories from there up to the one
+/// below the root.
 struct ScenePlace {
     std::string directory, name;
     std::vector<std::string> above;
 };
 
-/// Directories that `inner` lies below `outer`; negative if it does not.
+/// How many directories `inner` lies below `outer`; negative if it does not.
 int levels_below(const fs::path& inner, const fs::path& outer) {
     const auto [rest, end] = std::mismatch(inner.begin(), inner.end(), outer.begin(), outer.end());
     return end == outer.end() ? int(std::distance(rest, inner.end())) : -1;
@@ -151,7 +152,7 @@ Result<ScenePlace> place_of(const std::string& path, const ImportOptions& option
     return place;
 }
 
-/// The directory that is so many levels above the given one.
+/// The directory `levels` above the given one.
 std::string parent_of(const std::string& directory, size_t levels) {
     if (levels == 0) return directory;
     std::error_code error;

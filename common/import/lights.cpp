@@ -1,5 +1,5 @@
-// Light sources. In pbrt-v4 a light is its colour times `scale`; `power` (or `illuminance`) then replaces the
-// magnitude: it is the luminous flux (illuminance) that the light has for a colour of luminance 1, so an rgb colour
+// Light sources. In pbrt-v4 a light's strength is its colour times `scale`; `power` (or `illuminance`) then replaces
+// the magnitude: it is the luminous flux (illuminance) that the light has for a colour of luminance 1, so an rgb colour
 // still multiplies it.
 
 #include <cmath>
@@ -47,7 +47,7 @@ float light_scale(const ParameterList& p) {
     return scale;
 }
 
-/// The value of "power" or "illuminance" if it is in force (pbrt: if positive); 0 otherwise.
+/// The value of "power" or "illuminance" if it is used (pbrt: if it is positive); 0 otherwise.
 double magnitude(const ParameterList& p, std::string_view name) { return double(std::fmax(p.one_float(name, -1), 0.0f)); }
 
 Rgb checked(const ParameterList& p, const Rgb& colour, double factor) {
@@ -86,7 +86,7 @@ void point_light(Context* context, const ParameterList& p, const Mat4& m) {
 
 void spot_light(Context* context, const ParameterList& p, const Mat4& m) {
     const float cone = p.one_float("coneangle", 30), delta = p.one_float("conedeltaangle", 5);
-    // Below this, directions in single precision do not tell the axis from the rim.
+    // Below this, single precision cannot tell directions of the axis and of the rim apart.
     constexpr float kNarrowest = 0.01f;
     if (!(cone >= kNarrowest) || !(cone <= 180) || !(delta >= 0) || !(delta <= cone))
         fail(p.where(), p.what() + ": coneangle must lie in [0.01, 180] degrees and conedeltaangle between 0 and it");
@@ -113,7 +113,7 @@ void spot_light(Context* context, const ParameterList& p, const Mat4& m) {
     context->scene.spot_lights.push_back(light);
 }
 
-/// What the lights have in common whose intensity an image gives.
+/// The common part of the lights whose intensity an image gives.
 ImageLight image_light(Context* context, const ParameterList& p, const Mat4& m) {
     if (!similarity_scale(m)) fail(p.where(), p.what() + ": its transformation must be a rotation, reflection or uniform scale");
     const std::string reference = p.one_string("filename", "");
@@ -139,7 +139,7 @@ void projection_light(Context* context, const ParameterList& p, const Mat4& m) {
     const Image& image = context->scene.images[size_t(light.image)];
     const float fov = p.one_float("fov", 90);
     if (!(fov >= 0.01f) || !(fov <= 179)) fail(p.where(), p.what() + ": fov must lie between 0.01 and 179 degrees");
-    // fov is that of the shorter side.
+    // fov is the angle of the shorter side.
     const double half = math::tan(double(fov) * (kPiD / 360)), shorter = std::min(image.width, image.height);
     const double half_width = half * image.width / shorter, half_height = half * image.height / shorter;
     light.half_width = float(half_width), light.half_height = float(half_height);
@@ -174,10 +174,10 @@ void distant_light(Context* context, const ParameterList& p, const Mat4& m) {
         {unit_vector(p, m, from, to), checked(p, light_colour(context, p, "L"), scale), p.where().text()});
 }
 
-/// What "illuminance" normalises: the light's own xy plane lit by the upper half of the map. pbrt-v4 counts every pixel
-/// with 2 pi / n, half of its true solid angle, and weighs the first three channels of an EXR file as red, green and
-/// blue, which by name they are not (B, G, R or A, B, G); so do we, or a scene would look half as bright here, or have another
-/// exposure.
+/// The illuminance that "illuminance" normalises: on the light's own xy plane, lit by the upper half of the map.
+/// pbrt-v4 counts every pixel with 2 pi / n, half of its true solid angle, and weighs the first three channels of an
+/// EXR file as red, green and blue, although by name they are B, G, R or A, B, G. We do the same, because otherwise a
+/// scene would be half as bright here or have another exposure.
 template <typename Luminance>
 double illuminance_of(int width, int height, Luminance luminance) {
     double sum = 0;
@@ -272,7 +272,7 @@ AreaEmission area_emission(Context* context, const AreaLightDefinition& definiti
         if (!(luminance > 0)) fail(p.where(), p.what() + ": the image is black, so power cannot scale it");
         scale *= power / ((emission.two_sided ? 2 : 1) * kPiD * area * luminance);
     }
-    if (luminance == 0) scale = 0;  // A black image makes no light.
+    if (luminance == 0) scale = 0;  // A black image gives no light.
     emission.radiance = checked(p, colour, scale);
     p.finish();
     return emission;

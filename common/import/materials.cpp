@@ -12,7 +12,8 @@ namespace lightloom::import {
 namespace {
 
 constexpr int kMaxMixDepth = 32;
-/// Of pbrt's random walk between the layers: far more than any walk has, and few enough to count one by one.
+/// Bound of the events of pbrt's random walk between the layers: no walk has nearly as many, and they can still be
+/// counted one by one.
 constexpr int kMaxLayerEvents = 10000;
 
 TextureId spectrum_or(Context* context, const ParameterList& p, std::string_view name, float fallback) {
@@ -20,9 +21,9 @@ TextureId spectrum_or(Context* context, const ParameterList& p, std::string_view
     return id == kNone ? constant_texture(context, Rgb(fallback)) : id;
 }
 
-/// Parameter `name`, whether or not it is remapped to an alpha; kNone if absent. A number outside of [0, 1] that the file gives is
-/// an error. What a texture makes of numbers or pixels may be: above 1 it scatters as in pbrt-v4, but no coat lets through less
-/// light for it (its tables end at 1); below 0, where pbrt computes with what is no number, it is smooth.
+/// Parameter `name`, whether or not it is remapped to an alpha; kNone if absent. A number outside of [0, 1] in the file
+/// is an error. A texture may give any value: above 1 it scatters as in pbrt-v4, except that a coat lets through as
+/// much light as at 1, where its tables end; below 0, where pbrt computes with NaN, the surface is smooth.
 TextureId roughness_parameter(Context* context, const ParameterList& p, const std::string& name) {
     const TextureId id = float_texture_parameter(context, p, name);
     if (id == kNone) return kNone;
@@ -43,7 +44,7 @@ TextureId roughness_parameter(Context* context, const ParameterList& p, const st
     return id;
 }
 
-/// `prefix`roughness, `prefix`uroughness and `prefix`vroughness.
+/// Reads `prefix`roughness, `prefix`uroughness and `prefix`vroughness.
 void read_roughness(Context* context, const ParameterList& p, const std::string& prefix, float fallback, TextureId* u,
                     TextureId* v) {
     TextureId both = roughness_parameter(context, p, prefix + "roughness");
@@ -54,7 +55,7 @@ void read_roughness(Context* context, const ParameterList& p, const std::string&
     if (*v == kNone) *v = both;
 }
 
-/// An index of refraction as float, named glass, or spectrum; positive.
+/// Reads an index of refraction given as float, named glass, or spectrum; it must be positive.
 float read_index(Context* context, const ParameterList& p, std::string_view name) {
     float index = p.one_float(name, 1.5f);
     if (const Parameter* s = p.find("spectrum", name)) {
@@ -68,7 +69,7 @@ float read_index(Context* context, const ParameterList& p, std::string_view name
     return index;
 }
 
-/// The reflectance or eta and k of a conductor; `prefix` is "" or "conductor.".
+/// Reads the reflectance, or eta and k, of a conductor; `prefix` is "" or "conductor.".
 void read_conductor(Context* context, const ParameterList& p, const std::string& prefix, Material* m) {
     m->reflectance = spectrum_texture_parameter(context, p, "reflectance", TextureUse::kReflectance);
     const std::string eta_name = prefix + "eta", k_name = prefix + "k";
@@ -81,7 +82,7 @@ void read_conductor(Context* context, const ParameterList& p, const std::string&
     }
     const Parameter *eta = p.find("spectrum", eta_name), *k = p.find("spectrum", k_name);
     const auto is_named = [](const Parameter* s) { return s && s->strings.size() == 1 && named_index(s->strings[0]); };
-    // A metal's eta and k are reduced together, see spectra.h; those of a name have been.
+    // A metal's eta and k are reduced together, see spectra.h; for named metals this has been done.
     if (eta && k && !is_named(eta) && !is_named(k)) {
         const ConductorRgb both = conductor_rgb(*spectrum_parameter(context, p, eta_name), *spectrum_parameter(context, p, k_name));
         m->eta = constant_texture(context, both.eta);
@@ -89,8 +90,8 @@ void read_conductor(Context* context, const ParameterList& p, const std::string&
     }
     if (m->eta == kNone) m->eta = spectrum_texture_parameter(context, p, eta_name, TextureUse::kUnbounded);
     if (m->k == kNone) m->k = spectrum_texture_parameter(context, p, k_name, TextureUse::kUnbounded);
-    // pbrt's default is copper for either. One of the wrong type is finish()'s to report, or no more than an Attribute's default
-    // that suits another kind of material.
+    // pbrt's default is copper for either. A parameter of the wrong type is reported by finish(), unless it is an
+    // Attribute's default, which may suit another kind of material.
     if (m->eta == kNone) m->eta = constant_texture(context, named_metal("metal-Cu")->eta);
     if (m->k == kNone) m->k = constant_texture(context, named_metal("metal-Cu")->k);
 }
@@ -227,7 +228,7 @@ MaterialId make_material(Context* context, const std::string& name, const Defini
         m.kind = MaterialKind::kMix;
         read_mix(context, p, &m);
         constexpr const char* kElsewhere = "a mix is one of its materials at every point; give it to those";
-        p.ignore(&context->diagnostics, "normalmap", kElsewhere);  // as pbrt does, which refuses the other
+        p.ignore(&context->diagnostics, "normalmap", kElsewhere);  // pbrt ignores it, too, and refuses displacement
         p.refuse("displacement", kElsewhere);
     } else {
         fail(p.where(), p.what() + ": the material " + quoted(kind) +
@@ -243,7 +244,7 @@ MaterialId make_material(Context* context, const std::string& name, const Defini
     return id;
 }
 
-/// Where faults are collected, one that cannot be made is replaced by a diffuse one.
+/// Where faults are collected, a material that cannot be made is replaced by a diffuse one.
 MaterialId make_or_stand_in(Context* context, const std::string& name, const Definition& definition) {
     const auto stand_in = [&] {
         Material m;

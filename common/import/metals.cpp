@@ -17,7 +17,7 @@ std::optional<ConductorRgb> named_metal(const std::string& name) {
         {"metal-Al", {{1.2147f, 0.9207f, 0.6293f}, {7.1452f, 6.5747f, 5.5375f}}},
         {"metal-Au", {{0.2826f, 0.4793f, 1.4353f}, {106.31f, 2.5735f, 1.6769f}}},
         {"metal-Cu", {{0.4311f, 0.9639f, 1.1625f}, {6.0454f, 2.6043f, 2.3220f}}},
-        // Brass: its indices near 620, 540 and 460 nm.
+        // Brass has its indices near 620, 540 and 460 nm.
         {"metal-CuZn", {{0.4450f, 0.5682f, 0.9470f}, {3.5220f, 2.5880f, 1.9200f}}},
         {"metal-MgO", {{1.7371f, 1.7417f, 1.7522f}, {0.0000f, 0.0000f, 0.0413f}}},
         {"metal-TiO2", {{2.9095f, 2.9711f, 3.1602f}, {0.0001f, 0.0000f, 0.2692f}}},

@@ -10,7 +10,7 @@
 namespace lightloom::import {
 namespace {
 
-// What some kind of shape, light, material or texture asks for: an Attribute directive may set nothing else.
+// All parameters that some kind of shape, light, material or texture has; an Attribute directive may set no others.
 constexpr std::string_view kShapeParameters[] = {"float alpha",
                                                  "texture alpha",
                                                  "float radius",
@@ -125,7 +125,7 @@ double read_number(Tokenizer* tokens, const Location& where, const std::string& 
     return value;
 }
 
-/// `count` numbers, with or without brackets.
+/// Reads `count` numbers, with or without brackets.
 std::vector<double> read_numbers(Tokenizer* tokens, const Location& where, const std::string& word, int count) {
     const bool bracketed = tokens->peek().kind == TokenKind::kOpen;
     if (bracketed) tokens->next();
@@ -147,7 +147,7 @@ Mat4 read_matrix(Tokenizer* tokens, const Location& where, const std::string& wo
 
 Vec3 vec3(const std::vector<double>& v, size_t first) { return {float(v[first]), float(v[first + 1]), float(v[first + 2])}; }
 
-/// What a scope's directives begin with.
+/// The word that a scope's directives begin with.
 std::string scope_name(char kind) { return kind == 'a' ? "Attribute" : kind == 't' ? "Transform" : "Object"; }
 
 }  // namespace
@@ -199,13 +199,13 @@ std::string Parser::read_text(const std::string& name, const Location& from) {
         if (!inflated.ok()) fail(from, quoted(name) + ": " + inflated.status().message());
         text = std::move(inflated).value();
     } else if (has_suffix(name, ".gz")) {
-        fail(from, quoted(name) + " is not compressed by gzip, although it is named so");
+        fail(from, quoted(name) + " is not compressed by gzip, although its name says so");
     }
     const Location itself{context_->intern_file_name(name), 0};
     if (is_lfs_pointer(text))
         fail(itself, "this is a pointer that Git LFS left in place of the file; fetch the file with `git lfs pull`");
     if (const std::optional<std::string> foreign = foreign_scene(name, text)) fail(itself, *foreign);
-    // Files that include each other several times multiply on every level.
+    // Text is counted per inclusion, because files that include each other several times multiply on every level.
     text_bytes_ += text.size();
     if (text_bytes_ > limit)
         fail(from, "the scene's text, with every file as often as it is included, has more than " + std::to_string(limit) +
@@ -214,14 +214,14 @@ std::string Parser::read_text(const std::string& name, const Location& from) {
 }
 
 void Parser::skip_to_directive(Tokenizer* tokens) {
-    // Directives are words that begin with a capital; of values only the names of what is no number do.
+    // Directives are words that begin with a capital; the only values that do so are the names of NaN and infinity.
     const auto begins_directive = [](const Token& token) {
         if (token.kind != TokenKind::kWord || token.text.empty()) return false;
         const bool is_value = token.text == "NaN" || token.text == "Inf" || token.text == "Infinity";
         return token.text[0] >= 'A' && token.text[0] <= 'Z' && !is_value;
     };
     for (bool found = false; !found;)
-        // What cannot be read as a token is part of the same fault.
+        // Text that cannot be read as a token is part of the same fault.
         try {
             found = tokens->peek().kind == TokenKind::kEnd || begins_directive(tokens->peek());
             if (!found) tokens->next();
@@ -240,9 +240,9 @@ void Parser::directive(Tokenizer* tokens, const Token& token) {
     fail(token.where, "unknown directive " + quoted(word) + "; remove it or correct its name");
 }
 
-/// Vertices are kept in single precision, which 100 km from the origin knows steps of 8 mm. Scenes that transformations put there
-/// are moved back by what the camera's position has in whole units, before anything is rounded; numbers that are so large in the
-/// file itself are read in single precision, as pbrt reads them.
+/// Vertices are kept in single precision, which 100 km from the origin has steps of 8 mm. Scenes that transformations
+/// put there are moved back by the camera's position in whole units before anything is rounded; numbers that are so
+/// large in the file itself are read in single precision, as pbrt reads them.
 void Parser::begin_world() {
     in_world_ = true;
     Mat4& camera_to_world = context_->scene.camera.camera_to_world;
@@ -306,7 +306,7 @@ bool Parser::transformation(Tokenizer* tokens, const std::string& word, const Lo
     } else if (word == "ActiveTransform") {
         active_transform(tokens, where);
     } else if (word == "TransformTimes") {
-        read_numbers(tokens, where, word, 2);  // Matters only for moving things, which are refused where they are used.
+        read_numbers(tokens, where, word, 2);  // This matters only for moving things, which are refused where used.
     } else if (word == "ReverseOrientation") {
         state_.reverse_orientation = !state_.reverse_orientation;
     } else {
@@ -339,7 +339,7 @@ void Parser::transform(const Location& where, const std::function<Mat4(const Mat
 const Mat4& Parser::static_transform(const Location& where, const std::string& what) {
     const TransformFault& fault = state_.fault[0];
     if (!fault.why.empty())
-        fail(where, what + " cannot be placed with the transformation as it is since " + fault.where.text() + ": " + fault.why +
+        fail(where, what + " cannot be placed with the transformation in force since " + fault.where.text() + ": " + fault.why +
                         "; correct its numbers");
     if (!(state_.ctm[0] == state_.ctm[1]))
         context_->unsupported(where, "motion", what + " moves while the shutter is open (ActiveTransform); motion");
@@ -416,7 +416,7 @@ void Parser::include(Tokenizer* tokens, const Location& where) {
 
 void Parser::import(Tokenizer* tokens, const Location& where) {
     require_world(where, "Import", true);
-    // Unlike Include, what the file does to the graphics state ends with it.
+    // Unlike with Include, changes that the file makes to the graphics state end with it.
     const GraphicsState state = state_;
     const auto coordinate_systems = coordinate_systems_;
     const size_t outer = std::exchange(outer_scopes_, scopes_.size());
@@ -449,7 +449,7 @@ void Parser::attribute(Tokenizer* tokens, const Location& where) {
 void Parser::require_world(const Location& where, const std::string& word, bool wanted) {
     if (in_world_ == wanted) return;
     context_->diagnostics.fault({where, word + (wanted ? " must come after WorldBegin" : " must come before WorldBegin"), {}});
-    in_world_ = true;  // Said once.
+    in_world_ = true;  // so that this is reported once
 }
 
 ParameterList Parser::parameters(Tokenizer* tokens, const Location& where, const std::string& word, const std::string& kind,

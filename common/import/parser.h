@@ -20,14 +20,15 @@ class Parser {
 
   private:
     static constexpr size_t kMaxIncludeDepth = 64;
-    /// Each takes some microseconds. Text is limited, too; but files without any multiply by including one another.
+    /// Each inclusion takes some microseconds. The amount of text is limited, too, but files without any text can
+    /// multiply by including one another.
     static constexpr int kMaxIncludes = 10'000'000;
     static constexpr size_t kMaxScopeDepth = 1024;
 
-    /// Why a transformation cannot be undone: things may not be placed with it, but a file may set it and place nothing.
+    /// Why a transformation cannot be undone: nothing may be placed with it, but a file may set it and place nothing.
     struct TransformFault {
         Location where;
-        std::string why;  ///< Empty: it can.
+        std::string why;  ///< Empty if it can be undone.
     };
 
     struct GraphicsState {
@@ -45,7 +46,7 @@ class Parser {
         Location where;
     };
 
-    /// Its object may be defined further down.
+    /// An instance whose object may be defined further down in the file.
     struct PendingInstance {
         std::string object;
         Mat4 object_to_world;
@@ -55,7 +56,7 @@ class Parser {
     void parse_file(const std::string& name, const Location& from);
     /// The file's text, inflated if it is compressed. Fails for one of another format.
     std::string read_text(const std::string& name, const Location& from);
-    /// After a fault: to the next word that begins a directive.
+    /// After a fault, skips to the next word that begins a directive.
     void skip_to_directive(Tokenizer* tokens);
     void directive(Tokenizer* tokens, const Token& token);
     bool transformation(Tokenizer* tokens, const std::string& word, const Location& where);
@@ -77,15 +78,16 @@ class Parser {
     void shape(Tokenizer* tokens, const Location& where);
     void medium_interface(Tokenizer* tokens, const Location& where);
 
-    /// "Word "kind" parameters" with the defaults of Attribute `target` (may be empty) added.
+    /// Reads the parameters of a directive and adds the defaults of Attribute `target` (may be empty).
     ParameterList parameters(Tokenizer* tokens, const Location& where, const std::string& word, const std::string& kind,
                              const std::string& target);
-    /// Deals with what features.h lists in a directive; `word` is "Material" for MakeNamedMaterial, too. True if nothing is left of
-    /// it.
+    /// Leaves out the features of a directive (features.h) that the options name; `word` is "Material" for
+    /// MakeNamedMaterial, too. True if nothing is left of the directive.
     bool leave_out(const std::string& word, std::string* kind, ParameterList* list);
     /// Remembers the first directive of pbrt before version 4.
     void note_old_syntax(const Location& where, const std::string& word, const std::string& kind, const ParameterList& list);
-    /// Applies `f` to the transformations that ActiveTransform selects. `why` says what is wrong with one that `f` makes singular.
+    /// Applies `f` to the transformations that ActiveTransform selects. `why` explains a transformation that `f` makes
+    /// singular.
     void transform(const Location& where, const std::function<Mat4(const Mat4&)>& f, std::string_view why = {});
     /// The transformation of a shape, light, instance or camera; fails if it moves or cannot be undone.
     const Mat4& static_transform(const Location& where, const std::string& what);
@@ -94,13 +96,13 @@ class Parser {
     Context* context_;
     GraphicsState state_;
     std::vector<Scope> scopes_;
-    size_t outer_scopes_ = 0;  ///< Those of them that the file being imported may not close.
+    size_t outer_scopes_ = 0;  ///< Number of scopes that the file being imported may not close.
     struct CoordinateSystem {
         Mat4 ctm[2];
         TransformFault fault[2];
     };
     void begin_world();
-    /// From the file's world space to the scene's, whose origin lies near the camera where the camera is far away; see
+    /// Maps the file's world space to the scene's, whose origin lies near the camera where the camera is far away; see
     /// begin_world().
     Mat4 world_;
     std::map<std::string, CoordinateSystem> coordinate_systems_;
@@ -108,9 +110,9 @@ class Parser {
     std::vector<PendingInstance> instances_;
     std::map<std::string, bool> media_;
     int32_t current_object_ = kNone;
-    std::vector<std::string> open_files_;  ///< The one being read and those that include it, outermost first.
+    std::vector<std::string> open_files_;  ///< The file that is being read and those that include it, outermost first.
     int include_count_ = 0;
-    uint64_t text_bytes_ = 0;  ///< Of all files, as often as they are included.
+    uint64_t text_bytes_ = 0;  ///< Bytes of all files, as often as they are included.
     bool in_world_ = false;
 };
 

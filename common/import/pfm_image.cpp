@@ -15,7 +15,7 @@ namespace {
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
-/// The words of the header. One blank ends a word; `pos` is left on it.
+/// Reads the words of the header. One blank ends a word; `pos` is left on it.
 struct Header {
     std::string_view text;
     size_t pos = 0;
@@ -27,7 +27,7 @@ struct Header {
             else
                 ++pos;
         }
-        constexpr size_t kLongest = 64;  // What is no PFM need not have a blank anywhere.
+        constexpr size_t kLongest = 64;  // Other kinds of files need not have a blank anywhere.
         const size_t begin = pos;
         while (pos < text.size() && pos - begin < kLongest && !is_blank(text[pos]) && text[pos] != '#') ++pos;
         return text.substr(begin, pos - begin);
@@ -58,23 +58,24 @@ Result<PfmPixels> read_pfm(const std::string& bytes, std::string* warning) {
     uint64_t width = 0, height = 0;
     if (!parse_side(width_word, &width) || !parse_side(height_word, &height))
         return data_loss("the PFM header has " + quoted(width_word) + " and " + quoted(height_word) +
-                         " where its width and height should stand");
+                         " in place of its width and height");
     double scale = 0;
     if (!parse_number(scale_word, &scale) || float(scale) == 0)
         return data_loss("the PFM header has " + quoted(scale_word) +
-                         " where its scale should stand, a number that is not 0 (negative for little-endian)");
+                         " in place of its scale, a number that is not 0 (negative for little-endian)");
     const uint64_t channels = magic == "PF" ? 3 : 1;
     LL_RETURN_IF_ERROR(check_image_size(width, height, channels, bytes.size()));
 
     const uint64_t size = width * height * channels * sizeof(float);
     uint64_t begin = header.pos;
     if (begin < bytes.size()) ++begin;
-    // A line may end in two characters. The second might also be the first of the pixels, which the file's size tells.
+    // A line may end in two characters. The second might also be the first byte of the pixels; the file's size tells
+    // which.
     if (begin < bytes.size() && bytes[begin - 1] == '\r' && bytes[begin] == '\n' && bytes.size() - begin > size) ++begin;
     const uint64_t present = bytes.size() - begin;
     if (present < size)
         return data_loss("the PFM image is cut short: " + std::to_string(width) + " x " + std::to_string(height) + " pixels need " +
-                         std::to_string(size) + " bytes behind the header, and " + std::to_string(present) + " are there");
+                         std::to_string(size) + " bytes after the header, and " + std::to_string(present) + " are there");
     if (present > size) *warning = "the last " + std::to_string(present - size) + " bytes, behind the pixels, are ignored";
 
     PfmPixels out;

@@ -14,9 +14,9 @@ struct PfmPixels {
     std::vector<float> values;  ///< Row 0 at the top, although files begin with the bottom row.
 };
 
-/// Decodes a PFM. The header's scale gives the byte order by its sign (negative: little-endian) and multiplies the values by
-/// its magnitude, as in pbrt-v4. Comments ('#' to the end of the line) and blanks may stand wherever the header has one.
-/// `*warning` tells of bytes behind the pixels. The message does not name the file.
+/// Decodes a PFM. The header's scale gives the byte order by its sign (negative: little-endian) and multiplies the
+/// values by its magnitude, as in pbrt-v4. Comments ('#' to the end of the line) and blanks may stand wherever the
+/// header has a blank. `*warning` tells of bytes behind the pixels. The message does not name the file.
 Result<PfmPixels> read_pfm(const std::string& bytes, std::string* warning);
 
 }  // namespace lightloom::import

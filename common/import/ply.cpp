@@ -64,7 +64,7 @@ std::optional<Scalar> scalar_type(std::string_view name) {
     return std::nullopt;
 }
 
-/// Says what the properties of the vertices are for. Of several pairs of (u, v) pbrt takes the first in this order.
+/// Assigns a purpose to the properties of vertices. Of several pairs of (u, v) pbrt takes the first in this order.
 void set_vertex_slots(Element* vertex) {
     constexpr std::array<std::pair<std::string_view, VertexValue>, 6> kGeometry{
         {{"x", kX}, {"y", kY}, {"z", kZ}, {"nx", kNx}, {"ny", kNy}, {"nz", kNz}}};
@@ -117,7 +117,7 @@ class Reader {
     Status strips(const Element& element, PlyMesh* mesh);
     Status start_index_list(const Element& element, PlyMesh* mesh) const;
     bool is_vertex(double number) const { return number >= 0 && number < double(vertex_count_) && number == std::floor(number); }
-    /// Of face or strip `i`.
+    /// The error for a bad index in face or strip `i`.
     Status bad_index(const Element& element, uint64_t i) const;
     Status skip(const Element& element);
     bool value(Scalar type, double* out);
@@ -136,7 +136,7 @@ class Reader {
     bool have_format_ = false;
     char line_end_ = '\n';
     std::vector<Element> elements_;
-    uint64_t vertex_count_ = 0;  ///< As the header says: faces may come first.
+    uint64_t vertex_count_ = 0;  ///< From the header, because faces may come first.
 };
 
 Status Reader::header_line(const std::vector<std::string_view>& words) {
@@ -175,7 +175,7 @@ Status Reader::header_line(const std::vector<std::string_view>& words) {
         if (!type) return invalid_argument("unknown type " + quoted(std::string(words[p.is_list ? 3 : 1])) + " of a PLY property");
         if (!count_type || *count_type >= Scalar::kFloat)
             return invalid_argument("the count of a PLY list has the type " + quoted(std::string(words[2])) +
-                                    ", which is not one of integers");
+                                    ", which is not an integer type");
         p.type = *type;
         p.count_type = *count_type;
         p.name = words.back();
@@ -188,7 +188,7 @@ Status Reader::header_line(const std::vector<std::string_view>& words) {
     return invalid_argument("unknown PLY header line " + quoted(std::string(key)));
 }
 
-/// The next line without its end; nothing if there is none.
+/// Returns the next line without its end; nothing if there is none.
 std::optional<std::string_view> Reader::next_header_line() {
     if (pos_ >= bytes_.size()) return std::nullopt;
     const size_t begin = pos_, end = std::min(bytes_.find(line_end_, begin), bytes_.size());
@@ -224,7 +224,8 @@ Status Reader::header() {
     return check_claims();
 }
 
-/// Every record of an element takes at least so many bytes, so a count that the rest of the file cannot hold is a lie.
+/// Checks the header's counts: every record of an element takes a minimum of bytes, so that a count for which the rest
+/// of the file is too short is false.
 Status Reader::check_claims() const {
     uint64_t left = bytes_.size() - pos_;
     for (const Element& element : elements_) {
@@ -279,7 +280,7 @@ bool Reader::value(Scalar type, double* out) {
     const char* begin = bytes_.data() + pos_;
     const auto [end, error] = std::from_chars(begin, bytes_.data() + bytes_.size(), *out);
     if (error == std::errc::result_out_of_range) {
-        // Too small to matter, or too large for anything here.
+        // The number is too small to matter, or too large to be used.
         const std::string_view text(begin, size_t(end - begin));
         *out = text.find("e-") != text.npos || text.find("E-") != text.npos ? 0.0 : double(INFINITY);
     } else if (error != std::errc()) {
@@ -362,7 +363,7 @@ Status Reader::bad_index(const Element& element, uint64_t i) const {
 Status Reader::faces(const Element& element, PlyMesh* mesh) {
     LL_RETURN_IF_ERROR(start_index_list(element, mesh));
     mesh->indices.reserve(element.count * 3);
-    uint32_t face = 0;  // Number of those that are kept.
+    uint32_t face = 0;  // number of faces that are kept
     for (uint64_t i = 0; i < element.count; ++i)
         for (const Property& p : element.properties) {
             const size_t begin = pos_;
@@ -395,7 +396,8 @@ Status Reader::faces(const Element& element, PlyMesh* mesh) {
     return {};
 }
 
-/// Every vertex but two makes a triangle with the two before it, every other one turned round; a negative number starts anew.
+/// Every vertex after the first two makes a triangle with the two before it; every other triangle is turned round. A
+/// negative number starts anew.
 Status Reader::strips(const Element& element, PlyMesh* mesh) {
     LL_RETURN_IF_ERROR(start_index_list(element, mesh));
     for (uint64_t i = 0; i < element.count; ++i)
@@ -440,7 +442,7 @@ Status Reader::skip(const Element& element) {
 Status Reader::read(PlyMesh* mesh) {
     LL_RETURN_IF_ERROR(header());
     if (vertex_count_ > UINT32_MAX) return invalid_argument("the PLY mesh has more than 2^32 vertices");
-    // Strips are an older way to write faces: of files that have both, only the faces are read.
+    // Strips are an older way to write faces: if a file has both, only the faces are read.
     const bool has_faces =
         std::any_of(elements_.begin(), elements_.end(), [](const Element& e) { return e.name == "face" && e.count > 0; });
     const std::string_view index_element = has_faces ? "face" : "tristrips";

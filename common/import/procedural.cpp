@@ -1,4 +1,4 @@
-// Textures that are computed: checkerboards, dots and what is made of noise; and the mappings of 2D textures.
+// Textures that are computed: checkerboards, dots and noise; and the mappings of 2D textures.
 
 #include <cmath>
 
@@ -8,12 +8,12 @@
 namespace lightloom::import {
 namespace {
 
-/// Octaves whose frequency leaves a place in the texture a fraction at all in single precision, with room to spare.
+/// Most octaves: with higher frequencies single precision would leave a position in the texture no fraction.
 constexpr int kMaxOctaves = 32;
-/// Amplitudes grow with it; to the power of kMaxOctaves it is far from the end of single precision.
+/// Amplitudes grow with the roughness; its power kMaxOctaves stays well within single precision.
 constexpr float kMaxRoughness = 4;
 
-/// World space to the space of a texture.
+/// Maps world space to the space of a texture.
 Mat4 world_to_texture(const Definition& definition) {
     const ParameterList& parameters = definition.parameters;
     if (definition.moves)
@@ -32,8 +32,8 @@ int32_t add_space(Context* context, const Mat4& space) {
     return it->second;
 }
 
-/// The space whose first two coordinates are pbrt's planar (s, t): the products of the place with v1 and v2, plus udelta and
-/// vdelta.
+/// The space whose first two coordinates are pbrt's planar (s, t): the products of the position with v1 and v2, plus
+/// udelta and vdelta.
 Mat4 planar_space(const ParameterList& parameters, const Mat4& m) {
     const auto axis = [&](std::string_view name, const std::array<double, 3>& fallback) {
         const std::vector<double>* v = parameters.numbers("vector3", name, 3);
@@ -142,7 +142,7 @@ TextureRange noise_range(const TextureNode& node) {
     if (node.kind == TextureKind::kWrinkled) return {0.199 * last, bound + 0.201 * last};
     constexpr double kWindy = double(kNoiseBound) * 1.75 * double(kNoiseBound) * 1.96875;  // 3 and 6 octaves of 1, 1/2, 1/4 ...
     if (node.kind == TextureKind::kWindy) return {-kWindy, kWindy};
-    return {};  // A colour, which nothing asks about.
+    return {};  // The range of a colour is never needed.
 }
 
 double noise_cost(const TextureNode& node) {

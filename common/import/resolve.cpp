@@ -49,7 +49,7 @@ TriangleMesh subset(const TriangleMesh& mesh, const std::vector<size_t>& triangl
 }
 
 /// As in pbrt, every triangle, disk, sphere and patch (also a PLY quadrilateral) is a light of its own with the given
-/// power, which the triangles that stand for it share by area; those of equal radiance stay together.
+/// power, which its triangles share by area; lights of equal radiance stay together.
 void add_powered_mesh(Context* context, TriangleMesh&& mesh, const PendingShape& shape, bool hidden) {
     const size_t triangles_in_all = mesh.indices.size() / 3;
     const auto face_of = [&](size_t triangle) { return shape.faces.empty() ? triangle : shape.faces[triangle]; };
@@ -69,7 +69,7 @@ void add_powered_mesh(Context* context, TriangleMesh&& mesh, const PendingShape&
         meshes.push_back(std::move(part));
     };
     for (const auto& [area, triangles] : by_area) {
-        if (triangles.size() == triangles_in_all) return add_part(std::move(mesh), area);  // There is no other part.
+        if (triangles.size() == triangles_in_all) return add_part(std::move(mesh), area);  // the whole mesh
         add_part(subset(mesh, triangles), area);
     }
 }
@@ -96,7 +96,7 @@ void add_shape(Context* context, PendingShape shape) {
         attributes.alpha = constant_texture(context, Rgb(shape.alpha));
     bool hidden = false;
     if (shape.area_light) {
-        // As in pbrt-v4: where alpha is 0 everywhere, no ray meets the shape, and all of it is a light nevertheless.
+        // As in pbrt-v4, where alpha is 0 everywhere, no ray meets the shape, but all of it emits.
         hidden = attributes.alpha != kNone && is_zero(scene.textures[size_t(attributes.alpha)]);
         if (hidden) attributes.alpha = kNone;
         if (attributes.alpha != kNone)
@@ -112,7 +112,7 @@ void add_shape(Context* context, PendingShape shape) {
         const double area = sphere ? 4 * kPiD * double(sphere->radius) * sphere->radius : 0;
         const AreaEmission emission = area_emission(context, *shape.area_light, area);
         if (!emission.radiance.is_black()) attributes.emission = add_emission(context, emission);
-        if (hidden && attributes.emission == kNone) return;  // Neither seen nor shining.
+        if (hidden && attributes.emission == kNone) return;  // It is neither visible nor does it emit.
     }
     if (mesh)
         (object ? object->meshes : hidden ? scene.hidden_meshes : scene.meshes).push_back(std::move(*mesh));

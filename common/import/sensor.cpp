@@ -1,9 +1,10 @@
 // The sensor of a film: what remains of it in RGB.
 //
-// pbrt-v4 integrates spectra over the sensor's three curves, maps the triples to XYZ by a matrix that was fitted to the colours of
-// a chart, and so balances white: a chart under the daylight of `whitebalance` comes out as under the white of the output's colour
-// space. Light here is RGB already, so a sensor sees as the CIE 1931 observer does, and only the balance is left: the
-// Bradford transformation from that daylight to D65, which is all that pbrt-v4 does for its sensor "cie1931" as well.
+// pbrt-v4 integrates spectra over the sensor's three curves, maps the triples to XYZ by a matrix that was fitted to the
+// colours of a chart, which balances white: a chart under the daylight of `whitebalance` comes out as under the white
+// of the output's colour space. Light here is RGB already, so that every sensor sees as the CIE 1931 observer does, and
+// only the balance is left: the Bradford transformation from that daylight to D65, which is all that pbrt-v4 does for
+// its sensor "cie1931" as well.
 
 #include <algorithm>
 #include <array>
@@ -41,8 +42,9 @@ Matrix inverse_of(const Matrix& m) {
 /// XYZ of luminance 1 from chromaticity.
 Triple xyz_of(double x, double y) { return {x / y, 1, (1 - x - y) / y}; }
 
-/// Of CIE daylight (CIE 015), which is not defined below 4000 K; there, as in pbrt-v4, of a black body. Temperatures of daylight
-/// were given with an older constant of Planck's law, so that D65 is the daylight of 6504 K; pbrt-v4 corrects them in the same way.
+/// XYZ of CIE daylight (CIE 015), which is not defined below 4000 K; there it is that of a black body, as in pbrt-v4.
+/// Temperatures of daylight are based on an older constant of Planck's law, so that D65 is the daylight of 6504 K;
+/// pbrt-v4 corrects them in the same way.
 Triple daylight(double kelvin) {
     const double t = kelvin * (1.4388 / 1.4380);
     if (t < 4000) {
@@ -85,7 +87,7 @@ FilmResponse::Matrix sensor_colour(Context* context, const ParameterList& p) {
                                                  "saturated colours differ a little from pbrt's");
     }
     const float kelvin = p.one_float("whitebalance", 0);
-    // Real sensors are balanced for 6500 K if nothing is said, which is the white of the picture.
+    // By default real sensors are balanced for 6500 K, which is the white of the picture.
     if (kelvin == 0) return FilmResponse::kNeutral;
     if (!(kelvin >= 1000) || !(kelvin <= 25000))
         fail(p.where(), p.what() + ": whitebalance must be 0, for none, or lie between 1000 and 25000 kelvin");

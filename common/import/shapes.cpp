@@ -1,9 +1,10 @@
 // Shapes become triangle meshes and spheres in world space (the space of the object inside ObjectBegin).
 //
 // Orientation: a mesh keeps its corners in file order; `flip_normal` is ReverseOrientation xor "the transformation
-// swaps handedness", which makes the geometric normal the image of the object-space one. pbrt-v4 turns the
-// object-space normal of a mirrored sphere, disk or cylinder where a ray hits it: a mirrored glass sphere is a hole in glass. Where
-// it samples light on one it does not; so those that emit keep their side here, hit or sampled.
+// swaps handedness", which makes the geometric normal the image of the object-space one. pbrt-v4 turns the object-space
+// normal of a mirrored sphere, disk or cylinder where a ray hits it: a mirrored glass sphere is a hole in glass. Where
+// it samples light on such a shape it does not turn the normal; here shapes that emit keep their side, whether hit or
+// sampled.
 
 #include <cmath>
 
@@ -60,11 +61,11 @@ TriangleMesh place(Context* context, const ParameterList& parameters, TriangleMe
             if (substitutes.empty()) {
                 context->diagnostics.warn(
                     parameters.where(),
-                    parameters.what() + ": a normal has length zero or is no number; the geometry's own is used there");
+                    parameters.what() + ": a normal has length zero or is not finite; the geometry's own is used there");
                 substitutes = geometric_normals(mesh);
             }
             n = mesh.attributes.flip_normal ? -substitutes[i] : substitutes[i];
-            if (!normalise(&n)) n = {0, 0, 1};  // A vertex of degenerate triangles only: nothing can hit it.
+            if (!normalise(&n)) n = {0, 0, 1};  // All triangles of this vertex are degenerate: nothing can hit it.
         }
         mesh.normals[i] = n;
     }
@@ -80,7 +81,7 @@ std::vector<Vec3> points(const ParameterList& parameters, std::string_view type,
     return out;
 }
 
-/// P and indices; `corners` vertices make one face.
+/// Reads P and indices; `corners` vertices make one face.
 TriangleMesh read_points_and_indices(const ParameterList& parameters, size_t corners) {
     const std::string& what = parameters.what();
     TriangleMesh mesh;
@@ -102,7 +103,7 @@ TriangleMesh read_points_and_indices(const ParameterList& parameters, size_t cor
     return mesh;
 }
 
-/// Of trianglemesh and bilinearmesh: the same with N and uv.
+/// For trianglemesh and bilinearmesh: the same with N and uv.
 TriangleMesh read_mesh(const ParameterList& parameters, size_t corners) {
     const std::string& what = parameters.what();
     TriangleMesh mesh = read_points_and_indices(parameters, corners);
@@ -152,7 +153,7 @@ TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const S
     mesh.positions = std::move(ply->positions);
     mesh.normals = std::move(ply->normals);
     if (ply->finite_normals == 0 && !mesh.normals.empty()) {
-        context->diagnostics.warn(parameters.where(), quoted(reference) + ": its normals are no numbers and are left out");
+        context->diagnostics.warn(parameters.where(), quoted(reference) + ": its normals are not finite and are left out");
         mesh.normals.clear();
     }
     mesh.uvs = std::move(ply->uvs);
@@ -161,7 +162,7 @@ TriangleMesh ply_mesh(Context* context, const ParameterList& parameters, const S
     return place(context, parameters, std::move(mesh), state);
 }
 
-/// The angle that a part of a quadric covers, in degrees; as in pbrt, more than a full turn is one.
+/// The angle that a part of a quadric covers, in degrees; as in pbrt, more than a full turn counts as one.
 float read_phimax(const ParameterList& parameters) {
     const float phimax = parameters.one_float("phimax", 360);
     if (!(phimax > 0)) fail(parameters.where(), parameters.what() + ": phimax must be positive, in degrees");
@@ -172,7 +173,7 @@ struct Interval {
     float zmin, zmax;
 };
 
-/// zmin and zmax, as far as they lie within `limits`.
+/// Reads zmin and zmax, clipped to `limits`.
 Interval read_interval(Context* context, const ParameterList& parameters, const Interval& fallback, const Interval& limits) {
     Interval z{parameters.one_float("zmin", fallback.zmin), parameters.one_float("zmax", fallback.zmax)};
     if (z.zmin > z.zmax) {
@@ -185,10 +186,10 @@ Interval read_interval(Context* context, const ParameterList& parameters, const 
     return z;
 }
 
-/// All triangles are parts of one shape.
+/// Marks all triangles as parts of one shape.
 void join(const TriangleMesh& mesh, std::vector<uint32_t>* faces) { faces->assign(mesh.indices.size() / 3, 0); }
 
-/// Of a sphere, disk or cylinder, see above.
+/// The state for a sphere, disk or cylinder; see above.
 ShapeState quadric(ShapeState state) {
     if (!state.emits && state.object_to_world.swaps_handedness()) state.reverse_orientation = !state.reverse_orientation;
     return state;
@@ -266,7 +267,7 @@ TriangleMesh cylinder(Context* context, const ParameterList& parameters, const S
 /// As in pbrt, the outside of the limit surface is the side from which the corners of a face are seen clockwise.
 TriangleMesh subdivision_surface(Context* context, const ParameterList& parameters, const ShapeState& state) {
     const int levels = parameters.one_int("levels", 3);
-    parameters.accept("string", "scheme");  // There is one; pbrt looks at no other either.
+    parameters.accept("string", "scheme");  // There is only one scheme; pbrt ignores the value, too.
     const TriangleMesh control = read_points_and_indices(parameters, 3);
     Result<TriangleMesh> mesh =
         loop_subdivide(control.positions, control.indices, levels, context->options.max_subdivided_triangles);

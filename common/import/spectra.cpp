@@ -94,7 +94,7 @@ double evaluate(const Spectrum& spectrum, double nanometres) {
 Rgb unit_luminance_rgb(double x, double y, double z, bool* clipped) {
     Rgb3 c = to_rgb(x / y, 1, z / y);
     if (c.r < 0 || c.g < 0 || c.b < 0) {
-        // A white that is off by the rounding of published chromaticities is not worth a warning.
+        // A white that deviates by the rounding of published chromaticities is not worth a warning.
         if (std::min({c.r, c.g, c.b}) < -1e-3) *clipped = true;
         c = {std::max(c.r, 0.0), std::max(c.g, 0.0), std::max(c.b, 0.0)};
         const double luminance = 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b;
@@ -120,7 +120,7 @@ Xyz blackbody_xyz(double kelvin) {
     double x = 0, y = 0, z = 0;
     for_each_nanometre([&](double nm, const Row& row) {
         const double arg = kSecond / (nm * kelvin);
-        // exp(top) - exp-free ratio: (e^top - 1) / (e^arg - 1), written with negative exponents.
+        // The ratio (e^top - 1) / (e^arg - 1), written with negative exponents.
         const double ratio = math::exp(top - arg) * (1 - math::exp(-top)) / (1 - math::exp(-arg));
         const double s = 780 / nm;
         const double v = s * s * s * s * s * ratio;

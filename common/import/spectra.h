@@ -45,17 +45,19 @@ std::optional<Rgb> illuminant_rgb(const Spectrum& spectrum, bool* clipped);
 struct Xyz {
     double x, y, z;
 };
-/// Of a black body, on any scale. `kelvin` is positive.
+/// XYZ of a black body, on an arbitrary scale. `kelvin` is positive.
 Xyz blackbody_xyz(double kelvin);
 /// A black body's colour, luminance 1. `kelvin` is positive.
 Rgb blackbody_rgb(double kelvin, bool* clipped);
-/// A black body from 380 to 780 nm, relative to its peak (which may lie elsewhere), as pbrt takes one for anything but a light.
+/// A black body from 380 to 780 nm, relative to its peak (which may lie outside), as pbrt uses it for anything but a
+/// light.
 Spectrum blackbody_spectrum(double kelvin);
 /// The colour of a named light spectrum (stdillum-..., illum-acesD60); nothing for an unknown name.
 std::optional<Rgb> named_illuminant_rgb(const std::string& name, bool* clipped);
 
 Rgb reflectance_rgb(const Spectrum& spectrum);
-/// What D65's light of one wavelength (380 to 780 nm, else zero) adds to linear RGB, per nanometre; over all of them (1, 1, 1).
+/// Contribution of D65's light at one wavelength (380 to 780 nm, otherwise zero) to linear RGB, per nanometre; together
+/// they are (1, 1, 1).
 Rgb d65_rgb_at(int nanometres);
 
 struct ConductorRgb {
@@ -66,17 +68,17 @@ Rgb index_rgb(const Spectrum& spectrum);
 ConductorRgb conductor_rgb(const Spectrum& eta, const Spectrum& k);
 /// Reduced indices of "metal-Ag", "metal-Al", ...: the name without "-eta" or "-k".
 std::optional<ConductorRgb> named_metal(const std::string& name);
-/// n_d of "glass-BK7" and its kin; nothing for an unknown name.
+/// n_d of a glass such as "glass-BK7"; nothing for an unknown name.
 std::optional<float> named_glass(const std::string& name);
 /// The reduced index "metal-Ag-eta", "metal-Ag-k", or a glass's n_d in every channel; nothing for any other name.
 std::optional<Rgb> named_index(const std::string& name);
 /// Whether a parameter of some kind may have this name as its spectrum: any of the above, a metal's with "-eta" or "-k".
 bool is_named_spectrum(const std::string& name);
 
-/// A spectrum file: pairs of wavelength and value with blanks or commas between the numbers, '#' comments. Nothing if the text is
-/// not that.
+/// Parses a spectrum file: pairs of wavelength and value, blanks or commas between the numbers, '#' comments. Nothing
+/// if the text is anything else.
 std::optional<Spectrum> parse_spectrum_text(const std::string& text);
-/// Pairs as a parameter lists them; nothing if their number is odd or the wavelengths do not increase.
+/// Makes a spectrum of the pairs in a parameter; nothing if their number is odd or the wavelengths do not increase.
 std::optional<Spectrum> spectrum_from_pairs(const std::vector<double>& values);
 
 }  // namespace lightloom::import

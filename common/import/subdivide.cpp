@@ -36,14 +36,15 @@ struct Face {
     uint32_t corner_of(uint32_t v) const { return vertex[0] == v ? 0 : vertex[1] == v ? 1 : 2; }
 };
 
-/// The surface after some steps.
+/// The mesh after some steps of subdivision.
 struct Level {
     std::vector<Point> positions;
     std::vector<uint32_t> first_face;  ///< Per vertex: a face that has it as a corner. Its other faces are reached across edges.
     std::vector<char> is_boundary;     ///< Per vertex.
     std::vector<Face> faces;
 
-    /// The neighbours of a vertex, clockwise around it; of one on the boundary counter-clockwise from one end of it to the other.
+    /// The neighbours of a vertex, clockwise around it; for one on the boundary, counter-clockwise from one end of the
+    /// boundary to the other.
     void ring(uint32_t v, std::vector<uint32_t>* out) const {
         out->clear();
         uint32_t f = first_face[v];
@@ -68,7 +69,7 @@ struct Level {
     }
 };
 
-/// (1 - n w) p + w times the sum over its n neighbours; of a vertex on the boundary over the two along it.
+/// (1 - n w) p + w times the sum over its n neighbours; for a vertex on the boundary, over its two neighbours along it.
 Point blend(const Level& level, uint32_t v, const std::vector<uint32_t>& ring, double w) {
     if (level.is_boundary[v])
         return level.positions[v] * (1 - 2 * w) + (level.positions[ring.front()] + level.positions[ring.back()]) * w;
@@ -77,7 +78,7 @@ Point blend(const Level& level, uint32_t v, const std::vector<uint32_t>& ring, d
     return level.positions[v] * (1 - double(ring.size()) * w) + sum * w;
 }
 
-/// Weight of a neighbour of an old vertex, from the number of them [Warren 1995].
+/// Weight of a neighbour of an old vertex, from the number of its neighbours [Warren 1995].
 double step_weight(size_t valence) { return valence == 3 ? 3.0 / 16 : 3 / (8 * double(valence)); }
 
 /// The same for the limit of all further steps.
@@ -100,7 +101,7 @@ Result<Level> control_mesh(const std::vector<Vec3>& points, const std::vector<ui
         Face& face = level.faces[f];
         for (uint32_t k = 0; k < 3; ++k) {
             face.vertex[k] = number[indices[size_t(f) * 3 + k]];
-            // Where surfaces touch in a point, pbrt-v4 treats it as one of the last face that has it.
+            // Where surfaces touch in a point, pbrt-v4 assigns it to the last face that has it.
             level.first_face[face.vertex[k]] = f;
         }
         for (uint32_t k = 0; k < 3; ++k) {
@@ -130,8 +131,8 @@ Result<Level> control_mesh(const std::vector<Vec3>& points, const std::vector<ui
     return level;
 }
 
-/// Child k of a face lies at its corner k, where it has its own corner k; child 3 in the middle, with the new vertex of edge k as
-/// k.
+/// Child k of a face lies at its corner k, which is also the child's corner k; child 3 lies in the middle, and its
+/// corner k is the new vertex of edge k.
 Level subdivided(const Level& old) {
     Level level;
     std::vector<uint32_t> ring;
@@ -177,7 +178,7 @@ Level subdivided(const Level& old) {
     return level;
 }
 
-/// Of the limit surface, of any length; from the limit positions of the neighbours.
+/// Normal of the limit surface, of any length; computed from the limit positions of the neighbours.
 Point limit_normal(const Level& level, uint32_t v, const std::vector<uint32_t>& ring) {
     const auto at = [&](size_t i) { return level.positions[ring[i]]; };
     const size_t n = ring.size();
@@ -196,7 +197,7 @@ Point limit_normal(const Level& level, uint32_t v, const std::vector<uint32_t>& 
         across = at(0) + at(1) - p * 2;
     } else if (n == 3) {
         across = at(1) - p;
-    } else if (n == 4) {  // The regular case.
+    } else if (n == 4) {  // This is the regular case.
         across = (at(1) + at(2)) * 2 - at(0) - at(3) - p * 2;
     } else {
         const math::SinCos unit = math::sincos_turns(0.5 / double(n - 1));
@@ -207,7 +208,7 @@ Point limit_normal(const Level& level, uint32_t v, const std::vector<uint32_t>& 
     return cross_product(along, across);
 }
 
-/// Normalised; false if it has no direction.
+/// Normalises; false if the vector has no direction.
 bool to_unit(const Point& n, Vec3* out) {
     const double length = std::sqrt(n.x * n.x + n.y * n.y + n.z * n.z);
     if (!(length > 0) || !std::isfinite(length)) return false;
@@ -239,7 +240,7 @@ Result<TriangleMesh> loop_subdivide(const std::vector<Vec3>& points, const std::
     level.positions = std::move(limits);
 
     TriangleMesh mesh;
-    std::vector<Point> clockwise(level.positions.size());  // Sums of the faces' own normals, on the outer side.
+    std::vector<Point> clockwise(level.positions.size());  // sums of the faces' own normals, on the outer side
     for (const Face& face : level.faces) {
         const Point& a = level.positions[face.vertex[0]];
         const Point n = cross_product(level.positions[face.vertex[2]] - a, level.positions[face.vertex[1]] - a);
@@ -252,7 +253,7 @@ Result<TriangleMesh> loop_subdivide(const std::vector<Vec3>& points, const std::
         const Point& p = level.positions[v];
         mesh.positions.push_back({float(p.x), float(p.y), float(p.z)});
         level.ring(v, &ring);
-        Vec3 n{0, 0, 1};  // Left over only where all faces are without area, which nothing can hit.
+        Vec3 n{0, 0, 1};  // It stays only where all faces are without area, which nothing can hit.
         if (!to_unit(limit_normal(level, v, ring), &n)) to_unit(clockwise[v], &n);
         mesh.normals.push_back(n);
     }

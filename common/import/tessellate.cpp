@@ -22,7 +22,7 @@ std::optional<double> similarity_scale(const Mat4& m) {
 
 namespace {
 
-/// Directions in the plane of x and y, evenly over a part of a turn.
+/// Directions in the xy plane, spread evenly over a part of a turn.
 struct Fan {
     uint32_t segments;
     double turns;

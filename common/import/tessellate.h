@@ -1,5 +1,5 @@
 #pragma once
-// Object-space triangle meshes of the shapes that the renderer does not trace as such.
+// Object-space triangle meshes of the shapes that the renderer cannot trace directly.
 
 #include <optional>
 
@@ -7,7 +7,7 @@
 
 namespace lightloom::import {
 
-inline constexpr int kTurnSegments = 128;  ///< Of a full turn; a part of it has as many as its share, rounded up.
+inline constexpr int kTurnSegments = 128;  ///< For a full turn; a part of a turn has its share of them, rounded up.
 inline constexpr int kSphereRings = 64;    ///< From pole to pole.
 inline constexpr int kEllipsoidTriangles = 2 * (2 * kSphereRings) * (kSphereRings - 1);
 inline constexpr int kPatchSteps = 16;
@@ -20,18 +20,18 @@ std::optional<double> similarity_scale(const Mat4& m);
 /// that the area is that of the true shape; they stay within 3 10^-4 of the radius.
 TriangleMesh tessellate_disk(float radius, float inner_radius, float height, float phimax);
 
-/// What the planes zmin < zmax, in [-radius, radius], and `phimax` degrees leave of a sphere about the origin, with pbrt's (u, v)
-/// and exact normals at the vertices. A whole sphere has its vertices on the sphere; what is left of one is scaled so that its area
-/// is the true one, and stays within 3 10^-4 of the radius.
+/// The part of a sphere about the origin between the planes zmin < zmax, in [-radius, radius], and within `phimax`
+/// degrees, with pbrt's (u, v) and exact normals at the vertices. A whole sphere has its vertices on the sphere; a part
+/// is scaled so that its area is the true one, and stays within 3 10^-4 of the radius.
 TriangleMesh tessellate_sphere(float radius, float zmin, float zmax, float phimax);
 
-/// A cylinder about the z axis, open at zmin < zmax, with pbrt's (u, v) and exact normals at the vertices. Its polygon is scaled so
-/// that the area is that of the true cylinder; it stays within 3 10^-4 of the radius. Its corners have the directions of those of a
-/// disk of the same `phimax`, so that one covers the other.
+/// A cylinder about the z axis, open at zmin < zmax, with pbrt's (u, v) and exact normals at the vertices. Its polygon
+/// is scaled so that the area is that of the true cylinder; it stays within 3 10^-4 of the radius. Its corners have the
+/// same directions as those of a disk of the same `phimax`, so that the disk closes it.
 TriangleMesh tessellate_cylinder(float radius, float zmin, float zmax, float phimax);
 
-/// Four corners per face (p00, p10, p01, p11) to triangles. A parallelogram becomes two, which is exact; any other
-/// patch a grid, and then `*curved` is set. `*faces` gets the number of the patch of every triangle.
+/// Turns faces of four corners (p00, p10, p01, p11) into triangles. A parallelogram becomes two, which is exact; any
+/// other patch becomes a grid, and `*curved` is set. `*faces` receives the patch number of every triangle.
 TriangleMesh tessellate_patches(const TriangleMesh& patches, bool* curved, std::vector<uint32_t>* faces);
 
 }  // namespace lightloom::import

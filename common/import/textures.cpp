@@ -10,9 +10,10 @@
 namespace lightloom::import {
 namespace {
 
-/// Levels of nodes below a texture that a file may ask for; one more is left for a material's own scale.
+/// Levels of nodes below a texture that a file may ask for; one more level is reserved for a material's own scale.
 constexpr int kMaxNesting = 31;
-/// Nodes that one look-up may visit: textures that use each other twice on every level double it each time.
+/// Most nodes that one look-up may visit: textures that use another texture twice on every level double the number each
+/// time.
 constexpr double kMaxVisits = 4096;
 
 /// The text of the file that a spectrum parameter names; `what` names the directive.
@@ -59,7 +60,7 @@ Rgb colour_of(Context* context, const Parameter& p, const std::string& what, Tex
         if (p.numbers.size() != 3) fail(p.where, what + ": " + quoted("rgb " + p.name) + " needs three numbers");
         colour = {float(p.numbers[0]), float(p.numbers[1]), float(p.numbers[2])};
     } else if (use == TextureUse::kReflectance) {
-        // Above 1 is for others to bring down: a texture's scale, or in the end the material.
+        // Values above 1 are reduced elsewhere: by a texture's scale, or in the end by the material.
         Spectrum spectrum = read_spectrum(context, p, what);
         double largest = 1;
         for (const SpectrumSample& sample : spectrum) largest = std::max(largest, sample.value);
@@ -103,7 +104,7 @@ TextureId image_texture(Context* context, const Definition& definition, TextureU
     if (filter != "point" && filter != "bilinear")
         context->diagnostics.warn(parameters.where(), parameters.what() + ": the filter " + quoted(filter) +
                                                           " becomes bilinear; samples average the rest");
-    parameters.accept("float", "maxanisotropy");  // Belongs to the EWA filter only.
+    parameters.accept("float", "maxanisotropy");  // It belongs to the EWA filter only.
     const std::string reference = parameters.one_string("filename", "");
     if (reference.empty()) fail(parameters.where(), parameters.what() + " has no \"string filename\"");
     ImageRequest request;
@@ -149,15 +150,15 @@ TextureRange product(const TextureRange& a, const TextureRange& b) {
     return out;
 }
 
-/// Of the pixels of a one-channel image. Those of a float texture are floats even if the file has 8 bits (ImageChannels::kScalar);
-/// bytes are a grey picture's as a colour, which nothing asks about.
+/// Range of the pixels of a one-channel image. A float texture's pixels are floats even if the file has 8 bits
+/// (ImageChannels::kScalar); bytes belong to grey pictures used as colours, whose range is never needed.
 TextureRange range_of(const Image& image) {
     if (image.floats.empty()) return {0, 1};
     const auto [least, most] = std::minmax_element(image.floats.begin(), image.floats.end());
     return {double(*least), double(*most)};
 }
 
-/// Of a node whose operands have been added.
+/// Range of a node whose operands have been added.
 TextureRange range_of(Context* context, const TextureNode& node) {
     const auto of = [&](TextureId id) { return context->texture_ranges[size_t(id)]; };
     switch (node.kind) {
@@ -174,7 +175,7 @@ TextureRange range_of(Context* context, const TextureNode& node) {
         }
         case TextureKind::kImage: {
             const Image& image = context->scene.images[size_t(node.image)];
-            if (image.channels != 1) return {};  // Of colours, which nothing asks about.
+            if (image.channels != 1) return {};  // The range of colours is never needed.
             const auto [it, inserted] = context->image_ranges.try_emplace(node.image);
             if (inserted) it->second = range_of(image);
             TextureRange range = it->second;
@@ -191,7 +192,7 @@ TextureRange range_of(Context* context, const TextureNode& node) {
     return {};
 }
 
-/// Marks a texture that is being resolved, so that a cycle is found.
+/// Marks a texture that is being resolved, so that cycles are found.
 constexpr TextureId kInProgress = -2;
 
 }  // namespace

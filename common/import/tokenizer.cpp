@@ -26,7 +26,7 @@ void Tokenizer::scan() {
     while (pos_ < text_.size()) {
         const char c = text_[pos_];
         if (is_space(c)) {
-            // A carriage return alone ends a line, too: in comments it has to.
+            // A carriage return alone ends a line, too, which matters for comments.
             line_ += c == '\n' || (c == '\r' && (pos_ + 1 == text_.size() || text_[pos_ + 1] != '\n'));
             ++pos_;
         } else if (c == '#') {

@@ -38,7 +38,7 @@ class Tokenizer {
     std::string unescaped_;
 };
 
-/// The whole of `text` as a finite number; false otherwise.
+/// Parses all of `text` as a finite number; false if it is not one.
 bool parse_number(std::string_view text, double* out);
 
 }  // namespace lightloom::import

@@ -18,7 +18,7 @@ struct Plane {
 /// An odd number of taps; the middle one is at the pixel itself.
 using Kernel = std::vector<float>;
 
-/// sum_k kernel[k] * plane(x + k - radius, y); pixels beyond the border repeat the border's.
+/// sum_k kernel[k] * plane(x + k - radius, y); beyond the border its pixels are repeated.
 Plane convolve_rows(const Plane& plane, const Kernel& kernel);
 /// The same along y.
 Plane convolve_columns(const Plane& plane, const Kernel& kernel);

@@ -102,7 +102,7 @@ inline Triple to_hunt_lab(Triple rgb) {
     return {lightness, 0.01 * lightness * 500 * (fx - fy), 0.01 * lightness * 200 * (fy - fz)};
 }
 
-/// City block in lightness plus Euclid in chroma [A20, sec. 4.1.2].
+/// The HyAB distance: city block in lightness plus Euclidean in chroma [A20, sec. 4.1.2].
 inline double hyab(Triple a, Triple b) {
     const double da = a.y - b.y, db = a.z - b.z;
     return std::fabs(a.x - b.x) + std::sqrt(da * da + db * db);
@@ -114,8 +114,8 @@ constexpr double kColorSplitValue = 0.95;  // p_t
 constexpr double kFeatureExponent = 0.5;   // q_f
 constexpr double kFeatureWidth = 0.082;    // w, in degrees
 
-/// Maps the powered colour distance to [0, 1], most of the range for distances below 40 % of the largest
-/// [A20, sec. 4.1.3].
+/// Maps the colour distance, raised to q_c, to [0, 1]; distances below 40 % of the largest take most of the range [A20,
+/// sec. 4.1.3].
 struct ColorErrorMap {
     double largest, split;
     ColorErrorMap() {
@@ -168,8 +168,8 @@ Plane filter_csf(const Plane& plane, const std::array<CsfTerm, N>& terms, double
     return result;
 }
 
-/// Gaussian, first and second derivative of it, for edges and points [A20, sec. 4.2]. The Gaussian sums to 1; of the
-/// derivatives the positive weights sum to 1 and the negative ones to -1.
+/// A Gaussian and its first and second derivative, for edges and points [A20, sec. 4.2]. The Gaussian sums to 1; the
+/// positive weights of the derivatives sum to 1 and the negative ones to -1.
 struct FeatureKernels {
     Kernel gauss, edge, point;
 
@@ -195,7 +195,7 @@ struct FeatureKernels {
     }
 };
 
-/// What is compared of one image: the filtered colour, and the strength of its edges and points.
+/// The features of one image that are compared: the filtered colour, and the strength of edges and points.
 struct Appearance {
     std::vector<Triple> color;  // Hunt-adjusted L*a*b*
     Plane edge, point;
@@ -211,7 +211,7 @@ Plane magnitude(const Plane& a, const Plane& b) {
 
 inline double clamp01(double v) { return clamp(v, 0.0, 1.0); }
 
-/// `rgb`: 3 values in [0, 1] per pixel.
+/// `rgb` has 3 values in [0, 1] per pixel.
 Appearance appearance_of(const std::vector<float>& rgb, int width, int height, double ppd) {
     Plane y(width, height), cx(width, height), cz(width, height), achromatic(width, height);
     for (size_t i = 0; i < y.values.size(); ++i) {
@@ -252,12 +252,12 @@ std::vector<float> difference(const Appearance& a, const Appearance& b) {
     return map;
 }
 
-/// Rational fit of the ACES curve with its exposure of 0.6 inside [A21, sec. 3]: (k0 x^2 + k1 x) / (k2 x^2 + k3 x + k4).
+/// Rational fit of the ACES curve, including its exposure of 0.6 [A21, sec. 3]: (k0 x^2 + k1 x) / (k2 x^2 + k3 x + k4).
 constexpr double kAces[5] = {0.36 * 2.51, 0.6 * 0.03, 0.36 * 2.43, 0.6 * 0.59, 0.14};
 
 inline double aces(double x) {
     x = std::max(x, 0.0);
-    if (x > 1e8) return 1;  // Beyond the curve's shoulder, where the quotient only loses digits: it is above 1 here.
+    if (x > 1e8) return 1;  // Beyond the curve's shoulder the quotient exceeds 1 and loses digits.
     return clamp01((kAces[0] * x + kAces[1]) * x / ((kAces[2] * x + kAces[3]) * x + kAces[4]));
 }
 
@@ -292,7 +292,7 @@ HdrFlip hdr_flip(const RgbImage& image, const RgbImage& reference, double ppd) {
     const double largest = *std::max_element(luminance.begin(), luminance.end());
     std::nth_element(luminance.begin(), luminance.begin() + ptrdiff_t(luminance.size() / 2), luminance.end());
     const double median = std::max(double(luminance[luminance.size() / 2]), largest * 0x1p-24);
-    if (largest > 0) {  // A black reference is looked at as it is.
+    if (largest > 0) {  // A black reference keeps its exposure.
         const double target = inverse_aces(0.85);
         result.start_exposure = log2(target / largest);
         result.stop_exposure = log2(target / median);

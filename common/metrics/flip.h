@@ -1,5 +1,5 @@
 #pragma once
-// FLIP, a perceptual difference between images that are flipped between: our own implementation from the papers
+// FLIP, a perceptual difference between two images that are shown alternately: our own implementation from the papers
 //   [A20] Andersson, Nilsson, Akenine-Moeller, Oskarsson, Astroem, Fairchild: FLIP: A Difference Evaluator for Alternating
 //         Images. HPG 2020.
 //   [A21] Andersson, Nilsson, Shirley, Akenine-Moeller: Visualizing Errors in Rendered High Dynamic Range Images.
@@ -16,13 +16,13 @@ namespace lightloom {
 /// default.
 inline constexpr double kFlipPixelsPerDegree = 0.7 * 3840 / 0.7 * (kPiD / 180);
 
-/// Error per pixel in [0, 1], row-major. Both images are linear RGB and are clamped to [0, 1] first. Images are of equal
-/// size and finite.
+/// Error per pixel in [0, 1], row-major. Both images are linear RGB and are clamped to [0, 1] first. They must be
+/// finite and of equal size.
 std::vector<float> ldr_flip(const RgbImage& image, const RgbImage& reference, double pixels_per_degree = kFlipPixelsPerDegree);
 
 struct HdrFlip {
     std::vector<float> map;                        ///< Maximum over the exposures of the LDR-FLIP of the tone-mapped images.
-    double start_exposure = 0, stop_exposure = 0;  ///< In stops, found from the reference alone.
+    double start_exposure = 0, stop_exposure = 0;  ///< In stops, computed from the reference alone.
     int exposures = 0;
 };
 

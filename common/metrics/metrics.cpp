@@ -37,7 +37,7 @@ Status check_images(const RgbImage& image, const RgbImage& reference) {
 
 double ratio_of(double image, double reference) { return image == reference ? 1 : image / reference; }
 
-/// Mean of what is left after the largest `count * percent / 100` terms were dropped.
+/// Mean of the terms that remain after the largest `count * percent / 100` were dropped.
 double trimmed_mean(std::vector<double>& terms, double percent) {
     const size_t dropped = std::min(terms.size() - 1, size_t(double(terms.size()) * percent / 100));
     if (dropped > 0) {

@@ -1,6 +1,6 @@
 #pragma once
-// Mean luminance of an image and of its regions with what is known of their error, from independent group images; and
-// intervals for the ratio of two such means: how two renderings are shown to agree.
+// Mean luminance of an image and of its regions, with error estimates from independent group images, and intervals for
+// the ratio of two such means, by which two renderings are compared.
 
 #include <limits>
 #include <vector>
@@ -10,17 +10,17 @@
 
 namespace lightloom {
 
-/// A mean and what is known of its error.
+/// A mean with an estimate of its error.
 struct Estimate {
     double mean = 0;
-    double variance = 0;                                       ///< Of the mean.
-    double degrees = std::numeric_limits<double>::infinity();  ///< Of freedom of the variance.
+    double variance = 0;                                       ///< Variance of the mean.
+    double degrees = std::numeric_limits<double>::infinity();  ///< Degrees of freedom of the variance.
 
     double standard_error() const;
 };
 
-/// Mean of independent values of different weight (the iterations of a group): sum n x / sum n, with the variance
-/// sum n (x - mean)^2 / ((G - 1) sum n). Of fewer than two values the variance is infinite.
+/// Mean of independent values of different weight (the iterations of a group): sum n x / sum n, with the variance sum n
+/// (x - mean)^2 / ((G - 1) sum n). With fewer than two values the variance is infinite.
 class WeightedMean {
   public:
     void add(double value, double weight);
@@ -36,7 +36,7 @@ class WeightedMean {
 class RegionMeans {
   public:
     RegionMeans(int columns, int rows);
-    /// One group image; all of the same size, at least as many pixels as regions in each direction.
+    /// Adds one group image. All have the same size, with at least as many pixels as regions in each direction.
     void add(const RgbImage& group, double weight);
     std::vector<Estimate> estimates() const;
 

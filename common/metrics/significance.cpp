@@ -10,7 +10,7 @@ namespace {
 
 namespace policies = boost::math::policies;
 
-/// What has no answer is NaN or infinite, as in the rest of our arithmetic, instead of an exception.
+/// Undefined results are NaN or infinite, as in the rest of our arithmetic, instead of an exception.
 using NoThrow =
     policies::policy<policies::domain_error<policies::ignore_error>, policies::pole_error<policies::ignore_error>,
                      policies::overflow_error<policies::ignore_error>, policies::evaluation_error<policies::ignore_error>>;

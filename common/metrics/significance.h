@@ -1,6 +1,6 @@
 #pragma once
-// Student's t and the normal distribution, and Sidak's correction: what tests and cross-checks decide by. They use libm, so
-// nothing that ends up in a picture may use them.
+// Student's t and the normal distribution, and Sidak's correction, by which tests and cross-checks decide. They use
+// libm, so that nothing that ends up in a picture may use them.
 
 namespace lightloom {
 
@@ -13,7 +13,7 @@ double normal_p_value(double z);
 /// Two-sided p-value of Student's t with `degrees` of freedom, which may be infinite (the normal distribution).
 double student_p_value(double t, double degrees);
 
-/// The deviate whose two-sided p-value is `p`, in (0, 1).
+/// The deviate whose two-sided p-value is `p`, which lies in (0, 1).
 double student_quantile(double p, double degrees);
 
 }  // namespace lightloom

@@ -24,8 +24,8 @@ Plane luma(const RgbImage& image) {
     return plane;
 }
 
-/// Weighted mean of the products a b in the window around (x, y), and of a and b: in double, because variances are
-/// differences of nearly equal numbers.
+/// Weighted means of a, b and their products in the window around (x, y). They are kept in double, because variances
+/// are differences of nearly equal numbers.
 struct Moments {
     double a = 0, b = 0, aa = 0, bb = 0, ab = 0, weight = 0;
     void add(const Moments& o, double w) {

@@ -20,13 +20,13 @@ class CameraSampler : public WalkSampler {
         return camera.sample_ray({float(px) + film.x, float(py) + film.y}, lens);
     }
     Vec2 next_event(int t) { return t == 2 ? point(3) : rng().uniform2(); }
-    /// For draws among light sub-paths.
+    /// For draws of light sub-paths to connect to.
     Vec2 connection(int t) { return t == 2 ? point(4) : rng().uniform2(); }
 };
 
-/// Walks from the lens along sampler.ray(). `z` has room for max_edges + 2 vertices.
-/// After each arrival `visit(t)` is called with z[0 .. t-1] complete (material resolved unless nothing can follow), before
-/// the vertex scatters: next event and emitter hits belong there. `escape(t, ray)` is called when the sub-path of t
+/// Walks from the lens along sampler.ray(). `z` has room for max_edges + 2 vertices. After each arrival `visit(t)` is
+/// called with z[0 .. t-1] complete (material resolved unless nothing can follow), before the vertex scatters: the
+/// callback is the place for next event estimation and emitter hits. `escape(t, ray)` is called when the sub-path of t
 /// vertices leaves the scene. Returns the number of vertices.
 template <class Visit, class Escape>
 int trace_camera_path(const Scene& scene, CameraSampler& sampler, int px, int py, int max_edges, const RouletteRule& rule,

@@ -1,6 +1,6 @@
 #pragma once
-// The four ways to complete a path, each as: the unweighted contribution, and the PathView of the full path. Visibility is
-// tested here, the weight is not computed here. All functions return a black contribution when the technique fails.
+// The four ways to complete a path. Each function returns the unweighted contribution, black when the technique fails,
+// and fills in the PathView of the full path. Visibility is tested here; the weight is computed elsewhere (mis.h).
 //
 // Camera sub-path z[0..t-1] (z_0 on the lens), light sub-path y[0..s-1]; the full path has k = s + t - 1 edges,
 // x_i = y_i for i < s and x_{k-j} = z_j for j < t. The light vertices are PathVertex'es, or LightVertex'es of a cache.
@@ -37,8 +37,8 @@ inline void view_camera_suffix(const PathVertex* z, int t, int k, PathView* view
 /// end vertices (start and step), for methods that select by the light's throughput.
 enum class ViewDetail : uint8_t { kFull, kLightEnd, kSubspace };
 
-/// start[] of a path whose x_0, at `position`, lies on `e` and emits along `w`; fwd[0] must be set. `direction_pdf` as
-/// pdf_direction().
+/// Sets start[] of a path whose x_0, at `position`, lies on `e` and emits along `w`; fwd[0] must be set.
+/// `direction_pdf` is pdf_direction().
 inline void view_start(const EmitterSet& emitters, const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w,
                        float direction_pdf, PathView* view) {
     const float inv_position = float(1 / view->fwd[0]);
@@ -183,8 +183,8 @@ Rgb connect(const Scene& scene, const Vertex* y, int s, const PathVertex* z, int
     return contribution;
 }
 
-/// t = 1: connects y_{s-1}, s >= 2, to `lens_point` of Camera::sample_lens(), which moves as Camera::see() says. `film` receives
-/// the film position.
+/// t = 1: connects y_{s-1}, s >= 2, to `lens_point` of Camera::sample_lens(), which Camera::see() may move. `film`
+/// receives the film position.
 inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, Vec3* lens_point, Vec2* film, PathView* view,
                              WalkCounters* counters) {
     const PathVertex& a = y[s - 1];

@@ -1,6 +1,6 @@
 #pragma once
-// Corrections of the weights for what their densities do not say: how many of a technique's n samples count. A correction is a
-// function of the path, so weights with it sum to one as well; none of them touches a mean.
+// Corrections of the weights for what their densities do not say: how many of a technique's n samples count. A
+// correction is a function of the path, so that weights with it still sum to one and no mean changes.
 
 #include "common/path/correlation.h"
 #include "common/path/mis.h"
@@ -12,8 +12,8 @@ enum class Correction : uint8_t {
     kCorrelation,  ///< Connections that share a camera sub-path [Grittmann, Georgiev and Slusallek 2021]; correlation.h.
 };
 
-/// A selection of which n c_s connections count instead of n. Inner::OnPath says how many there are, connections(), and what
-/// sigma is if only a share of them counts, connect(s, share). Its view must have what view_footprint() writes.
+/// A selection that counts n c_s connections instead of n. Inner::OnPath gives their number, connections(), and sigma
+/// if only a share of them counts, connect(s, share). Its view must have what view_footprint() writes.
 template <class Inner>
 struct Corrected {
     Inner inner;
@@ -28,8 +28,9 @@ struct Corrected {
         double share(int s) const {
             switch (correction) {
                 case Correction::kUncorrected: return 1;
-                // One factor at a time costs as much per weight as there are possible connections times edges; products that
-                // grow along the path would round otherwise, and the bytes of every image with them.
+                // Computed one by one, the factors cost the number of possible connections times that of edges per
+                // weight. Products that grow along the path would be cheaper, but they round differently, which changes
+                // the bytes of every image.
                 case Correction::kCorrelation: return correlation_factor(this->view, s, this->connections());
             }
             return 1;

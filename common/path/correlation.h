@@ -11,8 +11,8 @@
 
 namespace lightloom {
 
-/// What correlation_factor() reads of a path that starts on `e` and was made from light prefix y[0 .. s-1] and camera suffix
-/// z[0 .. t-1].
+/// Sets what correlation_factor() reads of a path that starts on `e` and was made from light prefix y[0 .. s-1] and
+/// camera suffix z[0 .. t-1].
 inline void view_footprint(const Emitter& e, const LightSubPath& y, int s, const PathVertex* z, int t, PathView* view) {
     view->primary_distance2 = double(length_squared((t >= 2 ? z[1].p : y[s - 1].p) - z[0].p));
     view->source = e.is_discrete()   ? PathView::Source::kDiscrete
@@ -20,12 +20,12 @@ inline void view_footprint(const Emitter& e, const LightSubPath& y, int s, const
                                      : PathView::Source::kArea;
 }
 
-/// c_s in [1/n, 1]: of n connections that split the path after s light vertices, n c_s count. A function of the path and n. Reads
-/// what view_footprint() wrote.
+/// c_s in [1/n, 1]: of n connections that split the path after s light vertices, n c_s count. The factor is a function
+/// of the path and n; it reads what view_footprint() wrote.
 inline double correlation_factor(const PathView& view, int s, double n) {
     constexpr double kDisc = 3.14159265358979323846 * 0.017455064928217585 * 0.017455064928217585;  // pi tan^2(1 degree)
     const double area = kDisc * view.primary_distance2;
-    // The share of a sub-path's neighbours that the radius reaches; a Dirac event has no neighbours but itself.
+    // Shares of either sub-path's neighbours within the radius; a Dirac event has no neighbour but itself.
     double camera = 1, light = 1;
     for (int i = s; i < view.k; ++i)
         if (i + 1 == view.k || !view.delta[i + 1]) camera *= std::min(area * view.rev[i], 1.0);

@@ -1,6 +1,7 @@
 #pragma once
-// LightVertex: a vertex of a light sub-path as a cache keeps it, two cache lines instead of five: no more than connections, merges,
-// labels and weights read. A million paths are kept at a time, and drawing from them waits for memory more than for anything else.
+// LightVertex: a vertex of a light sub-path in a cache. It holds only what connections, merges, labels and weights
+// read, in two cache lines instead of five: a cache may have a million paths, and drawing from it mostly waits for
+// memory.
 
 #include <cstddef>
 #include <type_traits>
@@ -9,10 +10,11 @@
 
 namespace lightloom {
 
-/// What scatters at a vertex of any kind but the Lambertian one, apart from the vertex because few scenes have many of them.
+/// The surface at a vertex that is not Lambertian. It is stored apart from the vertex, because few scenes have many of
+/// these.
 struct LightSurface {
     Bsdf bsdf;
-    Vec3 s, t;  ///< Of the shading frame.
+    Vec3 s, t;  ///< Tangents of the shading frame.
 
     explicit LightSurface(const PathVertex& v) : bsdf(v.bsdf), s(v.shading.s), t(v.shading.t) {}
 };
@@ -26,7 +28,7 @@ struct alignas(64) LightVertex : SubPathVertex {
         const LightSurface* surface;  ///< All others; null where nothing but Dirac lobes scatters. It belongs to the cache.
     };
 
-    /// `s` must be there if needs_surface(v), and outlive the vertex.
+    /// `s` must not be null if needs_surface(v), and must outlive the vertex.
     LightVertex(const PathVertex& v, const LightSurface* s)
         : SubPathVertex(v),
           ns(v.shading.n),
@@ -38,14 +40,14 @@ struct alignas(64) LightVertex : SubPathVertex {
     static bool needs_surface(const PathVertex& v) { return v.bsdf.kind != BsdfKind::kDiffuse && v.bsdf.has_smooth_lobe(); }
 
     const Vec3& shading_normal() const { return ns; }
-    /// That of the PathVertex, bit for bit, where the vertex can be connected to; elsewhere nothing.
+    /// Equal to the PathVertex's bit for bit where the vertex can be connected to, and zero elsewhere.
     BsdfEval eval(const Vec3& w, TransportMode mode) const {
         if (kind == BsdfKind::kDiffuse) return eval_diffuse(reflectance, dot(wo, ns), dot(w, ns));
         if (!surface) return {};
         const Frame shading(surface->s, surface->t, ns);
         return surface->bsdf.eval(shading.to_local(wo), shading.to_local(w), mode);
     }
-    /// Fetches what eval() will read beyond the vertex itself, which has to be near already.
+    /// Prefetches what eval() reads besides the vertex itself, which must have been fetched already.
     void prefetch_surface() const {
         if (kind == BsdfKind::kDiffuse || !surface) return;
         for (size_t offset = 0; offset < sizeof(LightSurface); offset += 64)
@@ -54,8 +56,8 @@ struct alignas(64) LightVertex : SubPathVertex {
 };
 static_assert(std::is_trivially_copyable_v<LightVertex> && sizeof(LightVertex) == 128 && offsetof(SubPathVertex, ng) == 64);
 
-/// A light sub-path y_0 ... wherever its vertices are: as they were traced, or in a cache. For what is not worth a copy of its code
-/// for either.
+/// A light sub-path y_0 ... whose vertices are as they were traced or in a cache. It is for code that is not worth
+/// being compiled for both.
 class LightSubPath {
   public:
     LightSubPath() = default;

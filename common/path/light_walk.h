@@ -15,14 +15,15 @@ class LightSampler : public WalkSampler {
                       Rng({key.seed, Stage::kLightScramble, key.iteration, uint64_t(key.stage) << 56 | key.index >> 32}).next_u64(),
                       uint32_t(key.index), 3) {}
 
-    /// In [0, 1): which light. A point of the sequence has 24 bits, too few to tell a million lights apart.
+    /// A number in [0, 1) that selects the light. A point of the sequence has 24 bits, too few to tell a million lights
+    /// apart.
     double pick() { return double(point(0).x) + rng().uniform_double() * 0x1p-24; }
     Vec2 position() { return point(1); }
     Vec2 direction() { return point(2); }
 };
 
-/// Start of a light sub-path at path[0] and the ray that leaves it. False when nothing is emitted. y_0's alpha is F(1) / C(1),
-/// its emission without the direction.
+/// Starts a light sub-path: sets y_0 and the ray that leaves it. False when nothing is emitted. y_0's alpha is F(1) /
+/// C(1), its emission without the direction.
 inline bool start_light_path(const Scene& scene, LightSampler& sampler, PathVertex* y0, WalkRay* ray) {
     EmissionSample s;
     if (!scene.emitters().sample_emission(sampler.pick(), sampler.position(), sampler.direction(), &s)) return false;

@@ -1,6 +1,6 @@
 #pragma once
-// Leaving techniques out: the weights of those that remain sum to one again, so an image without them has the same mean wherever
-// the others can make the same paths. For measurements and tests; what a user renders with has no mask.
+// TechniqueMask leaves techniques out: the weights of those that remain sum to one again, so that the image has the
+// same mean wherever they can make the same paths. It is for measurements and tests; what a user renders has no mask.
 
 #include <algorithm>
 
@@ -9,10 +9,10 @@
 namespace lightloom {
 
 struct TechniqueMask {
-    bool on[kTechniqueKinds] = {true, true, true, true, true};  ///< By TechniqueKind.
-    int only_s = -1;                                            ///< Only this split; -1: all.
-    int min_k = 1, max_k = kMaxEdges;                           ///< Lengths of paths, in edges, that exist.
-    int max_light_vertices = kMaxEdges;                         ///< Light sub-paths are cut there.
+    bool on[kTechniqueKinds] = {true, true, true, true, true};  ///< By TechniqueKind: whether it remains.
+    int only_s = -1;                                            ///< Only this split remains; -1: all do.
+    int min_k = 1, max_k = kMaxEdges;                           ///< Lengths of paths, in edges, that remain.
+    int max_light_vertices = kMaxEdges;                         ///< Light sub-paths have at most this many.
 
     static TechniqueMask without(TechniqueKind kind) {
         TechniqueMask mask;

@@ -21,12 +21,13 @@
 //       OnPath on(const PathView&) const;        // called once per weight: what costs O(k) belongs here
 //   };
 //
-// Zero says that there is no such technique. Rules: the weights of all techniques sum to one over every path that some technique
-// can produce; a weight depends only on the path and on tables frozen before the unit began. What is handled here, for all of them:
-// connecting next to a Dirac vertex and merging at one is impossible, and a directly visible emitter (k = 1) is a hit alone.
+// Zero says that there is no such technique. Rules: the weights of all techniques sum to one over every path that some
+// technique can produce; a weight depends only on the path and on tables frozen before the unit began. Some rules are
+// handled here for all selections: connecting next to a Dirac vertex and merging at one is impossible, and a directly
+// visible emitter (k = 1) is a hit alone.
 //
-// Range: densities of 1e12 per vertex and 64 vertices overflow even double, so the sweep walks outward from the technique
-// that made the path with ratios, and keeps the exponent apart.
+// Range: densities of 1e12 per vertex and 64 vertices overflow even double, so the sweep walks outward from the
+// technique that made the path with ratios, and keeps the exponent in a variable of its own.
 
 #include <cmath>
 #include <cstdint>
@@ -80,7 +81,8 @@ struct RatioSum {
 
 }  // namespace detail
 
-/// What most selections answer: every split exists, roulette is not reckoned with, hits and one next event, nothing else.
+/// The answers of most selections: every split exists, roulette is ignored, and there are hits and one next event, but
+/// no other techniques.
 struct PlainTechniques {
     static constexpr bool kMerges = false;
     const PathView& view;
@@ -123,8 +125,8 @@ inline bool can_connect(const PathView& view, int s) {
     return !(s > 0 && view.delta[s - 1]) && !(s > 0 && s < view.k && view.delta[s]);
 }
 
-/// Calls visit(s, chain) with chain = C(s) A(s) / (C(base) A(base)) for every s != base from s_min to s_max that it is not
-/// zero for, walking outward from `base`, a technique that can produce the path.
+/// Calls visit(s, chain) with chain = C(s) A(s) / (C(base) A(base)) for every s != base from s_min to s_max for which
+/// it is not zero, walking outward from `base`, a technique that can produce the path.
 template <class Visit>
 LL_ALWAYS_INLINE inline void for_each_split(const PathView& view, int base, int s_min, int s_max, Visit&& visit) {
     WideProduct chain;
@@ -141,8 +143,8 @@ LL_ALWAYS_INLINE inline void for_each_split(const PathView& view, int base, int 
     }
 }
 
-/// w of technique `own` for the path in `on`'s view, in [0, 1]; zero when the selection has switched it off. `own` must be able to
-/// produce the path.
+/// The weight of technique `own` for the path in `on`'s view, in [0, 1]; zero when the selection has switched it off.
+/// `own` must be able to produce the path.
 template <class OnPath>
 double mis_weight(const PathView& view, Technique own, const OnPath& on, Heuristic heuristic = Heuristic::kBalance) {
     const int k = view.k, base = own.s;

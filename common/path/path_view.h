@@ -8,7 +8,7 @@
 
 namespace lightloom {
 
-/// Longest path, in edges. Scenes that ask for more are refused by name.
+/// Longest path, in edges. A scene that asks for more is refused.
 inline constexpr int kMaxEdges = 256;
 
 struct PathView {

@@ -2,8 +2,8 @@
 // The random walk of both sub-paths.
 //
 // Russian roulette divides the throughput by the true survival probability and stays out of every density: the weights
-// are a function of the path alone, and roulette is the same function of a sub-path's own throughput for every technique. What
-// weights may know of it: common/path/survival.h.
+// are a function of the path alone, and roulette is the same function of a sub-path's own throughput for every
+// technique. survival.h is what weights may know of roulette.
 
 #include "common/core/rng.h"
 #include "common/path/path_view.h"
@@ -83,7 +83,7 @@ inline Rgb light_step(const PathVertex& v, const BsdfSample& s, const Vec3& to_l
     if (s.delta) {
         factor *= std::fabs(s.wi.z / v.wo_local.z) * index_ratio2(v, s.wi);
     }
-    // No density from the light: no prefix of light tracing crosses this vertex, and whoever asks finds C = 0 first.
+    // Without a density from the light no light prefix crosses this vertex, and the caller finds C = 0 first.
     return std::isfinite(factor) ? s.weight * factor : Rgb{};
 }
 
@@ -92,7 +92,7 @@ template <TransportMode mode>
 bool leave(PathVertex* v, PathVertex* previous, const ScatterSample& u, WalkRay* ray) {
     BsdfSample s;
     if (!v->bsdf.sample(v->wo_local, u.lobe, u.direction, mode, &s)) return false;
-    if (!(s.pdf_fwd > 0)) return false;  // exactly grazing: weights divide by this density
+    if (!(s.pdf_fwd > 0)) return false;  // exactly grazing, but weights divide by this density
     ray->direction = v->shading.to_world(s.wi);
     Rgb weight = s.weight;
     if constexpr (mode == TransportMode::kImportance) {
@@ -115,12 +115,13 @@ bool leave(PathVertex* v, PathVertex* previous, const ScatterSample& u, WalkRay*
     return true;
 }
 
-/// False when roulette ends the walk; otherwise the throughput is divided by the survival probability: the share of its power that
-/// the sub-path has kept since it began with the throughput `start`. One that has lost nothing always goes on.
+/// False when roulette ends the walk; otherwise the throughput is divided by the survival probability. This is the
+/// share of its power that the sub-path has kept since it began with the throughput `start`, but at least
+/// rule.min_survival; a sub-path that has lost nothing always goes on.
 inline bool survive(const RouletteRule& rule, int vertex_index, float start, float u, WalkRay* ray) {
     if (vertex_index < rule.first_vertex) return true;
     const float q = clamp(scalar_of(ray->alpha) * ray->index_ratio2 / start, rule.min_survival, 1.0f);
-    constexpr float kLossless = 1 - 1e-5f;  // what rounding makes of a hundred events that lose nothing
+    constexpr float kLossless = 1 - 1e-5f;  // what rounding leaves of 1 after a hundred lossless events
     if (q > kLossless) return true;
     if (u >= q) return false;
     ray->alpha *= 1 / q;

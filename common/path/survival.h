@@ -1,8 +1,9 @@
 #pragma once
-// How the weights reckon with Russian roulette. The estimator divides by the true survival probability, which depends on the
-// throughput of the walk that was taken; the weights take a function of how many vertices played it and lose light, so that they
-// sum to one whatever roulette does. (Glass loses nothing, and a walk that is caught in it for fifty events is as alive as before.)
-// Without it, a technique is trusted as if its long sub-paths were never ended.
+// How the weights take Russian roulette into account. The estimator divides by the true survival probability, which
+// depends on the throughput of the walk that was taken. The weights use a function of the number of vertices that
+// played roulette and lose light instead, so that they sum to one whatever roulette does. (Glass loses nothing: a walk
+// that is caught in it for fifty events is as sure to go on as before.) Without this, a technique would be trusted as
+// if its long sub-paths were never ended.
 
 #include <algorithm>
 #include <array>
@@ -18,11 +19,11 @@ namespace lightloom {
 /// if that is more, for each time that it was played.
 class TypicalSurvival {
   public:
-    /// What survives a surface of middling reflectance, once the throughput stays near the survival that it is divided by. Between
-    /// 0.5 and 0.75 the noise of `lvcbpt` and `spcbpt` hardly differs; `bdpt` gains nothing and does without.
+    /// The usual survival probability after a surface of medium reflectance. Between 0.5 and 0.75 the noise of `lvcbpt`
+    /// and `spcbpt` hardly differs; `bdpt` gains nothing and does without.
     static constexpr float kPerEvent = 0.6f;
 
-    /// Without roulette.
+    /// Without roulette every sub-path survives.
     TypicalSurvival() { shares_.fill(1); }
     explicit TypicalSurvival(const RouletteRule& rule) : first_vertex_(rule.first_vertex) {
         const double q = double(std::max(rule.min_survival, kPerEvent));
@@ -42,7 +43,7 @@ class TypicalSurvival {
     int first_vertex_ = kMaxEdges + 2;
 };
 
-/// The same for the sub-paths of one path, of which lossless vertices do not count.
+/// The same for the sub-paths of a given path, whose lossless vertices do not count.
 class PathSurvival {
   public:
     LL_ALWAYS_INLINE PathSurvival(const TypicalSurvival& typical, const PathView& view) : typical_(typical), k_(view.k) {
@@ -51,12 +52,12 @@ class PathSurvival {
         if (any) [[unlikely]]
             mark(view);
     }
-    /// Of light sub-paths x_0 ... x_{s-1}.
+    /// The share of light sub-paths x_0 ... x_{s-1} that survive.
     double light(int s) const {
         const int first = typical_.first_vertex();
         return typical_(any_ && s > first ? s - lossless(first - 1, s - 1) : s);
     }
-    /// Of camera sub-paths x_k ... x_{k-t+1}.
+    /// The share of camera sub-paths x_k ... x_{k-t+1} that survive.
     double camera(int t) const {
         const int first = typical_.first_vertex();
         return typical_(any_ && t > first ? t - lossless(k_ - t + 2, k_ - first + 2) : t);
@@ -68,7 +69,7 @@ class PathSurvival {
         std::fill_n(words_, k_ / 64 + 1, 0);
         for (int i = 1; i < k_; ++i) words_[i / 64] |= uint64_t(view.lossless[i]) << (i % 64);
     }
-    /// How many of x_begin ... x_{end-1} are, 0 < begin <= end <= k.
+    /// How many of x_begin ... x_{end-1} are lossless, 0 < begin <= end <= k.
     int lossless(int begin, int end) const {
         int count = 0;
         for (int w = begin / 64; w <= (end - 1) / 64; ++w) {

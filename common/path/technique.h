@@ -1,6 +1,7 @@
 #pragma once
-// The ways in which a path can be made, by name. Two of them may share a split of the path (next event estimation and a cached
-// point on a light both leave one light vertex), so a number of light vertices alone names none.
+// The ways in which a path can be made, by name. Two of them may share a split of the path (next event estimation and a
+// cached point on a light both leave one light vertex), so that the number of light vertices alone does not identify a
+// technique.
 
 #include <cstdint>
 #include <string_view>
@@ -16,7 +17,7 @@ enum class TechniqueKind : uint8_t {
 };
 inline constexpr int kTechniqueKinds = 5;
 
-/// Lower-case words, for people and for files.
+/// Lower-case words, for reports and files.
 constexpr std::string_view to_string(TechniqueKind kind) {
     constexpr std::string_view kNames[] = {"hit", "next event", "connect", "lens", "merge"};
     return kNames[int(kind)];
@@ -33,7 +34,7 @@ struct Technique {
     static constexpr Technique lens(int k) { return {TechniqueKind::kLens, k}; }
     static constexpr Technique merge(int i) { return {TechniqueKind::kMerge, i}; }
 
-    /// Vertices of the light sub-path, the one at which a merge met the camera's included.
+    /// Vertices of the light sub-path; of a merge, including the one at which it met the camera sub-path.
     constexpr int light_vertices() const { return kind == TechniqueKind::kMerge ? s + 1 : s; }
     /// Whether the contribution may land in any pixel, because no camera sub-path decided which.
     constexpr bool splats() const { return kind == TechniqueKind::kLens; }

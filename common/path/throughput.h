@@ -10,8 +10,8 @@
 
 namespace lightloom {
 
-/// For a path of technique s that was completed with ViewDetail::kSubspace from light prefix y[0 .. s-1] (s >= 2; for s <= 1 y is
-/// not read) and camera suffix z[0 .. t-1].
+/// Fills in light_throughput of a path of technique s that was completed with ViewDetail::kSubspace from light prefix
+/// y[0 .. s-1] (s >= 2; for s <= 1 y is not read) and camera suffix z[0 .. t-1].
 inline void view_throughput(const LightSubPath& y, int s, const PathVertex* z, PathView* view) {
     const int k = view->k;
     Rgb beta;

@@ -14,21 +14,21 @@ inline constexpr uint16_t kNoLabel = 0xffff;
 /// every vertex of a sub-path comes first and fills one cache line.
 struct SubPathVertex {
     double fwd = 0;      ///< Density of this vertex as traced; area, or native measure at y_0.
-    double rev = 0;      ///< Density of this vertex as traced from its successor's far side; set when both exist.
+    double rev = 0;      ///< Density of this vertex as traced from its successor; set when the successor has scattered.
     Vec3 p;              ///< Position.
     Rgb alpha;           ///< Throughput of the sub-path up to here, before this vertex scatters.
     float survival = 1;  ///< Product of the survival probabilities that alpha was divided by: alpha * survival is free of roulette.
-    /// Light subspace of the prefix, or eye subspace of the suffix, that ends here as traced; and of the other kind, seen from
-    /// the successor. kNoLabel until a method with tables asks for them.
+    /// Light subspace of the prefix, or eye subspace of the suffix, that ends here as traced; reverse_label is of the
+    /// other kind, as seen from the successor. kNoLabel until a method with tables asks for them.
     uint16_t label = kNoLabel, reverse_label = kNoLabel;
-    /// Where the classifier of reverse_label goes on for this vertex as seen from wo's side (SubspaceTree::label_and_settle()); 0:
-    /// the root.
+    /// Node from which the classifier of reverse_label goes on if this vertex is seen from wo's side
+    /// (SubspaceTree::label_and_settle()); 0 is the root.
     uint32_t reverse_branch = 0;
     int32_t emitter = kNone;  ///< Emitter that this vertex lies on.
     float to_previous = 0;    ///< Turns a solid-angle density at this vertex towards the predecessor into the predecessor's
                               ///< density: |cos| / d^2, 1 for an infinite light, 0 for a light that cannot be hit.
     bool delta = false;       ///< The sub-path went on through a Dirac lobe.
-    bool lossless = false;    ///< Bsdf::is_lossless(): roulette ends no sub-path here.
+    bool lossless = false;    ///< Bsdf::is_lossless(): no light is lost here.
     Vec3 ng;                  ///< Geometric normal (at an infinite light's y_0: the direction of travel).
     Vec3 wo;                  ///< Unit, towards the predecessor.
     float reach = 0;          ///< SurfacePoint::reach.
@@ -41,8 +41,9 @@ struct PathVertex : SubPathVertex {
     Frame shading;
     Vec3 wo_local;  ///< `wo` in the shading frame.
     Bsdf bsdf;
-    /// Camera sub-paths, once it has scattered: what light tracing would multiply a prefix's F / C by when it crosses this
-    /// vertex the other way, from the successor to the predecessor (BSDF, adjoint correction, density; see PathView::step).
+    /// For camera sub-paths, once the vertex has scattered: what light tracing would multiply a prefix's F / C by when
+    /// it crosses this vertex the other way, from the successor to the predecessor (BSDF, adjoint correction, density;
+    /// see PathView::step).
     Rgb step;
 
     void set_bsdf(const Bsdf& b) {

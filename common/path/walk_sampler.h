@@ -15,7 +15,7 @@ class WalkSampler {
         lobe_rest_ = u.y;
         return {u.x, n == 2 ? point(scattering_) : rng_.uniform2()};
     }
-    /// A uniform that comes for free with scattering().
+    /// A uniform number that scattering() has left over.
     float roulette() const { return lobe_rest_; }
     Rng& rng() { return rng_; }
 
@@ -27,7 +27,7 @@ class WalkSampler {
           scattering_(scattering),
           index_(index) {}
 
-    /// The points of one place are independent of one another.
+    /// Points with different numbers are independent of one another.
     Vec2 point(uint64_t number) const { return low_discrepancy_point(index_, scramble_ + number); }
 
   private:

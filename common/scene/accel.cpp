@@ -51,7 +51,7 @@ RTCScene new_scene() {
     return s;
 }
 
-/// Whether what was committed has been built.
+/// Whether Embree has built everything that was committed.
 Status built() {
     if (const RTCError error = rtcGetDeviceError(device()); error != RTC_ERROR_NONE)
         return internal_error("Embree could not build the acceleration structure (error " + std::to_string(int(error)) +
@@ -89,7 +89,8 @@ bool passes_through(const GeometryUser& g, uint32_t instance_id, uint32_t primit
     const float opacity = g.opacity(g.opacity_user, {g.object, instance, g.geometry, primitive, uv.x, uv.y, outward});
     if (opacity >= 1) return false;
     if (opacity <= 0) return true;
-    // The object too: a ray that crosses two objects through identity instances meets equal geometry and primitive numbers.
+    // The object is part of the hash, too: a ray that crosses two objects through identity instances meets equal
+    // geometry and primitive numbers.
     const uint64_t id = ((uint64_t(g.geometry * 2 + salt) << 32) | primitive) ^ mix64(uint64_t(g.object + 1));
     return ray_hash(ray.org_x, ray.org_y, ray.org_z, ray.dir_x, ray.dir_y, ray.dir_z, id) >= opacity;
 }
@@ -102,8 +103,9 @@ void alpha_filter(const RTCFilterFunctionNArguments* args) {
     if (passes_through(g, args->context->instID[0], hit.primID, 0, {hit.u, hit.v}, {}, ray)) args->valid[0] = 0;
 }
 
-/// Embree asks for bounds on threads of TBB and waits for them; both come without instrumentation, so that ThreadSanitizer does not
-/// see that what a callback has read may be freed afterwards. This orders the two once more, where it does see it.
+/// Embree asks for bounds on threads of TBB and waits for them; both come without instrumentation, so that
+/// ThreadSanitizer does not see that what a callback has read may be freed afterwards. This counter orders the two once
+/// more, in a way that it does see.
 std::atomic<uint64_t> bounds_asked{0};
 
 void sphere_bounds(const RTCBoundsFunctionArguments* args) {
@@ -113,13 +115,14 @@ void sphere_bounds(const RTCBoundsFunctionArguments* args) {
     bounds_asked.fetch_add(1, std::memory_order_release);
 }
 
-/// Both roots in double: a sphere of glass is hit from inside at grazing angles, where float cancels. `t` ascending.
+/// Both roots, `t` ascending. They are computed in double, because a sphere of glass is hit from inside at grazing
+/// angles, where float cancels.
 int sphere_roots(const Sphere& s, const RTCRay& ray, double t[2]) {
     const double ox = double(ray.org_x) - s.centre.x, oy = double(ray.org_y) - s.centre.y, oz = double(ray.org_z) - s.centre.z;
     const double dx = ray.dir_x, dy = ray.dir_y, dz = ray.dir_z, r = s.radius;
     const double a = dx * dx + dy * dy + dz * dz;
     const double b = ox * dx + oy * dy + oz * dz;
-    // The discriminant through the perpendicular from the centre, which does not cancel far from the sphere.
+    // This form of the discriminant, by the perpendicular from the centre, does not cancel far from the sphere.
     const double px = ox - b / a * dx, py = oy - b / a * dy, pz = oz - b / a * dz;
     const double discriminant = r * r - (px * px + py * py + pz * pz);
     if (discriminant < 0) return 0;
@@ -208,7 +211,7 @@ struct Accel::Impl {
         const TriangleMesh& mesh = meshes[i];
         RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
         rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.positions.data(), 0, sizeof(Vec3),
-                                   mesh.positions.size() - 1);  // the last one is padding
+                                   mesh.positions.size() - 1);  // the last vertex is padding
         rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices.data(), 0, 3 * sizeof(uint32_t),
                                    mesh.indices.size() / 3);
         if (mesh.attributes.alpha != kNone) {
@@ -334,7 +337,7 @@ void Accel::for_each_near(const Vec3& centre, float radius, const std::function<
         at.primitive = args->primID;
         at.instance = args->context->instStackSize > 0 ? v.impl.instance_of(args->context->instID[0]) : -1;
         v.done = !v.visit(at);
-        if (!v.done) return false;  // the radius stays what it is
+        if (!v.done) return false;  // the search radius stays the same
         args->query->radius = 0;
         return true;
     };

@@ -77,7 +77,8 @@ bool Bsdf::sample_other(const Vec3& wo, float lobe, Vec2 u, TransportMode mode, 
 }
 
 Rgb Bsdf::albedo() const {
-    // At normal incidence, where a feature layer is mostly looked at.
+    // The coat's reflectance at normal incidence stands for all directions, because feature layers mostly show surfaces
+    // from the front.
     const float coat = fresnel_dielectric(1, eta).reflectance;
     switch (kind) {
         case BsdfKind::kNull: return Rgb(0);

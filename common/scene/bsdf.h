@@ -7,9 +7,9 @@
 // f_radiance(wo -> wi) = f_importance(wo -> wi) / (eta_wi side / eta_wo side)^2 as usual [Veach 1997, 5.2]; `mode` selects.
 // The correction for shading normals is NOT in here (common/path applies it): the surface is the shading frame's.
 //
-// Interfaces are GGX with height-correlated Smith masking and the visible-normal density, as in pbrt-v4, so that pictures
-// agree with it; coats are analytic (bsdf_coated.cpp). Every kind but the dielectrics is two-sided: it looks the same from
-// below. Make a Bsdf with one of the functions at the end; its fields are their business and the evaluation's.
+// Interfaces are GGX with height-correlated Smith masking and the visible-normal density, as in pbrt-v4, so that
+// pictures agree with it; coats are analytic (bsdf_coated.cpp). Every kind but the dielectrics is two-sided: it looks
+// the same from below. Make a Bsdf with one of the functions at the end; only these and the evaluation use its fields.
 
 #include <cstdint>
 #include <type_traits>
@@ -48,8 +48,8 @@ struct BsdfSample {
     bool delta = false;  ///< The lobe chosen is a Dirac distribution: this vertex's event is not connectible.
 };
 
-/// A function of |cos| at one roughness: two neighbouring rows of a table (bsdf_tables.h) and where between them to look.
-/// The rows live as long as the program.
+/// A function of |cos| at one roughness: two neighbouring rows of a table (bsdf_tables.h) and the position between
+/// them. The rows live as long as the program.
 struct TableRows {
     const float* rows = nullptr;
     float fraction = 0;
@@ -57,7 +57,7 @@ struct TableRows {
 
 struct Bsdf {
     BsdfKind kind = BsdfKind::kNull;
-    bool black = true;                         ///< No light leaves: nothing to sample or to connect to.
+    bool black = true;                         ///< No light leaves: there is nothing to sample or to connect to.
     float eta = 1;                             ///< Relative index: below the surface (z < 0) over above; a coat's over outside.
     float alpha_x = 0, alpha_y = 0;            ///< GGX alpha of the interface (of the coat for coated kinds); 0 is smooth (delta).
     Rgb reflectance;                           ///< Diffuse albedo; conductor: eta; kCoatedDiffuse: see base_weight.
@@ -75,9 +75,10 @@ struct Bsdf {
     bool has_smooth_lobe() const;
     /// True if some lobe is a Dirac delta.
     bool has_delta_lobe() const;
-    /// Whether all light that arrives leaves again, but for what a rough interface loses between its facets.
+    /// Whether all light that arrives leaves again, except for what a rough interface loses between its facets.
     bool is_lossless() const { return kind == BsdfKind::kDielectric || kind == BsdfKind::kThinDielectric; }
-    /// All zero when both directions are such that no non-delta lobe scatters; never NaN for finite unit directions.
+    /// All values are zero when no non-delta lobe scatters between the directions; none is NaN for finite unit
+    /// directions.
     BsdfEval eval(const Vec3& wo, const Vec3& wi, TransportMode mode) const;
     /// `lobe` in [0,1) picks the lobe, `u` in [0,1)^2 the direction. False when the walk ends here (absorbed or degenerate).
     bool sample(const Vec3& wo, float lobe, Vec2 u, TransportMode mode, BsdfSample* out) const;
@@ -90,7 +91,7 @@ struct Bsdf {
 };
 static_assert(std::is_trivially_copyable_v<Bsdf> && sizeof(Bsdf) <= 112);
 
-/// Lambertian, on whichever side wo is. Albedo per channel, clamped to [0, 1] as in pbrt.
+/// Lambertian reflection on the side of wo. The albedo is clamped per channel to [0, 1], as in pbrt.
 Bsdf make_diffuse(const Rgb& reflectance);
 /// Lambertian on both sides of a thin sheet; albedos clamped to [0, 1] each.
 Bsdf make_diffuse_transmission(const Rgb& reflectance, const Rgb& transmittance);
@@ -109,7 +110,7 @@ Bsdf make_coated_diffuse(const Rgb& reflectance, float eta, float thickness, flo
 Bsdf make_coated_conductor(const Rgb& conductor_eta, const Rgb& conductor_k, float base_alpha_x, float base_alpha_y, float eta,
                            float thickness, float alpha_x, float alpha_y);
 
-// The Lambertian case inline: in an interior it is most of the work.
+// The Lambertian case is inline, because in an interior it is most of the work.
 
 inline bool Bsdf::has_smooth_lobe() const {
     switch (kind) {
@@ -139,7 +140,7 @@ inline bool Bsdf::has_delta_lobe() const {
     return false;
 }
 
-/// Bsdf::eval() of the Lambertian kind, which reads of both directions only where they stand against the normal.
+/// Bsdf::eval() of the Lambertian kind, which depends only on the cosines of both directions.
 inline BsdfEval eval_diffuse(const Rgb& reflectance, float wo_z, float wi_z) {
     if (!(wo_z * wi_z > 0)) return {};
     return {reflectance * kInvPi, std::fabs(wi_z) * kInvPi, std::fabs(wo_z) * kInvPi};

@@ -47,10 +47,10 @@ float make_coat(Bsdf* b, float eta, float thickness, float alpha_x, float alpha_
 
 struct CoatSide {
     float transmitted;  ///< A.
-    float reflected;    ///< E; of a rough coat with its losses, which only choosing lobes sees.
+    float reflected;    ///< E; a rough coat's includes its losses, which matter for the choice of lobes only.
 };
 
-/// For the cosine outside.
+/// `cos` is the cosine outside the coat.
 CoatSide coat_side(const Bsdf& b, float cos) {
     if (b.alpha_x > 0) {
         const float transmitted = look_up(b.coat_transmission, cos);
@@ -81,7 +81,7 @@ float diffuse_coat_pmf(const Bsdf& b, const CoatSide& side) {
     return side.reflected + base > 0 ? side.reflected / (side.reflected + base) : 1.0f;
 }
 
-/// What the lobes of a coated conductor share for one direction.
+/// The values that the lobes of a coated conductor share for one direction.
 struct ConductorSide {
     CoatSide coat;
     float trapped;             ///< W.
@@ -92,8 +92,8 @@ ConductorSide conductor_side(const Bsdf& b, const Vec3& w) {
     ConductorSide s;
     s.coat = coat_side(b, w.z);
     s.trapped = look_up(b.trapped, w.z);
-    // A rough coat transmits something beyond the critical angle too, but no refracted direction says where it meets the base: that
-    // lobe has no value there, so it must not be drawn either.
+    // A rough coat also transmits light beyond the critical angle, but without a refracted direction the base's lobe
+    // has no value there, so that it must not be drawn either.
     const float base = refracted(w, b.eta).z > 0 ? s.coat.transmitted * b.base_weight * (1 - s.trapped) : 0.0f;
     const float diffuse = s.coat.transmitted * s.trapped * b.trapped_reflectance.average();
     const float sum = s.coat.reflected + base + diffuse;
@@ -134,7 +134,7 @@ Bsdf make_coated_conductor(const Rgb& conductor_eta, const Rgb& conductor_k, flo
     const Ggx base = regularised(blurred(base_alpha_x, b.alpha_x), blurred(base_alpha_y, b.alpha_y));
     b.base_alpha_x = base.alpha_x;
     b.base_alpha_y = base.alpha_y;
-    // The mean reflectance of the base is Fresnel's at the mean cosine, 2/3.
+    // The mean reflectance of the base is taken as Fresnel's at the mean cosine, 2/3.
     const Rgb mean = fresnel_conductor(2.0f / 3, b.reflectance, b.transmittance);
     b.base_weight = mean.average();
     if (base.alpha_x == 0) return b;

@@ -42,7 +42,7 @@ BsdfEval eval_dielectric(const Bsdf& b, const Vec3& wo, const Vec3& wi, Transpor
     const Vec3 h = wo + etap * wi;
     const float so = ggx.slope_length(wo), si = ggx.slope_length(wi);
     const float oh = dot(wo, h), ih = dot(wi, h);
-    // A facet is seen from the sides on which the directions lie.
+    // A facet must be visible from both directions.
     const float up = h.z > 0 ? 1.0f : -1.0f;
     if (!(up * oh * wo.z > 0) || !(up * ih * wi.z > 0)) return {};
     const float denominator = so * zi + si * zo;
@@ -68,7 +68,7 @@ bool sample_dielectric(const Bsdf& b, const Vec3& wo, float lobe, Vec2 u, Transp
     if (wo.z == 0) return false;
     const bool smooth = b.alpha_x == 0;
     const float side = wo.z > 0 ? 1.0f : -1.0f;
-    // Everything on the upper side, with the index seen from there.
+    // From here on directions are on the upper side, and the index is the one seen from there.
     const Vec3 w{wo.x, wo.y, std::fabs(wo.z)};
     const Vec3 m = smooth ? Vec3{0, 0, 1} : Ggx{b.alpha_x, b.alpha_y}.sample_visible_normal(w, u);
     const float cos_m = dot(w, m);

@@ -40,10 +40,11 @@ struct Ggx {
     }
 };
 
-/// Both directions so close to the horizon that f, which grows like 1 / cos there, would leave float's range.
+/// Below this, both directions are so close to the horizon that f, which grows like 1 / cos there, would exceed float's
+/// range.
 inline constexpr float kLeastDenominator = 1e-30f;
 
-/// What a reflecting microfacet lobe shares between its value and its densities, for wo and wi above the surface.
+/// Value and densities of a reflecting microfacet lobe, for wo and wi above the surface.
 struct MicrofacetReflection {
     float value = 0;    ///< D G2 / (4 cos cos): the BRDF without Fresnel.
     float pdf_fwd = 0;  ///< Solid-angle density of wi: visible normal at wo, then mirrored.
@@ -62,13 +63,13 @@ inline MicrofacetReflection microfacet_reflection(const Ggx& ggx, const Vec3& wo
     return {half_density / denominator, half_density / (so + wo.z), half_density / (si + wi.z), cos_h < 1 ? cos_h : 1.0f};
 }
 
-/// Smooth surfaces are told apart as in pbrt: both alphas below this are a mirror.
+/// A surface with both alphas below this is a mirror, as in pbrt.
 inline constexpr float kSmoothAlpha = 1e-3f;
-/// The sharpest axis of an anisotropic rough surface, as in pbrt.
+/// Smallest alpha along one axis of an anisotropic rough surface, as in pbrt.
 inline constexpr float kLeastAlpha = 1e-4f;
 
 inline Ggx regularised(float alpha_x, float alpha_y) {
-    // Not-a-number counts as smooth.
+    // NaN counts as smooth.
     if (!(alpha_x >= kSmoothAlpha) && !(alpha_y >= kSmoothAlpha)) return {0, 0};
     return {alpha_x > kLeastAlpha ? alpha_x : kLeastAlpha, alpha_y > kLeastAlpha ? alpha_y : kLeastAlpha};
 }

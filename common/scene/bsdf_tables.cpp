@@ -9,8 +9,8 @@
 namespace lightloom {
 namespace {
 
-/// Insert-only list: readers never wait, and two threads that build the same table build the same numbers. Entries live as
-/// long as the program, because every Bsdf may point into them.
+/// A list that only grows: readers never wait, and two threads that build the same table compute the same numbers.
+/// Entries live as long as the program, because every Bsdf may point into them.
 class TableCache {
   public:
     using Build = void (*)(float eta, float thickness, DirectionalTable* table);
@@ -50,9 +50,10 @@ class TableCache {
 float knot_cosine(int i) { return sqr(float(i) / (DirectionalTable::kCosines - 1)); }
 float knot_alpha(int i) { return sqr(sqr(lerp(float(i) / (DirectionalTable::kAlphas - 1), DirectionalTable::kFirstRoot, 1.0f))); }
 
-/// Integrates one microfacet event over visible normals: the mean of weight(wo.m, m, &wi) G2 / G1 for light that arrives along
-/// `wo` in the xz plane and goes on along wi. The azimuth runs over half a turn, since the lobe of an isotropic interface is
-/// symmetric; the height u of Ggx::sample_visible_normal is substituted by 1 - (1 - t)^2: more points in GGX's tail.
+/// Integrates one microfacet event over visible normals: the mean of weight(wo.m, m, &wi) G2 / G1 for light that
+/// arrives along `wo` in the xz plane and goes on along wi. The azimuth runs over half a turn, since the lobe of an
+/// isotropic interface is symmetric; the height u of Ggx::sample_visible_normal is substituted by 1 - (1 - t)^2, which
+/// puts more points into GGX's tail.
 class EventQuadrature {
   public:
     EventQuadrature() {
@@ -95,7 +96,7 @@ Vec3 at_cosine(float cos) { return {safe_sqrt(1 - cos * cos), 0, cos}; }
 
 void build_coat(float eta, float thickness, DirectionalTable* table) {
     const EventQuadrature event;
-    // Diffuse light inside: midpoints of equal projected solid angle.
+    // Diffuse light inside is represented by midpoints of equal projected solid angle.
     constexpr int kInner = 24;
     for (int a = 0; a < DirectionalTable::kAlphas; ++a) {
         const float alpha = knot_alpha(a);
@@ -169,7 +170,7 @@ float cosine_mean_of_product(const TableRows& a, const TableRows& b) {
     static_assert(DirectionalTable::kCosines % kLanes == 0);
     const float *a0 = a.rows, *a1 = a.rows + DirectionalTable::kCosines;
     const float *b0 = b.rows, *b1 = b.rows + DirectionalTable::kCosines;
-    // Independent sums, so that the compiler may use vectors without reordering anything.
+    // The sums are independent, so that the compiler may use vectors without reordering additions.
     float sums[kLanes] = {};
     for (int i = 0; i < DirectionalTable::kCosines; i += kLanes)
         for (int l = 0; l < kLanes; ++l) {

@@ -1,6 +1,7 @@
 #pragma once
-// Tables behind the coats: how much light a rough dielectric interface lets through, over angle and roughness. One table per
-// index of refraction and thickness, computed by fixed quadrature when the pair is first seen, from nothing else.
+// Tables behind the coats: how much light a rough dielectric interface lets through, over angle and roughness. One
+// table per index of refraction and thickness, computed by fixed quadrature when the pair first occurs; it depends on
+// nothing else.
 
 #include <algorithm>
 #include <cmath>
@@ -9,19 +10,19 @@
 
 namespace lightloom {
 
-/// A function of (|cos|, alpha): linear between knots that are equidistant in sqrt(|cos|) and in the fourth root of alpha
-/// (from the least rough alpha on), which puts them where the albedo bends: where |cos| and alpha are alike.
+/// A function of (|cos|, alpha): linear between knots that are equidistant in sqrt(|cos|) and in the fourth root of
+/// alpha (from the least rough alpha on), which puts them where the albedo bends: where |cos| and alpha are similar.
 struct DirectionalTable {
     static constexpr int kCosines = 96;
     static constexpr int kAlphas = 80;
     static constexpr float kFirstRoot = 0.17f;  ///< alpha = 8.4e-4, below which interfaces are smooth.
     float values[kAlphas][kCosines];
-    /// A second function, of alpha alone.
+    /// A second function, which depends on alpha alone.
     float per_alpha[kAlphas];
     /// The same for alpha = 0, where per-direction values come from Fresnel's equations instead.
     float at_zero;
 
-    /// `alpha` is moved into the table's range, which ends at 1.
+    /// `alpha` is clamped to the table's range, which ends at 1.
     TableRows rows(float alpha) const {
         int row;
         const float fraction = locate(alpha, &row);
@@ -63,14 +64,15 @@ inline float slab_transmittance(float thickness, float cos) {
     return cos2 > 0 ? cos2 / (cos2 + thickness * (cos + 0.5f * thickness)) : (thickness > 0 ? 0.0f : 1.0f);
 }
 
-/// values: share of the light arriving from outside that gets to the bottom of a coat of this index and optical thickness
-/// (one scattering event at the rough interface, then the slab). per_alpha: share of diffuse light leaving the bottom that
-/// the coat returns to it. Thread-safe; builds the table at the first call for its arguments (some 50 ms), after that it is
-/// a walk over the few coats of a scene.
+/// values: share of the light arriving from outside that gets to the bottom of a coat of this index and optical
+/// thickness (one scattering event at the rough interface, then the slab). per_alpha: share of diffuse light leaving
+/// the bottom that the coat returns to it. Thread-safe; the first call for given arguments builds the table (some 50
+/// ms); later calls search the few coats of a scene.
 const DirectionalTable& coat_table(float eta, float thickness);
 
-/// values: of what a perfectly reflecting rough base under a smooth coat reflects, the share beyond the critical angle, over
-/// the cosine outside of the light that came in. Zero for eta <= 1. Thread-safe in the same way.
+/// values: the share of a perfectly reflecting rough base's reflection, under a smooth coat, that lies beyond the
+/// critical angle, as a function of the incoming light's cosine outside the coat. Zero for eta <= 1. Thread-safe like
+/// coat_table().
 const DirectionalTable& trapped_table(float eta);
 
 }  // namespace lightloom

@@ -6,12 +6,12 @@
 namespace lightloom {
 namespace {
 
-/// Of u and v, in which textures are looked up beside the point.
+/// Step of u and v at which textures are looked up beside the point.
 constexpr float kStep = 0.0005f;
 
 Vec3 perpendicular(const Vec3& v, const Vec3& unit_n) { return v - unit_n * dot(v, unit_n); }
 
-/// `n` as a unit vector if it has a direction.
+/// Makes `n` a unit vector; false if it has no direction.
 bool normalise(Vec3* n) {
     const float len2 = length_squared(*n);
     if (!(len2 > 0) || !std::isfinite(len2)) return false;
@@ -72,7 +72,7 @@ SurfaceTangents tangents_of(const TriangleMesh& mesh, const RawHit& hit) {
 SurfaceTangents tangents_of(const Sphere& sphere, const Vec3& outward) {
     const Vec3 local = sphere.orientation.to_local(outward);
     const float sine = safe_sqrt(local.x * local.x + local.y * local.y);
-    // The azimuth of the poles, where dp/du is nothing, is any.
+    // At the poles, where dp/du vanishes, any azimuth will do.
     const float cos_phi = sine > 0 ? local.x / sine : 1, sin_phi = sine > 0 ? local.y / sine : 0;
     const float turn = kTwoPi * sphere.radius, half_turn = kPi * sphere.radius;  // u goes once around, v from pole to pole
     SurfaceTangents out;
@@ -95,7 +95,7 @@ Frame tilted_frame(const TextureTables& tables, const Material& material, const 
         const Vec3 t = tangents.mirrored ? -flat.t : flat.t;
         n = flat.s * (2 * code.r - 1) + t * (2 * code.g - 1) + flat.n * (2 * code.b - 1);
     } else {
-        // (u, v) may be so large that the step is rounded, and in the end away.
+        // Where (u, v) is large the step is rounded, in the end to zero.
         const float du = (point.uv.x + kStep) - point.uv.x, dv = (point.uv.y + kStep) - point.uv.y;
         const auto height = [&](float u, float v) {
             return evaluate_texture(tables, material.displacement,
@@ -107,12 +107,13 @@ Frame tilted_frame(const TextureTables& tables, const Material& material, const 
         dpdu = tangents.dpdu + flat.n * slope_u + tangents.dndu * h;
         Vec3 dpdv = tangents.dpdv + flat.n * slope_v + tangents.dndv * h;
         if (dpdu == tangents.dpdu && dpdv == tangents.dpdv) return flat;
-        // Of unit length first: the square of the product of small ones is below single precision.
+        // The tangents are normalised first, because the squared product of small ones underflows in single precision.
         if (!normalise(&dpdu) || !normalise(&dpdv)) return flat;
         n = cross(dpdu, dpdv);
     }
     if (!normalise(&n)) return flat;
-    // On the side that the frame had; that of an emitter's normals may be turned away from the geometric one.
+    // The normal stays on the side of the unmodified frame's; an emitter's interpolated normals may be turned away from
+    // the geometric one.
     const Vec3 side = dot(flat.n, point.ng) < 0 ? -point.ng : point.ng;
     return frame_along(face_forward(n, side), dpdu);
 }

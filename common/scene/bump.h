@@ -5,8 +5,9 @@
 //
 // As in pbrt-v4, a height h(u, v) along the shading normal n gives
 //     dp/du' = dp/du + dh/du n + h dn/du,   dp/dv' likewise,   n' along dp/du' x dp/dv', on the side of the geometric normal,
-// and dh/du is a quotient of differences. pbrt's step is the footprint of a camera's pixel where it knows that, and 0.0005
-// otherwise. Here it is 0.0005 always: the normal has to be the same for every technique that finds the point.
+// and dh/du is a quotient of differences. pbrt's step is the footprint of a camera's pixel where it is known, and
+// 0.0005 otherwise. Here the step is always 0.0005, because the normal has to be the same for every technique that
+// finds the point.
 //
 // A normal map holds a normal's coordinates along dp/du, n x dp/du and n.
 
@@ -35,21 +36,23 @@ struct SurfaceTangents {
     Vec3 dpdu, dpdv;  ///< Perpendicular to the shading normal, scene units.
     Vec3 dndu, dndv;
     Vec3 n;                 ///< The shading normal, unit.
-    bool mirrored = false;  ///< What placed the surface swaps handedness.
+    bool mirrored = false;  ///< The transformation that placed the surface swaps handedness.
 
-    /// To the space that `m` leads to; `inverse` leads back.
+    /// Transforms the tangents by `m`; `inverse` is its inverse.
     void transform(const Mat4& m, const Mat4& inverse);
 };
 
-/// Those of a triangle's point. As in pbrt-v4, a mesh with normals has dp/du turned by 90 degrees for its dp/dv (so that v is
-/// stretched as u is); but a mesh that stands for a curved surface has that surface's own. Where (u, v) is degenerate, two
-/// perpendicular unit vectors. A mirrored mesh is the mirror image of the unmirrored one.
+/// The tangents at a point of a triangle. As in pbrt-v4, a mesh with normals has dp/du turned by 90 degrees for its
+/// dp/dv (so that v is stretched as u is); but a mesh that stands for a curved surface has that surface's tangents.
+/// Where (u, v) is degenerate, the tangents are two perpendicular unit vectors. A mirrored mesh is the mirror image of
+/// the unmirrored one.
 SurfaceTangents tangents_of(const TriangleMesh& mesh, const RawHit& hit);
-/// Those of a sphere at the outward unit normal `outward`.
+/// The tangents of a sphere at the outward unit normal `outward`.
 SurfaceTangents tangents_of(const Sphere& sphere, const Vec3& outward);
 
-/// The shading frame that `material`, which has a displacement or a normal map, gives to `point`, which has its frame without.
-/// A frame that is not defined (a normal of length zero in the map, heights beyond single precision) is the one without.
+/// The shading frame that `material`, with its displacement or normal map, gives to `point`, whose frame is the
+/// unmodified one. Where the new frame is undefined (a normal of length zero in the map, heights beyond single
+/// precision), the unmodified one is returned.
 Frame tilted_frame(const TextureTables& tables, const Material& material, const SurfacePoint& point,
                    const SurfaceTangents& tangents);
 

@@ -56,7 +56,7 @@ Vec3 Camera::sample_lens(Vec2 lens) const {
 
 namespace {
 
-/// The longitude-latitude mapping and the octahedral one have their pole at +z, cameras at +y.
+/// The longitude-latitude and octahedral mappings have their pole at +z, cameras at +y.
 Vec3 swap_yz(const Vec3& d) { return {d.x, d.z, d.y}; }
 
 }  // namespace
@@ -93,7 +93,7 @@ bool Camera::project_other(const Vec3& start, const Vec3& direction, Vec2* film,
         *pdf = inv_pixel_area_;
         return film->x >= 0 && film->x < width && film->y >= 0 && film->y < height;
     }
-    // Every direction has its pixel; what rounds to the far border belongs to the last one.
+    // Every direction belongs to a pixel: what rounds to the far border belongs to the last one.
     constexpr float kBelowOne = 0x1.fffffep-1f;
     Vec2 uv;
     if (kind_ == CameraKind::kEqualArea) {

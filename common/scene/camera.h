@@ -1,9 +1,10 @@
 #pragma once
-// Cameras: perspective with an optional thin lens, orthographic, and two that see in all directions. Measure convention used
-// everywhere: the position on the lens has density 1 (every technique samples it the same way), and the direction has the density
-// of the primary ray of ONE pixel (image-plane density 1 per pixel area). Then a camera sample starts with throughput 1, and the
-// contribution of a light sub-path to a pixel is its throughput times the area density that camera sampling would have had at
-// its last vertex. Of parallel rays it is the other way round: the direction has density 1, and the position that of one pixel.
+// Cameras: perspective with an optional thin lens, orthographic, and two that see in all directions. They share one
+// measure convention: the position on the lens has density 1 (every technique samples it the same way), and the
+// direction has the density of the primary ray of ONE pixel (image-plane density 1 per pixel area). Then a camera
+// sample starts with throughput 1, and the contribution of a light sub-path to a pixel is its throughput times the area
+// density that camera sampling would have had at its last vertex. For parallel rays it is the other way round: the
+// direction has density 1, and the position has that of one pixel.
 
 #include "common/core/result.h"
 #include "common/scene/description.h"
@@ -17,21 +18,21 @@ class Camera {
 
     struct CameraRay {
         Vec3 origin, direction;  ///< World; unit direction.
-        float pdf = 0;           ///< For one pixel: of the direction, 1/sr, or of a parallel ray's place across it, 1/m^2.
+        float pdf = 0;           ///< For one pixel: of the direction, 1/sr, or of a parallel ray's position, 1/m^2.
     };
     /// `film` in pixels (x right, y down, continuous), `lens` uniform in [0, 1)^2.
     CameraRay sample_ray(Vec2 film, Vec2 lens) const;
 
-    /// False for a pinhole, which has no use for `lens`.
+    /// False for a pinhole, which ignores `lens`.
     bool has_lens() const { return lens_radius_ > 0; }
     bool has_parallel_rays() const { return kind_ == CameraKind::kOrthographic; }
 
-    /// A point on the lens, world. Of a camera with parallel rays see() tells where they start.
+    /// A point on the lens, world space. For parallel rays, see() determines where they start.
     Vec3 sample_lens(Vec2 lens) const;
 
-    /// What the camera sees of a world direction leaving the lens point (of a parallel ray: its start): the film position and the
-    /// density of one pixel, CameraRay::pdf. False when the direction falls outside of the frame (but not necessarily outside of
-    /// the crop).
+    /// Projects a world direction that leaves the lens point (for a parallel ray: its start) to the film position, and
+    /// gives the density for one pixel, CameraRay::pdf. False when the direction falls outside of the frame (but not
+    /// necessarily outside of the crop).
     bool project(const Vec3& lens_point, const Vec3& direction, Vec2* film, float* pdf) const;
 
     /// A point as the camera sees it.
@@ -41,10 +42,12 @@ class Camera {
         float pdf = 0;        ///< CameraRay::pdf.
         float distance2 = 0;  ///< pdf / distance2 is the density at the point, across the ray, 1/m^2. 1 for parallel rays.
     };
-    /// `*lens` is a point of sample_lens(), and becomes the start of the ray if rays are parallel. False as for project().
+    /// Projects a point. `*lens` is a point of sample_lens() and is moved to the start of the ray if rays are parallel.
+    /// False as for project().
     bool see(const Vec3& point, Vec3* lens, Sight* sight) const;
 
-    /// Where parallel rays start, world: the upper left corner and the two edges from there, to the right and down.
+    /// The rectangle from which parallel rays start, world space: its upper left corner and the two edges from there,
+    /// to the right and down.
     struct Window {
         Vec3 corner, right, down;
     };

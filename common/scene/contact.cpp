@@ -7,8 +7,8 @@
 namespace lightloom {
 namespace {
 
-constexpr double kZero = 0x1p-21;       // of a plane's rounding scale: eight units in the last place of what it is known by
-constexpr double kClearance = 0x1p-16;  // the same: beyond that even a grazing ray has left the surface
+constexpr double kZero = 0x1p-21;       // times a plane's rounding scale: four to eight units in the last place
+constexpr double kClearance = 0x1p-16;  // times the same scale: farther away even a grazing ray has left the surface
 
 struct Point {
     double x, y, z;
@@ -26,18 +26,18 @@ struct Point {
     }
 };
 
-/// In double precision: what single precision could not tell apart is told by what is known of the corners, not by how they are
-/// computed with.
+/// A triangle with computations in double precision, so that only the rounding of the corners matters, and not that of
+/// the computation.
 struct Triangle {
     Vec3 corners[3];
     Point normal{0, 0, 1};
 
     void set_normal() { normal = cross(Point(corners[1]) - corners[0], Point(corners[2]) - corners[0]).unit(); }
     double height(const Vec3& p) const { return dot(Point(p) - corners[0], normal); }
-    /// Unit, in the plane, pointing out of the edge from corner i.
+    /// Unit vector in the plane that points out of the edge from corner i.
     Point edge_normal(int i) const { return cross(Point(corners[(i + 1) % 3]) - corners[i], normal).unit(); }
-    /// What the rounding of coordinates is to be multiplied by for that of the plane: of a ground at y = 0 nothing, however wide
-    /// it is, of a tilted one its extent.
+    /// The rounding scale of the plane, by which the relative rounding of coordinates is multiplied: zero for a ground
+    /// at y = 0, however wide it is, and for a tilted plane its extent.
     double scale() const {
         double sum = 0;
         for (const Vec3& c : corners)
@@ -73,7 +73,7 @@ bool overlap(const Triangle& a, const Triangle& b, const Point& axis, double lea
 
 /// Whether two triangles share a part of one plane.
 bool coincide(const Triangle& a, const Triangle& b, double zero) {
-    // The plane of the larger one is the better known.
+    // The plane of the larger triangle is known better.
     if (std::min(distance_to_plane(a, b), distance_to_plane(b, a)) > zero) return false;
     for (int i = 0; i < 3; ++i)
         if (!overlap(a, b, a.edge_normal(i), zero) || !overlap(a, b, b.edge_normal(i), zero)) return false;
@@ -98,7 +98,7 @@ ContactFinder::ContactFinder(const SceneDescription& scene, const Accel& accel, 
 
 namespace {
 
-/// A triangle in world space; nothing for a sphere.
+/// Gets a triangle in world space; false for a sphere.
 bool world_triangle(const SceneDescription& scene, const RawHit& at, Triangle* out) {
     const Instance* instance = at.instance >= 0 ? &scene.instances[size_t(at.instance)] : nullptr;
     const auto& meshes = instance ? scene.objects[size_t(instance->object)].meshes : scene.meshes;
@@ -187,7 +187,7 @@ ContactFinder::Covered ContactFinder::cover(std::vector<Emitter>* emitters, cons
             const double scale = std::max(t.scale(), own.scale());
             if (!coincide(own, t, kZero * scale)) return;
             reach = std::max(reach, float(scale));
-            if (e.hidden) return;  // no ray meets it
+            if (e.hidden) return;  // no ray meets the emitter
             float& gap = at.instance < 0 ? covered.meshes[at.geometry] : covered.instances[size_t(at.instance)];
             gap = std::max(gap, float(4 * kZero) * std::max(float(scale), e.reach));
             covered.any = true;

@@ -35,7 +35,7 @@ enum class TextureKind : uint8_t {
 };
 enum class WrapMode : uint8_t { kRepeat, kClamp, kBlack };
 
-/// What 2D textures take for (s, t). All but kUv depend on the place in space.
+/// How 2D textures get their (s, t). All mappings but kUv depend on the position in space.
 enum class TextureMapping : uint8_t {
     kUv,           ///< su u + du and sv v + dv.
     kPlanar,       ///< The first two coordinates in the texture's space.
@@ -54,14 +54,14 @@ struct TextureNode {
     WrapMode wrap = WrapMode::kRepeat;
     bool nearest = false;                          ///< kImage: point lookup; bilinear otherwise.
     bool invert = false;                           ///< kImage: 1 - the scaled value (pbrt's order).
-    bool non_negative = true;                      ///< kImage: below zero is zero, as in pbrt for colours and what is inverted.
+    bool non_negative = true;                      ///< kImage: negative values become 0 (pbrt: colours, inverted values).
     TextureMapping mapping = TextureMapping::kUv;  ///< kCheckerboard, kImage, kDots.
-    float scale = 1;                               ///< kImage: multiplies the looked-up value. kMarble: multiplies the place.
+    float scale = 1;                               ///< kImage: multiplies the value. kMarble: multiplies the position.
     float su = 1, sv = 1, du = 0, dv = 0;          ///< TextureMapping::kUv.
-    int32_t space = kNone;                         ///< Index into SceneDescription::texture_spaces: other mappings, and the kinds
-                                                   ///< that are functions of the place (kSolidCheckerboard, kFractal and below).
-    float omega = 0;                               ///< kFractal, kWrinkled, kMarble: amplitude of an octave over that of the last.
-    float variation = 0;                           ///< kMarble: how far noise bends its layers.
+    int32_t space = kNone;  ///< Index into SceneDescription::texture_spaces: other mappings, and the kinds that are functions of
+                            ///< the position (kSolidCheckerboard, kFractal and below).
+    float omega = 0;        ///< kFractal, kWrinkled, kMarble: ratio of successive amplitudes.
+    float variation = 0;    ///< kMarble: how far noise bends its layers.
 };
 
 enum class MaterialKind : uint8_t {
@@ -86,12 +86,12 @@ struct Material {
     TextureId base_roughness_u = kNone, base_roughness_v = kNone;  ///< kCoatedConductor's conductor.
     bool remap_roughness = true;              ///< pbrt: alpha = sqrt(roughness) if true, alpha = roughness otherwise.
     float ior = 1.5f;                         ///< Relative index of (thin) dielectric or of the coat.
-    float thickness = 0.01f;                  ///< Of the coat of coated kinds: every crossing transmits exp(-thickness / cos).
+    float thickness = 0.01f;                  ///< Of a coat, optical: every crossing transmits exp(-thickness / cos).
     int layer_events = 10;                    ///< kCoatedDiffuse: scattering events between coat and base that are followed, as
                                               ///< pbrt's "maxdepth"; every other one is a base reflection. 0: all.
     MaterialId mix_a = kNone, mix_b = kNone;  ///< kMix: a with probability 1 - amount, b with probability amount.
     TextureId mix_amount = kNone;
-    // What tilts the shading normal, see bump.h; at most one is in force, and a kMix has neither.
+    // These tilt the shading normal, see bump.h; at most one is used, and a kMix has neither.
     TextureId displacement = kNone;  ///< Height above the surface along the shading normal, scene units; the first channel counts.
     TextureId normal_map = kNone;    ///< Unit normal n in the shading frame (s, t, n) as (n + 1) / 2.
 };
@@ -103,7 +103,7 @@ struct AreaEmission {
     int32_t image = kNone;  ///< Index into images; looked up by the shape's (u, v), see SurfaceMap.
 };
 
-/// What all shapes share.
+/// Attributes that all kinds of shapes have.
 struct ShapeAttributes {
     MaterialId material = kNone;
     int32_t emission = kNone;  ///< Index into SceneDescription::emissions.
@@ -120,7 +120,7 @@ struct TriangleMesh {
                                     ///< normal of a triangle is flipped into the hemisphere of its shading normals.
     std::vector<Vec2> uvs;          ///< Empty, or one per position; empty means (0,0) (1,0) (1,1) at the three corners.
     std::vector<uint32_t> indices;  ///< Three per triangle.
-    bool curved = false;            ///< Stands for a curved surface of its own tangents, see tangents_of() in bump.h.
+    bool curved = false;            ///< Stands for a curved surface and has its tangents, see tangents_of() in bump.h.
     ShapeAttributes attributes;
 };
 
@@ -155,9 +155,9 @@ struct SpotLight {
     Vec3 position;
     Frame axes;     ///< axes.n is the direction of the axis, away from the light.
     Rgb intensity;  ///< On the axis, W / sr.
-    // 1 - cosine of an angle, which has the digits that the cosine of a narrow cone has lost.
-    float total_height = 0;    ///< Of the angle beyond which the light is dark.
-    float falloff_height = 0;  ///< Of the angle within which it has full intensity; smoothstep between.
+    // The next two are 1 - cosine of an angle, which keeps the digits that the cosine of a narrow cone loses.
+    float total_height = 0;    ///< For the angle beyond which there is no light.
+    float falloff_height = 0;  ///< For the angle within which it has full intensity; smoothstep between.
     std::string source = {};
 };
 
@@ -167,7 +167,7 @@ struct ImageLight {
     Kind kind = Kind::kProjection;
     Vec3 position;
     Mat4 light_to_world;                    ///< Rotation (and reflection) part is used.
-    float half_width = 1, half_height = 1;  ///< kProjection: of the picture at distance 1.
+    float half_width = 1, half_height = 1;  ///< kProjection: size of the picture at distance 1.
     Rgb intensity{1.0f};                    ///< Multiplies the image, W / sr.
     int32_t image = kNone;                  ///< Index into images; square for kGoniometric.
     std::string source = {};
@@ -210,20 +210,20 @@ struct FilmDescription {
     /// Crop window in pixels, half open: x0, x1, y0, y1; all -1 means the whole frame.
     int crop[4] = {-1, -1, -1, -1};
     FilmResponse response;
-    std::string file_name;  ///< As in the scene file; where pictures go is the command line's to say.
+    std::string file_name;  ///< As in the scene file; the command line decides where pictures go.
 };
 
 struct SceneDescription {
     std::vector<TriangleMesh> meshes;
     std::vector<Sphere> spheres;
-    /// Surfaces that emit and are nothing else: no ray meets them (pbrt: area lights with alpha 0).
+    /// Surfaces that emit but are invisible: no ray meets them (pbrt: area lights with alpha 0).
     std::vector<TriangleMesh> hidden_meshes;
     std::vector<Sphere> hidden_spheres;
     std::vector<ObjectDefinition> objects;
     std::vector<Instance> instances;
     std::vector<Material> materials;
     std::vector<TextureNode> textures;
-    std::vector<Mat4> texture_spaces;  ///< World space to the space that a texture is defined in.
+    std::vector<Mat4> texture_spaces;  ///< Each maps world space to the space in which a texture is defined.
     std::vector<Image> images;
     std::vector<AreaEmission> emissions;
     std::vector<PointLight> point_lights;
@@ -234,18 +234,20 @@ struct SceneDescription {
     CameraDescription camera;
     FilmDescription film;
     int max_depth = 5;           ///< Bounces, as in pbrt: paths have up to max_depth + 1 edges.
-    int samples_per_pixel = 16;  ///< What the file asks for; the command line may override.
-    /// What the file calls the scene's origin: its world is moved so far that single precision suffices around the camera.
+    int samples_per_pixel = 16;  ///< As the file asks for; the command line may override it.
+    /// The scene's origin in the file's coordinates: the world is moved so that single precision suffices around the
+    /// camera.
     std::array<double, 3> origin{};
-    /// What every light was multiplied by, a power of two, and the film's exposure divided by.
+    /// Power of two by which every light was multiplied and the film's exposure divided.
     double strength_scale = 1;
     std::string integrator;             ///< As in the scene file, empty if it has none; the client takes its default from it.
     std::vector<std::string> warnings;  ///< Named warnings: "file:line: what was ignored and why that matters".
 };
 
-/// What rendering relies on in shapes, instances, and the strength of area, image and infinite lights: indices in range, finite
-/// numbers, areas within single precision, invertible matrices. kInvalidArgument names the first that breaks it, a shape with its
-/// place in the scene file. import_pbrt() and Scene::build() check it; everything else is the importer's to guarantee.
+/// Checks what rendering relies on in shapes, instances, and the strength of area, image and infinite lights: indices
+/// in range, finite numbers, areas within single precision, invertible matrices. kInvalidArgument names the first
+/// violation, for a shape with its place in the scene file. import_pbrt() and Scene::build() call it; the importer
+/// guarantees everything else.
 Status validate(const SceneDescription& description);
 
 /// Whether a transformation is made of rotations, translations, reflections and one scale for all axes, as a camera's must be.

@@ -26,8 +26,8 @@ float cone_height(float radius, float d2) {
     return sin2 / (1 + safe_sqrt(1 - sin2));
 }
 
-/// Whether next event samples the sphere by the cone that it subtends (otherwise by area): from outside, if nothing but the near
-/// side can shine there. The far side's inner face shines through a near side that no ray meets.
+/// Whether next event estimation samples the sphere by the cone that it subtends (otherwise by area). It does so from
+/// outside, if only the near side can shine there: the inner face of the far side shines through a hidden near side.
 bool samples_cone(const Emitter& e, float d2) {
     return !e.inward && !(e.hidden && e.two_sided) && d2 > e.radius * e.radius * 1.0001f;
 }

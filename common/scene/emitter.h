@@ -20,26 +20,26 @@ enum class EmitterKind : uint8_t { kTriangle, kSphere, kPoint, kSpot, kDistant, 
 struct Emitter {
     EmitterKind kind = EmitterKind::kTriangle;
     bool two_sided = false;
-    float pmf = 0;        ///< Of being selected, for light sub-paths and for next event alike (by power).
+    float pmf = 0;        ///< Selection probability (by power), for light sub-paths and next event alike.
     int32_t map = kNone;  ///< Index of the map that multiplies `radiance`: SurfaceMap of area lights, DirectionMap of kProjection
                           ///< and kGoniometric, which have one.
     Rgb radiance;         ///< Radiance; intensity of lights at a point; irradiance for distant; unused for environment.
     Vec3 position;        ///< First corner, centre, or light position.
     Vec3 edge1, edge2;    ///< kTriangle.
     Vec3 normal;          ///< Unit; side that emits. Spot: axis. Distant: direction of travel.
-    float radius = 0;     ///< kSphere; negative-free. `inward` flips its emitting side.
+    float radius = 0;     ///< kSphere; not negative. `inward` flips its emitting side.
     bool inward = false;
     float inv_area = 0;
     float total_height = 0, falloff_height = 0;  ///< kSpot; see SpotLight.
     float reach = 0;                             ///< Area lights: largest coordinate magnitude; see offset_origin().
-    float clearance = 0;                         ///< Of lamps that are points: see Scene::intersect().
+    float clearance = 0;                         ///< Clearance of lights at a point: see Scene::intersect().
     bool hidden = false;                         ///< Area lights: no ray meets the surface, which only emits.
     int32_t light = 0;                           ///< Group for reports: the area-light shape or light source it came from.
 
     bool is_area() const { return kind == EmitterKind::kTriangle || kind == EmitterKind::kSphere; }
     bool is_infinite() const { return kind == EmitterKind::kDistant || kind == EmitterKind::kEnvironment; }
     bool has_direction_map() const { return kind == EmitterKind::kProjection || kind == EmitterKind::kGoniometric; }
-    /// x_0 is measured by counting: a point, or a single direction.
+    /// Whether x_0 is measured by counting: a point, or a single direction.
     bool is_discrete() const { return !is_area() && kind != EmitterKind::kEnvironment; }
     /// Whether a camera sub-path can find x_0 by itself. If not, there is no technique with s = 0.
     bool can_be_hit() const { return is_area() ? !hidden : kind == EmitterKind::kEnvironment; }
@@ -56,7 +56,7 @@ struct EmissionSample {
     float pdf_direction = 0;  ///< Solid angle for finite lights; area on the disc facing the scene, m^-2, for infinite ones.
 };
 
-/// x_0 chosen from a reference point.
+/// A point x_0 that was chosen from a reference point.
 struct NextEventSample {
     uint32_t emitter = 0;
     Vec3 position;       ///< Point on a finite light; for infinite ones a point beyond the scene to test visibility to.
@@ -68,7 +68,7 @@ struct NextEventSample {
     float pdf = 0;       ///< Native measure, pmf included.
 };
 
-/// What Emitter::map stands for.
+/// The maps that Emitter::map refers to.
 struct LightMaps {
     std::vector<SurfaceMap> surfaces;
     std::vector<DirectionMap> directions;
@@ -77,7 +77,7 @@ struct LightMaps {
 class EmitterSet {
   public:
     EmitterSet() = default;
-    /// `emitters` without their pmf; `centre` and `radius` of the sphere around the scene, for infinite lights.
+    /// `emitters` need no pmf yet; `centre` and `radius` are those of the sphere around the scene, for infinite lights.
     EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius, LightMaps maps = {});
 
     bool empty() const { return emitters_.empty(); }
@@ -93,13 +93,15 @@ class EmitterSet {
     /// Scalar power of an emitter, W.
     double power(const Emitter& e) const;
 
-    /// False when nothing emits there (a black texel, for instance).
+    /// Samples the start of a light sub-path. False when nothing emits there (a black texel, for instance).
     bool sample_emission(double pick, Vec2 u_position, Vec2 u_direction, EmissionSample* out) const;
-    /// False when the point chosen cannot light `reference` (wrong side, inside a cone's shadow...).
+    /// Chooses x_0 from `reference`. False when the chosen point cannot light `reference` (wrong side, outside of a
+    /// spot's cone...).
     bool sample_next_event(const Vec3& reference, double pick, Vec2 u, NextEventSample* out) const;
 
-    /// Connects `reference` to a given x_0 of emitter `out->emitter`: `position` on a finite light, `travel` the direction of
-    /// travel of an infinite one, `normal` that of an area light. Fills in the rest of `out` but for pdf. False as above.
+    /// Connects `reference` to a given x_0 of emitter `out->emitter`: `position` lies on a finite light;
+    /// `normal_or_travel` is the normal of an area light or the direction of travel of an infinite one. Fills in the
+    /// rest of `out` except pdf. False as above.
     bool connect_point(const Vec3& reference, const Vec3& position, const Vec3& normal_or_travel, NextEventSample* out) const;
     /// Radiance (or intensity, irradiance) leaving x_0 of emitter `e` along `w` (unit, away from the light); `position` is x_0, and
     /// `normal` the geometric normal there on the emitting side. The environment looks its map up in -w.

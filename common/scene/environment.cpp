@@ -23,7 +23,8 @@ Environment::Environment(const std::vector<InfiniteLight>& lights, const std::ve
         if (light.image != kNone) {
             part.image = &images[size_t(light.image)];
             const int w = part.image->width, h = part.image->height;
-            // Equal-area texels of constant radiance (point lookup, as pbrt does): the table is exactly proportional.
+            // Texels have equal areas and constant radiance (point lookup, as pbrt does), so that the table is exactly
+            // proportional.
             std::vector<double> weights(size_t(w) * size_t(h));
             double sum = 0;
             for (int y = 0; y < h; ++y)
@@ -72,7 +73,7 @@ Vec3 Environment::sample(float pick, Vec2 u) const {
     float rest = 0;
     const Part& part = parts_[pick_.sample(pick, &rest)];
     if (part.image == nullptr) return normalize(part.to_world.vector(sample_sphere(u)));
-    // One uniform chooses the texel; its remainder and the second place the direction inside it.
+    // One uniform number chooses the texel; its remainder and the second number choose the direction inside it.
     float inside = 0;
     const uint32_t texel = part.texels.sample(double(u.x) + double(rest) * 0x1p-24, &inside);
     const int w = part.image->width, h = part.image->height;

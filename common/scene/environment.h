@@ -21,7 +21,7 @@ class Environment {
     Rgb radiance(const Vec3& d) const;
     /// Density of sample() at `d`, solid angle, 1/sr.
     float pdf_solid_angle(const Vec3& d) const;
-    /// Direction towards the environment; `pick` selects among the lights, `u` the direction.
+    /// Samples a direction towards the environment; `pick` selects among the lights, `u` the direction.
     Vec3 sample(float pick, Vec2 u) const;
     /// Integral of scalar_of(radiance) over the sphere, W / m^2.
     double integrated_radiance() const { return total_; }

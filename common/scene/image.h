@@ -28,7 +28,7 @@ struct Image {
         if (channels == 1) return Rgb(channel(x, y, 0));
         return {channel(x, y, 0), channel(x, y, 1), channel(x, y, 2)};
     }
-    /// Of an image that is not empty.
+    /// Mean of all texels; the image must not be empty.
     Rgb mean() const {
         double sum[3] = {};
         for (int y = 0; y < height; ++y)

@@ -10,7 +10,7 @@
 namespace lightloom {
 namespace {
 
-/// Subdivisions of a triangle's edges, and rows and columns on a sphere.
+/// Most subdivisions of a triangle's edges, and number of rows and columns on a sphere.
 constexpr int kFinest = 32;
 
 }  // namespace
@@ -23,7 +23,7 @@ SurfaceMap::SurfaceMap(const Image& image, const Rgb& image_mean, const Vec2 uv[
         texels = std::max({texels, std::fabs(a.x - b.x) * float(image.width), std::fabs(a.y - b.y) * float(image.height)});
     }
     const int n = texels < kFinest / 2 ? std::max(1, int(std::ceil(2 * texels))) : kFinest;
-    // Centroids of n^2 congruent triangles, in two orientations.
+    // The points are the centroids of n^2 congruent triangles in two orientations.
     const auto centroid = [&](double b1, double b2) {
         const float u = float(b1 / n), v = float(b2 / n), w = 1 - u - v;
         return lookup({w * uv[0].x + u * uv[1].x + v * uv[2].x, w * uv[0].y + u * uv[1].y + v * uv[2].y});
@@ -56,7 +56,7 @@ void SurfaceMap::raise_mean(const Rgb& image_mean) {
 
 Rgb SurfaceMap::at(const Emitter& e, const Vec3& position) const {
     if (e.kind == EmitterKind::kSphere) return lookup(sphere_uv(orientation_, (position - e.position) / e.radius));
-    // Barycentric weights by least squares, in double: they cancel in thin triangles.
+    // Barycentric weights come from least squares in double, because they cancel in thin triangles.
     const auto product = [](const Vec3& p, const Vec3& q) { return double(p.x) * q.x + double(p.y) * q.y + double(p.z) * q.z; };
     const Vec3 d = position - e.position;
     const double a = product(e.edge1, e.edge1), b = product(e.edge1, e.edge2), c = product(e.edge2, e.edge2);
@@ -150,7 +150,7 @@ Vec3 DirectionMap::sample(float pick, Vec2 u) const {
 
 Rgb SurfaceMap::lookup(Vec2 uv) const {
     const int w = image_->width, h = image_->height;
-    const auto unit = [](float c) { return c > 0 ? std::min(c, 1.0f) : 0.0f; };  // also of what is no number
+    const auto unit = [](float c) { return c > 0 ? std::min(c, 1.0f) : 0.0f; };  // NaN becomes 0
     const float x = unit(uv.x) * float(w) - 0.5f, y = (1 - unit(uv.y)) * float(h) - 0.5f;
     const float fx = std::floor(x), fy = std::floor(y), dx = x - fx, dy = y - fy;
     const int x0 = std::clamp(int(fx), 0, w - 1), x1 = std::clamp(int(fx) + 1, 0, w - 1);

@@ -1,5 +1,6 @@
 #pragma once
-// Lights whose strength an image gives: over the surface of an area light, or over the directions of a light at a point.
+// Lights whose strength is given by an image: over the surface of an area light, or over the directions of a light at a
+// point.
 
 #include "common/core/transform.h"
 #include "common/core/vec.h"
@@ -14,17 +15,18 @@ struct Emitter;
 /// v = 1, as pbrt-v4 does.
 class SurfaceMap {
   public:
-    /// Of a triangle with these (u, v) at its corners. `image` must outlive this object; `image_mean` is its mean().
+    /// The map of a triangle with these (u, v) at its corners. `image` must outlive this object; `image_mean` is its
+    /// mean().
     SurfaceMap(const Image& image, const Rgb& image_mean, const Vec2 uv[3]);
-    /// Of a sphere with this Sphere::orientation.
+    /// The map of a sphere with this Sphere::orientation.
     SurfaceMap(const Image& image, const Rgb& image_mean, const Frame& orientation);
 
-    /// What the radiance of `e`, which this map belongs to, is multiplied by at a point of it. A function of the point, whoever
-    /// found it.
+    /// Factor of the radiance of `e`, the emitter of this map, at a point on it. It depends on the point only,
+    /// whichever technique found it.
     Rgb at(const Emitter& e, const Vec3& position) const;
-    /// Mean over the primitive's area, for the light's power, by a midpoint rule of at most 1024 points that are half a texel apart
-    /// where these suffice; and, so that no part of a light is never chosen because a rule misses its bright spot, at least a
-    /// hundredth of the image's mean.
+    /// Mean over the primitive's area, for the light's power, by a midpoint rule of at most 1024 points that are half a
+    /// texel apart where these suffice; and at least a hundredth of the image's mean, so that a light is chosen even if
+    /// the rule misses its bright spot.
     const Rgb& mean() const { return mean_; }
 
   private:
@@ -47,11 +49,11 @@ class DirectionMap {
     /// An equal-area octahedral map about the light's +y, as pbrt-v4's goniometric lights have it: grey, the mean of the channels.
     static DirectionMap goniometric(const Image& image, const Mat4& light_to_world);
 
-    /// What the light's intensity is multiplied by along the unit vector `w`, away from the light.
+    /// Factor of the light's intensity along the unit vector `w`, away from the light.
     Rgb intensity(const Vec3& w) const;
     /// Density of sample() at `w`, 1/sr.
     float pdf_solid_angle(const Vec3& w) const;
-    /// `pick` in [0, 1) has 24 bits more for the choice of the texel than u.x has.
+    /// Samples a direction; `pick` in [0, 1) adds 24 bits to u.x for the choice of the texel.
     Vec3 sample(float pick, Vec2 u) const;
     /// Integral of intensity() over all directions, sr.
     const Rgb& integral() const { return integral_; }
@@ -62,8 +64,8 @@ class DirectionMap {
     DirectionMap(const Image& image, const Mat4& light_to_world);
     void set_weights(const std::vector<double>& solid_angles);
     Rgb texel(size_t i) const;
-    /// The texel that `w` falls into; its probability times `*density` is the density of sample() at `w`. False outside of the
-    /// image.
+    /// Finds the texel that `w` falls into; its probability times `*density` is the density of sample() at `w`. False
+    /// outside of the image.
     bool find(const Vec3& w, size_t* texel, float* density) const;
 
     const Image* image_;

@@ -1,4 +1,5 @@
-// Material + textures at a point -> Bsdf. Parameters that a material leaves unset have pbrt-v4's defaults.
+// Makes a Bsdf from a material and its textures at a point. Parameters that a material leaves unset have pbrt-v4's
+// defaults.
 
 #include "common/scene/texture.h"
 
@@ -28,7 +29,7 @@ struct ConductorIndex {
 
 ConductorIndex conductor_index(const TextureTables& tables, const Material& m, const TexturePoint& at) {
     if (m.reflectance != kNone) return {Rgb(1), conductor_k(reflectance(tables, m.reflectance, at, Rgb(0)))};
-    // Copper, at the wavelengths of the three primaries.
+    // The default is copper, at the wavelengths of the three primaries.
     return {value(tables, m.eta, at, Rgb(0.200f, 0.924f, 1.102f)), value(tables, m.k, at, Rgb(3.912f, 2.452f, 2.142f))};
 }
 
@@ -40,7 +41,7 @@ MaterialId choose_material(const TextureTables& tables, MaterialId material, con
         const Material& m = tables.materials[size_t(material)];
         if (m.kind != MaterialKind::kMix) return material;
         const float amount = value(tables, m.mix_amount, at, Rgb(0.5f)).r;
-        // What is left of `choice` is uniform again, for mixes inside mixes.
+        // `choice` is rescaled, so that it is uniform again for mixes inside mixes.
         if (choice < amount) {
             choice /= amount < 1 ? amount : 1.0f;
             material = m.mix_b;

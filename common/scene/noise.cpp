@@ -23,13 +23,13 @@ constexpr uint8_t kPermutation[256] = {
     49,  192, 214, 31,  181, 199, 106, 157, 184, 84,  204, 176, 115, 121, 50,  45,  127, 4,   150, 254, 138, 236, 205, 93,
     222, 114, 67,  29,  24,  72,  243, 141, 128, 195, 78,  66,  215, 61,  156, 180};
 
-/// One coordinate: its cell modulo 256, where in the cell it lies, and the weight of the cell's far end there.
+/// One coordinate: its cell modulo 256, its position in the cell, and the weight of the cell's far end there.
 struct Axis {
     uint32_t cell;
     float offset, weight;
 
     explicit Axis(float x) {
-        // Everything here is exact for every finite float; a fraction is zero from 2^23 on.
+        // These operations are exact for every finite float; from 2^23 on the fraction is zero.
         const float whole = std::floor(x);
         cell = uint32_t(whole - 256 * std::floor(whole / 256));
         offset = x - whole;
@@ -84,7 +84,7 @@ float turbulence(const Vec3& p, float omega, int octaves) {
 }
 
 bool inside_dot(Vec2 st) {
-    // Beyond, cells have no fractions to place a dot with.
+    // Beyond this, floats have no fractions that could place a dot in a cell.
     if (!(std::fabs(st.x) < 0x1p23f && std::fabs(st.y) < 0x1p23f)) return false;
     const float s = std::floor(st.x + 0.5f), t = std::floor(st.y + 0.5f);
     if (!(noise({s + 0.5f, t + 0.5f, 0.5f}) > 0)) return false;
@@ -101,7 +101,7 @@ Rgb marble(const Vec3& p, float omega, int octaves, float variation) {
                                                     {0.58f, 0.58f, 0.6f}, {0.2f, 0.2f, 0.33f},  {0.58f, 0.58f, 0.6f}};
     double angle = double(p.y) + double(variation) * double(fractal_noise(p, omega, octaves));
     if (!(std::fabs(angle) < 1e18)) angle = 0;
-    angle -= 2 * kPiD * std::floor(angle / (2 * kPiD));  // The sine takes no large arguments.
+    angle -= 2 * kPiD * std::floor(angle / (2 * kPiD));  // The sine does not take large arguments.
     const float turns = float(0.5 + 0.5 * math::sin(angle)) * kSegments;
     const int first = clamp(int(std::floor(turns)), 0, kSegments - 1);
     const float t = clamp(turns - float(first), 0.0f, 1.0f), u = 1 - t;

@@ -29,7 +29,7 @@ void make_alias(std::span<const double> weights, AliasEntry* entries) {
             small.push_back(l);
         }
     }
-    // Rounding can strand an index of weight zero here: it must never be drawn, so it borrows from another.
+    // Rounding can leave an index of weight zero here. It must never be drawn, so that its part goes to another index.
     for (const uint32_t i : small)
         if (entries[i].pmf == 0) {
             uint32_t j = 0;
@@ -76,7 +76,8 @@ Vec3 sample_cosine_hemisphere_concentric(Vec2 u) {
 }
 
 Vec2 sample_triangle(Vec2 u) {
-    // The square folded onto the triangle without a square root [Heitz 2019, A Low-Distortion Map Between Triangle and Square].
+    // This folds the square onto the triangle without a square root [Heitz 2019, A Low-Distortion Map Between Triangle
+    // and Square].
     if (u.y > u.x) {
         const float x = u.x * 0.5f;
         return {x, u.y - x};
@@ -86,7 +87,7 @@ Vec2 sample_triangle(Vec2 u) {
 }
 
 std::vector<double> projected_solid_angles(int columns, int rows, double half_width, double half_height) {
-    // Of the rectangle from the axis to (x, y), signed; a cell's is the sum over its corners.
+    // Signed solid angle of the rectangle from the axis to (x, y); a cell's is the sum over its corners.
     const auto to_corner = [](double x, double y) { return math::atan(x * y / std::sqrt(1 + x * x + y * y)); };
     std::vector<double> above(size_t(columns) + 1), below(above.size()), out;
     const auto fill = [&](std::vector<double>& line, int row) {

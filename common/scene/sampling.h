@@ -1,5 +1,5 @@
 #pragma once
-// Discrete and warped sampling that several emitters share.
+// Sampling of discrete distributions and of shapes.
 
 #include <cmath>
 #include <cstdint>
@@ -11,14 +11,14 @@
 
 namespace lightloom {
 
-/// One of `count` equal parts of the unit interval: its own index below `keep`, another's above.
+/// One of `count` equal parts of the unit interval: below `keep` it belongs to its own index, above to another.
 struct AliasEntry {
     float pmf = 0;
     float keep = 1;
     uint32_t alias = 0;
 };
 
-/// Fills in `entries`, weights.size() of them. Weights as in AliasTable.
+/// Fills in weights.size() `entries`. Weights are as for AliasTable.
 void make_alias(std::span<const double> weights, AliasEntry* entries);
 /// The part that `u` in [0, 1) falls into.
 inline uint32_t alias_part(uint32_t count, double u) {
@@ -37,11 +37,11 @@ class AliasTable {
     size_t size() const { return entries_.size(); }
     bool empty() const { return entries_.empty(); }
     float pmf(size_t i) const { return entries_[i].pmf; }
-    /// `u` in [0, 1); `remapped`, when given, receives a fresh uniform in [0, 1).
+    /// `u` in [0, 1); `remapped`, when given, receives a new uniform number in [0, 1).
     uint32_t sample(double u, float* remapped = nullptr) const;
 
   private:
-    /// One cache line serves a draw: a table of an environment map is far larger than any cache.
+    /// A draw needs one cache line, because the table of an environment map is far larger than any cache.
     std::vector<AliasEntry> entries_;
 };
 
@@ -55,7 +55,7 @@ inline Vec3 sample_cosine_hemisphere(Vec2 u) {
     const float radius = std::sqrt(u.y);
     return {radius * float(azimuth.cos), radius * float(azimuth.sin), std::sqrt(1 - u.y)};
 }
-/// The same through sample_disk(), which tears neighbours apart less: for points that are stratified.
+/// The same by sample_disk(), which keeps more neighbours together; for stratified points.
 Vec3 sample_cosine_hemisphere_concentric(Vec2 u);
 /// Uniform barycentric weights (b1, b2) of a triangle.
 Vec2 sample_triangle(Vec2 u);

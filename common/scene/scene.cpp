@@ -11,8 +11,8 @@
 namespace lightloom {
 namespace {
 
-/// Uniform in [0, 1) from the bits of a position: decides mixed materials. The decision belongs to the point, so it is
-/// independent of the technique that found it.
+/// Uniform in [0, 1) from the bits of a position: it decides about mixed materials. The decision depends on the point
+/// alone and not on the technique that found it.
 float position_hash(const Vec3& p) {
     const uint64_t xy = (uint64_t(std::bit_cast<uint32_t>(p.x)) << 32) | std::bit_cast<uint32_t>(p.y);
     return float(mix64(mix64(xy + 0x632be59bd9b4e019ull) ^ std::bit_cast<uint32_t>(p.z)) >> 40) * 0x1p-24f;
@@ -47,7 +47,7 @@ void Scene::triangle_point(const TriangleMesh& mesh, const RawHit& hit, SurfaceP
     out->material = mesh.attributes.material;
 }
 
-/// The hit that counts: an area light wins where it lies in the plane of what was hit.
+/// Finds the hit that counts: where an area light lies in the plane of the surface that was hit, the light wins.
 bool Scene::find_surface(const Vec3& o, const Vec3& d, float clearance, RawHit* hit) const {
     if (!accel_->intersect(o, d, clearance, 1e30f, hit)) return false;
     if (!covered_.any) [[likely]]
@@ -56,7 +56,7 @@ bool Scene::find_surface(const Vec3& o, const Vec3& d, float clearance, RawHit* 
                       : hit->geometry < covered_.meshes.size() ? covered_.meshes[hit->geometry]
                                                                : 0;
     if (!(gap > 0)) return true;
-    // Along a grazing ray two planes that are apart by rounding are farther apart.
+    // Two planes that differ by rounding are farther apart along a grazing ray.
     SurfacePoint point;
     surface_point(o, d, *hit, &point);
     constexpr float kGrazing = 1e-3f;
@@ -83,7 +83,8 @@ void Scene::surface_point(const Vec3& o, const Vec3& d, const RawHit& hit, Surfa
         triangle_point(meshes[hit.geometry], hit, out);
         const int32_t first = instanced ? kNone : mesh_first_emitter_[hit.geometry];
         out->emitter = first == kNone ? kNone : first + int32_t(hit.primitive);
-        // The emitting side is the triangle's, as light sampling has it, also where interpolated normals cross its plane.
+        // The emitting side is that of the whole triangle, as for light sampling, even where interpolated normals cross
+        // its plane.
         if (out->emitter != kNone) {
             const Emitter& e = emitters_[uint32_t(out->emitter)];
             out->ng = face_forward(out->ng, e.normal);

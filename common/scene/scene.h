@@ -24,7 +24,7 @@ struct SceneOptions {
 /// The frame that a film makes with these options; kInvalidArgument if it is empty or too large.
 Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions& options);
 
-/// What `lightloom inspect` prints.
+/// The facts that `lightloom inspect` prints.
 struct SceneSummary {
     uint64_t triangle_count = 0;            ///< As stored (an instanced object counts once).
     uint64_t instanced_triangle_count = 0;  ///< As seen (every instance counts).
@@ -34,7 +34,7 @@ struct SceneSummary {
     struct Light {
         std::string kind;   ///< area, point, spot, distant, infinite, projection, goniometric
         std::string where;  ///< file:line where known
-        double power = 0;   ///< Flux, W, as luminance within 0.1 %; in these proportions lights are selected.
+        double power = 0;   ///< Flux, W, as luminance within 0.1 %; lights are selected in proportion to it.
         uint64_t primitives = 0;
     };
     std::vector<Light> lights;
@@ -44,7 +44,7 @@ struct SceneSummary {
 struct SurfacePoint {
     Vec3 p;
     Vec3 ng;        ///< Geometric normal, unit; outside as the scene defines it.
-    Frame shading;  ///< Shading frame, n in the hemisphere of ng (but for emitters whose normals point inwards).
+    Frame shading;  ///< Shading frame, n in the hemisphere of ng (except emitters whose normals point inwards).
     Vec2 uv;
     MaterialId material = kNone;
     int32_t emitter = kNone;
@@ -57,7 +57,8 @@ class Scene {
     Scene(const Scene&) = delete;
     Scene& operator=(const Scene&) = delete;
 
-    /// Takes the description over. Fails with one clear line (and the shape's source) on anything inconsistent.
+    /// Takes over the description. What validate() refuses fails with one clear line, which names the shape's place in
+    /// the file.
     static Result<std::unique_ptr<Scene>> build(SceneDescription description, const SceneOptions& options = {});
 
     const SceneSummary& summary() const { return summary_; }
@@ -66,21 +67,21 @@ class Scene {
     const EmitterSet& emitters() const { return emitters_; }
     const FrameLayout& frame() const { return frame_; }
 
-    // Ends of rays. Leaving a surface, a ray starts from offset_origin(); leaving a lens or lamp, at that end's clearance, within
-    // which nothing exists for its rays (contact.h). The segment between two ends is open by the same lengths, whichever of them it
-    // is looked at from.
+    // Where rays end: a ray that leaves a surface starts from offset_origin(); one that leaves a lens or lamp starts at
+    // that end's clearance, within which nothing exists for its rays (contact.h). The segment between two ends is
+    // shortened by the same lengths, whichever end it is traced from.
 
-    /// Closest surface along the unit direction `d` from `o`, farther than `clearance`. Where an area light lies in the plane of
-    /// the surface hit, the light is what is there.
+    /// Closest surface along the unit direction `d` from `o`, farther than `clearance`. Where an area light lies in the
+    /// plane of the surface that was hit, the hit is on the light.
     bool intersect(const Vec3& o, const Vec3& d, SurfacePoint* out, float clearance = 0) const;
     /// The material of a point, textures looked up.
     Bsdf bsdf_at(const SurfacePoint& point) const;
     /// Whether the open segment between two surface points is blocked; both ends are moved off their surfaces.
     bool occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3& q, const Vec3& ng_q, float reach_q) const;
-    /// The same where `q` is not on a surface (a lens, a point light, a point beyond the scene) and has a clearance: what lies
-    /// within that is hidden from it.
+    /// The same where `q` is not on a surface (a lens, a point light, a point beyond the scene) and has a clearance:
+    /// surfaces within it do not block its rays.
     bool occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3& q, float clearance = 0) const;
-    /// Of the lens.
+    /// The clearance of the lens.
     float camera_clearance() const { return camera_clearance_; }
 
   private:
@@ -91,7 +92,8 @@ class Scene {
     Status find_contacts(std::vector<Emitter>* emitters, float largest);
     bool find_surface(const Vec3& o, const Vec3& d, float clearance, RawHit* hit) const;
     void surface_point(const Vec3& o, const Vec3& d, const RawHit& hit, SurfacePoint* out) const;
-    /// The shading frame of a material with a displacement or normal map. Of a mix, the point's material becomes the one chosen.
+    /// The shading frame of a material with a displacement or normal map. If the material is a mix, the point's
+    /// material becomes the one that is chosen.
     void tilt(const RawHit& hit, SurfacePoint* point) const;
     void summarise();
     void triangle_point(const TriangleMesh& mesh, const RawHit& hit, SurfacePoint* out) const;
@@ -104,11 +106,11 @@ class Scene {
     std::vector<int32_t> sphere_emitter_;      // per world sphere
     std::vector<Mat4> instance_inverse_;
     std::vector<std::string> light_sources_;  // where each light group came from
-    std::vector<uint8_t> tilts_;              // per material, whether tilt() has to look at it; empty if none
+    std::vector<uint8_t> tilts_;              // per material: whether tilt() has to handle it; empty if it never has to
     EmitterSet emitters_;
     Camera camera_;
     float camera_clearance_ = 0;
-    ContactFinder::Covered covered_;  ///< By area lights in their plane.
+    ContactFinder::Covered covered_;  ///< Surfaces that area lights in their plane cover.
     /// Largest coordinate magnitude in the whole scene, at most 1/4: in a scene of ordinary size small primitives keep the
     /// offsets that rays from afar need, and only in a scene that is tiny as a whole do the offsets shrink with it.
     float least_reach_ = 0.25f;

@@ -24,7 +24,7 @@ void drop_degenerate_triangles(TriangleMesh* mesh) {
     index.resize(kept);
 }
 
-/// Which materials have a displacement or a normal map, or lead to one as mixes. Empty if none does.
+/// Marks the materials that have a displacement or a normal map, or lead to one as mixes. Empty if none does.
 std::vector<uint8_t> tilting_materials(const std::vector<Material>& materials) {
     std::vector<uint8_t> tilts(materials.size());
     const auto leads = [&](MaterialId id) { return id != kNone && tilts[size_t(id)] != 0; };
@@ -55,7 +55,8 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters, LightMaps* maps) {
         e.light = new_light(source, fallback);
         return e;
     };
-    // The emission of a shape or null, after a note where in `emitters` the shape's begin, if a ray can meet it and will ask.
+    // Returns the emission of a shape, or null; before that it notes where the shape's emitters begin in `emitters`, if
+    // a ray can meet the shape.
     const auto area_emission = [&](const ShapeAttributes& attributes, std::vector<int32_t>* first_emitter) {
         const AreaEmission* emission =
             attributes.emission != kNone ? &description_.emissions[size_t(attributes.emission)] : nullptr;
@@ -69,7 +70,8 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters, LightMaps* maps) {
         e.radiance = emission.radiance;
         return e;
     };
-    // The index of a primitive's map, if its light has an image; `place` is what a SurfaceMap needs to know of the primitive.
+    // Returns the index of a primitive's map if its light has an image; `place` is the SurfaceMap constructor's
+    // argument for the primitive.
     std::map<int32_t, Rgb> image_means;
     const auto add_map = [&](int32_t image, const auto& place) {
         if (image == kNone) return kNone;
@@ -158,7 +160,7 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters, LightMaps* maps) {
     }
     if (!description_.infinite_lights.empty()) {
         std::string source = description_.infinite_lights[0].source;
-        // They are one emitter, which is sampled by what all of them add up to.
+        // All infinite lights are one emitter, which is sampled by their sum.
         const size_t others = description_.infinite_lights.size() - 1;
         if (others > 0 && !source.empty()) source += " (and " + std::to_string(others) + " more)";
         emitters->push_back(new_emitter(EmitterKind::kEnvironment, source, "infinite light"));
@@ -177,7 +179,7 @@ float Scene::largest_reach(const Bounds3& bounds) const {
     return reach;
 }
 
-/// What lies at distance zero of the camera, a lamp or an area light.
+/// Finds what lies at distance zero from the camera, a lamp or an area light.
 Status Scene::find_contacts(std::vector<Emitter>* emitters, float largest) {
     const ContactFinder contacts(description_, *accel_, instance_inverse_, largest);
     camera_clearance_ = contacts.clearance(camera_.position());

@@ -45,7 +45,7 @@ Rgb image_value(const TextureNode& node, const Image& image, Vec2 st) {
     return {std::max(v.r, 0.0f), std::max(v.g, 0.0f), std::max(v.b, 0.0f)};
 }
 
-/// Beyond, the parity of a cell is no information any more, and a sum of three still is an integer.
+/// Beyond this the parity of a cell carries no information.
 bool has_cells(float x) { return std::fabs(x) < 1e9f; }
 
 int64_t cell(float x) { return int64_t(std::floor(x)); }

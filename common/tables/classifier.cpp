@@ -8,7 +8,8 @@ namespace {
 
 using Node = SubspaceTree::Node;
 
-/// Reorders a tree: the upper half of its levels first, then the trees below, each of them likewise.
+/// Reorders a tree: the nodes of the upper half of its levels come first, then the subtrees below, each in the same
+/// order.
 class Layout {
   public:
     explicit Layout(const std::vector<Node>& from) : from_(from), out_{from[0]} {}
@@ -20,7 +21,8 @@ class Layout {
     }
 
   private:
-    /// Gives the nodes below `tops` (positions in out_) their places, tree by tree; returns what lies `height` levels deeper.
+    /// Places the nodes below `tops` (positions in out_) tree by tree; returns the nodes that lie `height` levels
+    /// deeper.
     std::vector<uint32_t> place(const std::vector<uint32_t>& tops, uint32_t height) {
         std::vector<uint32_t> bottoms;
         for (const uint32_t top : tops) {
@@ -55,7 +57,7 @@ SubspaceTree SubspaceTree::compacted() const {
 }
 
 Status SubspaceTree::validate(uint32_t label_count) const {
-    if (nodes_.empty()) return data_loss("a classifier without nodes");
+    if (nodes_.empty()) return data_loss("a classifier has no nodes");
     for (size_t i = 0; i < nodes_.size(); ++i) {
         const Node& n = nodes_[i];
         if (n.axis() == kLeaf) {

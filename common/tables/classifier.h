@@ -29,7 +29,8 @@ class SubspaceTree {
     static constexpr uint32_t kLeaf = 15;
     static constexpr uint32_t kMaxDepth = 24;
 
-    /// By axis; room for any four bits, because a descent may look at a leaf's before it knows that it is one.
+    /// An end's scalars by axis. There is room for every 4-bit axis, because a descent may look up a leaf's before it
+    /// knows that the node is a leaf.
     using Scalars = std::array<float, 16>;
     static Scalars scalars_of(const SubPathEnd& e) {
         return {e.position.x, e.position.y,  e.position.z,  e.normal.x,   e.normal.y,
@@ -42,7 +43,7 @@ class SubspaceTree {
         uint32_t axis_and_child = kLeaf << 28;
         uint32_t axis() const { return axis_and_child >> 28; }
         uint32_t child() const { return axis_and_child & 0x0fffffffu; }
-        /// The child on the side of the scalars; of an inner node.
+        /// The child on the side of the scalars; the node must be an inner one.
         uint32_t next(const Scalars& scalars) const { return child() + (scalars[axis()] >= threshold ? 1 : 0); }
     };
     static Node make_leaf(uint32_t label) { return {0, (kLeaf << 28) | label}; }
@@ -52,20 +53,22 @@ class SubspaceTree {
     SubspaceTree() : nodes_(1, make_leaf(0)) {}
     /// `nodes[0]` is the root; see validate().
     explicit SubspaceTree(std::vector<Node> nodes) : nodes_(std::move(nodes)) {}
-    /// The same function of an end by fewer nodes in a better order: splits between equal leaves are gone, and what one descent
-    /// reads lies together on every scale, from cache lines to pages [van Emde Boas's layout; Prokop 1999, chapter 6].
+    /// Returns a tree that gives every end the same label with fewer nodes in a better order: splits between equal
+    /// leaves are removed, and the nodes of one descent lie close together on every scale, from cache lines to pages
+    /// [van Emde Boas's layout; Prokop 1999, chapter 6].
     SubspaceTree compacted() const;
 
     uint32_t label(const SubPathEnd& end) const { return label(end, 0); }
-    /// The same, from a node on the way that label_and_settle() returned for an end with this position and normal.
+    /// The same label, by a descent from the node that label_and_settle() returned for an end of this position and
+    /// normal.
     uint32_t label(const SubPathEnd& end, uint32_t from) const {
         const Scalars scalars = scalars_of(end);
         while (nodes_[from].axis() != kLeaf) from = nodes_[from].next(scalars);
         return nodes_[from].child();
     }
-    /// This tree's label, and how far position and normal alone lead in `other`: a vertex is asked for labels from many directions,
-    /// and two thirds of the way are the same for all of them. Every step of a descent waits for the one before; two descents wait
-    /// together.
+    /// Returns this tree's label, and the node of `other` to which position and normal alone lead: a vertex is asked
+    /// for its labels of many directions, and two thirds of those descents are the same. Each step of a descent waits
+    /// for the step before it; two descents at once wait together.
     struct Settled {
         uint32_t label, other_branch;
     };
@@ -80,8 +83,8 @@ class SubspaceTree {
         }
     }
     const std::vector<Node>& nodes() const { return nodes_; }
-    /// Children follow their parents (no loop can exist), every index is inside, every label below `label_count`, thresholds
-    /// are finite.
+    /// Checks that children follow their parents (so that there is no loop), that every index is in range and every
+    /// label below `label_count`, and that thresholds are finite.
     Status validate(uint32_t label_count) const;
 
   private:

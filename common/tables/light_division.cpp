@@ -9,8 +9,8 @@
 namespace lightloom {
 namespace {
 
-/// Equal-area coordinates in [0, 1]^2 of a point on an emitter: inverse mappings of what sampling.h draws from, up to the order
-/// of the axes.
+/// Equal-area coordinates in [0, 1]^2 of a point on an emitter: the inverses of the mappings by which sampling.h draws
+/// points, up to the order of the axes.
 Vec2 emitter_coordinates(const Emitter& e, const Vec3& position, const Vec3& w) {
     switch (e.kind) {
         case EmitterKind::kTriangle: {
@@ -53,7 +53,8 @@ LightDivision LightDivision::divide(const EmitterSet& emitters, uint32_t cell_co
     }
     std::vector<Cells> cells(power.size());
     if (!(total > 0)) return LightDivision(std::move(cells));
-    // `taken` cells are gone and `open` of the last one is in use; a light that would fill less than two cells goes into it.
+    // `taken` cells are in use, and the lights in the last one fill `open` of it. A light that would fill less than four
+    // cells (2 x 2), or that has no surface, shares the last cell until it is full.
     uint32_t taken = 0;
     double open = 1;
     for (size_t i = 0; i < cells.size(); ++i) {

@@ -1,7 +1,8 @@
 #pragma once
-// Light subspaces of prefixes of one vertex: x_0 alone. Emitters share a fixed number of cells in proportion to their power:
-// an area light gets a grid on its surface, the environment an equal-area grid of directions, and lights too weak for a cell of
-// their own share one with their neighbours in the list. [Su, Li and Wang 2022, section 5.1: 20 % of the light subspaces]
+// The light subspaces of prefixes of a single vertex, x_0, which lies on the light. Emitters share a fixed number of
+// cells in proportion to their power: an area light gets a grid on its surface, the environment an equal-area grid of
+// directions, and weak lights share a cell with their neighbours in the list. [Su, Li and Wang 2022, section 5.1: 20 %
+// of the light subspaces]
 
 #include <cstdint>
 #include <vector>
@@ -13,7 +14,7 @@ namespace lightloom {
 
 class LightDivision {
   public:
-    /// An emitter's cells: first .. first + side^2 - 1 as a grid.
+    /// The cells of an emitter, first .. first + side^2 - 1, form a grid.
     struct Cells {
         uint16_t first = 0, side = 1;
     };
@@ -23,8 +24,8 @@ class LightDivision {
     /// Divides `emitters` into at most `cell_count` cells (at least one), numbered from zero.
     static LightDivision divide(const EmitterSet& emitters, uint32_t cell_count);
 
-    /// Cell of a point x_0 of emitter `index` that emits along `w` (unit; only the environment looks at it). The same for
-    /// a point that was sampled and for one that was hit.
+    /// Cell of a point x_0 of emitter `index` that emits along `w` (unit; it matters for the environment only). A point
+    /// that was sampled and one that was hit have the same cell.
     uint32_t label(const EmitterSet& emitters, uint32_t index, const Vec3& position, const Vec3& w) const;
     uint32_t cell_count() const;
     const std::vector<Cells>& cells() const { return cells_; }

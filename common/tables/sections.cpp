@@ -28,7 +28,7 @@ Result<std::vector<std::pair<std::string, std::string_view>>> parse_sections(std
         at = line_end + 1;
         if (size >= bytes.size() || at + size + 1 > bytes.size()) return data_loss("the tables are cut short");
         const std::string_view content = bytes.substr(at, size_t(size));
-        // Nothing but what put_section() writes.
+        // Only what put_section() writes is accepted.
         if (line != std::string(name) + ' ' + std::to_string(size) + ' ' + hex || bytes[at + size_t(size)] != '\n')
             return data_loss("malformed table header");
         if (sha256(content).hex() != hex) return data_loss(std::string("table ") + name + " is damaged");

@@ -20,7 +20,7 @@ Status positive(const std::vector<float>& values, size_t count, const char* name
     return {};
 }
 
-/// Little-endian, which every supported host is.
+/// The values' bytes in memory, which are little-endian on every supported host.
 template <class T>
 std::string bytes_of(const std::vector<T>& values) {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -71,7 +71,8 @@ Status SubspaceTables::validate(const EmitterSet& emitters) const {
     for (const uint16_t w : window) {
         if (w < 1 || w > kMaxWindow) return data_loss("the window table holds a number out of range");
     }
-    if (!(vertices_per_path > 0 && std::isfinite(vertices_per_path))) return data_loss("no light vertices per path");
+    if (!(vertices_per_path > 0 && std::isfinite(vertices_per_path)))
+        return data_loss("the number of light vertices per path is not positive and finite");
     return {};
 }
 

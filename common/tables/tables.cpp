@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::string_view kMagic = "lightloom-tables 2\n";
 static_assert(kMagic.starts_with(kTablesPrefix));
-constexpr std::string_view kAlgorithm = "algorithm";  // no part's name
+constexpr std::string_view kAlgorithm = "algorithm";  // no part has this name
 
 }  // namespace
 
@@ -60,7 +60,7 @@ Result<Tables> parse_tables(std::string_view bytes, std::span<const TablePart* c
         const auto part = std::find_if(known.begin(), known.end(), [&](const TablePart* p) { return p->name == name; });
         if (part == known.end())
             return failed_precondition("the tables have a part '" + name +
-                                       "' that this algorithm does not read; they are another one's");
+                                       "' that this algorithm does not read; they belong to another algorithm");
         auto value = (*part)->parse(content);
         if (!value.ok()) return value.status();
         tables.put(*part, *std::move(value));

@@ -1,6 +1,7 @@
 #pragma once
-// Tables: what an algorithm has learned before it renders, in named parts. The container knows none of them: a part's type says
-// what it is called and how it is written, read and checked, and an algorithm's row of the catalog says which parts it has.
+// Tables: what an algorithm has learned before it renders, in named parts. The container knows none of the parts: a
+// part's type defines its name and how it is written, read and checked, and an algorithm's row of the catalog lists the
+// parts that it has.
 
 #include <memory>
 #include <span>
@@ -13,12 +14,12 @@
 
 namespace lightloom {
 
-/// How parts of one type are handled. A type T names its own: `static const TablePart kPart`.
+/// How parts of one type are handled. A type T declares its own as `static const TablePart kPart`.
 struct TablePart {
     std::string_view name;
     std::string (*serialize)(const void* part);
     Result<std::shared_ptr<const void>> (*parse)(std::string_view bytes);
-    /// Everything that a renderer of a scene with these emitters relies on; kDataLoss naming what is wrong.
+    /// Checks everything that a renderer of a scene with these emitters relies on; kDataLoss names what is wrong.
     Status (*validate)(const void* part, const EmitterSet& emitters);
 };
 
@@ -35,16 +36,17 @@ class Tables {
     void set(std::shared_ptr<const T> part) {
         put(&T::kPart, std::move(part));
     }
-    /// Null when there is no such part.
+    /// The part of type T, or null when there is none.
     template <class T>
     std::shared_ptr<const T> get() const {
         return std::static_pointer_cast<const T>(find(&T::kPart));
     }
     bool empty() const { return parts_.empty(); }
-    /// Whose they are; empty where nobody has said so. Algorithms may have parts of the same kind that mean nothing to one another.
+    /// Name of the algorithm that the tables belong to; empty where it is unknown. Parts of the same type may mean
+    /// different things to different algorithms.
     const std::string& algorithm() const { return algorithm_; }
     void belong_to(std::string algorithm) { algorithm_ = std::move(algorithm); }
-    /// Whether these are the parts, no more and no fewer.
+    /// Whether the tables have exactly these parts.
     bool consist_of(std::span<const TablePart* const> parts) const;
     Status validate(const EmitterSet& emitters) const;
 
@@ -59,14 +61,14 @@ class Tables {
     friend std::string serialize(const Tables& tables);
     friend Result<Tables> parse_tables(std::string_view bytes, std::span<const TablePart* const> known);
 
-    std::vector<Entry> parts_;  // by name
+    std::vector<Entry> parts_;  // sorted by name
     std::string algorithm_;
 };
 
-/// What serialized tables of every version begin with.
+/// Serialized tables of every version begin with this.
 inline constexpr std::string_view kTablesPrefix = "lightloom-tables ";
 
-/// Each part with its own SHA-256. The same tables have the same bytes on every host.
+/// Writes each part with its own SHA-256. The same tables have the same bytes on every host.
 std::string serialize(const Tables& tables);
 /// kDataLoss when a part is cut short, damaged or malformed; kFailedPrecondition for a part that is not among the known ones.
 Result<Tables> parse_tables(std::string_view bytes, std::span<const TablePart* const> known);

@@ -13,18 +13,19 @@ namespace {
 
 constexpr size_t kClassifierEnds = 200000;  ///< Enough for 1000 centroids and their borders.
 
-/// Quantile of the paths' weights at which they are cut off. Above it a handful would decide what Gamma is, and with what strength
-/// its prior counts. Gamma may be anything, so this touches no mean.
+/// The paths' weights are cut at this quantile. Otherwise a handful of paths would decide what Gamma is and how
+/// strongly its prior counts. The cut biases no image, because every Gamma gives the right mean.
 constexpr double kWeightCut = 0.99;
 
-/// On average, in a subspace that the data tell from others: four that are independent. Paths of one length of a sample share a
-/// camera sub-path.
+/// Fewest nodes per subspace, on average, with which the data can tell subspaces apart: four independent ones. The
+/// paths of one length that a camera sample keeps share a camera sub-path.
 constexpr uint64_t kFewestNodes = 4 * kTrainingPathsPerLength;
 
-/// Share of the time that has passed when these begin, for progress (measured; 5 10^5 samples of a hard interior).
+/// Share of the time that has passed when these phases begin, for progress reports (measured with 5e5 samples of a
+/// difficult interior).
 constexpr double kEnergyBegins = 0.1, kGammaBegins = 0.15;
 
-/// Of Gamma: 64 MB in single precision, which go to every worker.
+/// Most entries of Gamma: 64 MB in single precision, which every worker receives.
 constexpr uint64_t kMaxGammaCells = uint64_t(1) << 24;
 
 class Stopwatch {
@@ -44,7 +45,7 @@ class Stopwatch {
 std::vector<double> block_brightness(const TrainingData& d) {
     const int w = d.blocks_x, h = d.blocks_y;
     const double per_block = double(d.samples) / double(d.block_sum.size());
-    // A block whose sum left the range knows nothing of its brightness and takes that of its neighbours.
+    // A block whose sum is not finite counts as black here and gets its brightness from its neighbours.
     const auto known = [](double s) { return std::isfinite(s) ? s : 0; };
     double mean = 0;
     for (const double s : d.block_sum) mean += known(s) / per_block;
@@ -80,7 +81,7 @@ uint32_t used_labels(const SubspaceTree& tree) {
     return count;
 }
 
-/// kappa of both sides.
+/// Trains kappa, the classifiers of both sides.
 void train_classifiers(const TrainingData& d, const std::vector<double>& brightness, const EmitterSet& emitters,
                        const TrainingOptions& o, std::stop_token stop, SubspaceTables* tables) {
     size_t nodes = 0;
@@ -118,7 +119,7 @@ void train_classifiers(const TrainingData& d, const std::vector<double>& brightn
     tables->eye_count = used_labels(tables->eye_tree);
 }
 
-/// Q, windows and the number of connectible vertices.
+/// Measures Q, the windows and the mean number of connectible vertices.
 void measure_energy(const TrainingData& d, const EmitterSet& emitters, const TrainingOptions& o, std::stop_token stop,
                     SubspaceTables* t) {
     std::vector<double> sum(t->light_count, 0.0), count(t->light_count, 0.0);
@@ -138,7 +139,8 @@ void measure_energy(const TrainingData& d, const EmitterSet& emitters, const Tra
     const double paths = double(std::max<uint64_t>(1, d.light_samples));
     double total = 0;
     for (const double s : sum) total += s / paths;
-    // The floor keeps every subspace reachable: a zero would lose the light that only a delta light's prefix carries.
+    // The floor keeps every subspace reachable: with a zero, light of delta lights that only these prefixes carry would
+    // be lost.
     const double floor = total > 0 ? 1e-3 * total / t->light_count : 1;
     t->energy.clear(), t->window.clear();
     for (uint32_t i = 0; i < t->light_count; ++i) {
@@ -158,7 +160,7 @@ GammaDataset gamma_dataset(const TrainingData& d, const std::vector<double>& bri
     out.energy = t.energy;
     std::vector<float> weights;
     uint32_t part = 0, sample = 0;
-    Vec3 first_hit;  // which a camera sample's paths have in common
+    Vec3 first_hit;  // the paths of one camera sample have it in common
     for (size_t x = 0; x < d.paths.size(); ++x) {
         if (stop.stop_requested()) return out;
         const TrainingPath& p = d.paths[x];
@@ -232,7 +234,8 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
     if (stop.stop_requested()) return cancelled;
     report->paths = dataset.paths.size(), report->nodes = dataset.nodes.size();
     if (dataset.paths.empty())
-        report->note += std::string(report->note.empty() ? "" : "; ") + "no path of this scene can be connected: uniform tables";
+        report->note +=
+            std::string(report->note.empty() ? "" : "; ") + "no path of this scene can be connected; the tables are uniform";
     GammaOptions gamma;
     gamma.trainer = options.trainer;
     gamma.mix = options.mix;

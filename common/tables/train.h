@@ -1,9 +1,10 @@
 #pragma once
-// From training data to tables: brightness of blocks, kappa, Q, Gamma, windows. [Su, Li and Wang 2022, section 5]
+// Learns tables from training data: brightness of blocks, kappa, Q, Gamma, windows. [Su, Li and Wang 2022, section 5]
 //
-// Cleaning of the dataset, for what it trains only (no image is made of it): a path without a connectible edge teaches Gamma
-// nothing and is left out, as is one whose numbers left the range of single precision (counted); w_X is cut at its 99.99 %
-// quantile, so that one lucky path does not own a column; centroids see contributions cut at their 99.9 % quantile.
+// The dataset is cleaned for training only (no image is made of it). A path without a connectible edge teaches Gamma
+// nothing and is left out, as is a path whose numbers left the range of single precision (these are counted). w_X is
+// cut at its 99 % quantile, so that one lucky path does not own a column; for the choice of centroids, contributions
+// are cut at their 99.9 % quantile.
 
 #include <cstdint>
 #include <functional>
@@ -19,11 +20,11 @@ namespace lightloom {
 
 struct TrainingOptions {
     uint32_t light_subspaces = 1000, eye_subspaces = 1000;  ///< N_L, N_E: upper bounds.
-    double source_share = 0.2;                              ///< Of the light subspaces, for points on lights.
+    double source_share = 0.2;                              ///< Share of the light subspaces for points on lights.
     double direction_weight = 0.05;                         ///< k_d.
-    double mix = 0.1;                                       ///< Conservative share of Gamma.
+    double mix = 0.1;                                       ///< Conservative share of Gamma; see train_gamma.h.
     GammaTrainer trainer = GammaTrainer::kMm;
-    int connections = 3;        ///< N that rendering will use.
+    int connections = 3;        ///< N, the number of connections that rendering will make.
     double reuse_target = 200;  ///< M0: prefixes that a subspace should hold.
     int reuse_windows = 1;      ///< J_max.
     double nominal_paths = 1;   ///< Light paths of the smallest cache that rendering will make.
@@ -32,20 +33,20 @@ struct TrainingOptions {
 
 struct TrainingReport {
     GammaReport gamma;
-    uint32_t light_subspaces = 0, eye_subspaces = 0;  ///< That there are; see SubspaceTables.
+    uint32_t light_subspaces = 0, eye_subspaces = 0;  ///< Subspaces in the tables; at most as many as asked for.
     uint64_t paths = 0, nodes = 0;
     uint64_t out_of_range = 0;  ///< Paths and light sub-paths that were left out; see TrainingData::in_range().
     double classifier_seconds = 0, energy_seconds = 0, gamma_seconds = 0;
     std::string note;  ///< One line when the tables are simpler than asked or data were left out; empty otherwise.
 };
 
-/// How others follow a training, and end it.
+/// Lets the caller follow a training and end it.
 struct TrainingControl {
     std::stop_token stop;
-    std::function<void(double)> progress;  ///< Optional; called now and then with the share of the time that has passed, about.
+    std::function<void(double)> progress;  ///< Optional; called now and then with the approximate share of time passed.
 };
 
-/// kCancelled within about a second of a stop request; otherwise always valid tables, whatever the data hold.
+/// Returns kCancelled within about a second of a stop request, and otherwise valid tables, whatever the data hold.
 Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& emitters, const TrainingOptions& options,
                                     const TrainingControl& control, TrainingReport* report);
 

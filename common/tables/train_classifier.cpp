@@ -16,15 +16,15 @@ constexpr size_t kAxes = SubspaceTree::kAxes;
 constexpr double kPurity = 0.99;
 constexpr uint32_t kNodesPerSubspace = 64;
 
-/// An end as a point of a Euclidean space in which the distance of two ends is that of algorithms.md 1.3, up to sigma:
-/// |dx|^2 / sigma^2 + (1 - n n') + k_d (1 - d d'), and 1 - n n' = |n - n'|^2 / 2 for unit vectors.
+/// An end as a point of a Euclidean space in which the squared distance of two ends is the distance of algorithms.md
+/// 1.3 over sigma^2: |dx|^2 / sigma^2 + (1 - n n') + k_d (1 - d d'), where 1 - n n' = |n - n'|^2 / 2 for unit vectors.
 using Point = std::array<float, kAxes>;
 
 struct Space {
     Point scale;
 
     Space(const std::vector<WeightedEnd>& ends, float direction_weight) {
-        // sigma^2: largest variance of the positions along an axis.
+        // sigma^2 is the largest variance of the positions along an axis.
         double sum[3] = {}, square[3] = {}, total = 0;
         for (const WeightedEnd& e : ends) {
             for (int a = 0; a < 3; ++a) {
@@ -95,7 +95,7 @@ std::vector<Point> choose_centroids(const std::vector<WeightedEnd>& ends, const 
     return centroids;
 }
 
-/// Puts the centroids into the order of a balanced kd-tree, and drops repeated ones.
+/// Puts the centroids into the order of a balanced kd-tree.
 void order_centroids(std::vector<Point>& c, size_t begin, size_t end) {
     if (end - begin < 2) return;
     Bounds bounds;
@@ -111,7 +111,7 @@ void order_centroids(std::vector<Point>& c, size_t begin, size_t end) {
 /// Index of the nearest centroid of every end.
 std::vector<uint32_t> nearest(const std::vector<WeightedEnd>& ends, const Space& space, const std::vector<Point>& centroids,
                               const std::stop_token& stop) {
-    // Axis by axis, so that the inner loop is over centroids in vector registers.
+    // The centroids are stored axis by axis, so that the inner loop runs over centroids in vector registers.
     std::array<std::vector<float>, kAxes> columns;
     for (size_t a = 0; a < kAxes; ++a)
         for (const Point& c : centroids) columns[a].push_back(c[a]);
@@ -146,7 +146,7 @@ class TreeBuilder {
           node_budget_(size_t(kNodesPerSubspace) * label_count) {}
 
     SubspaceTree build(const std::stop_token& stop) {
-        // Breadth first, so that a spent budget leaves every part of space equally fine.
+        // The tree grows breadth first, so that a spent node budget leaves every part of space equally fine.
         struct Task {
             uint32_t node;
             size_t begin, end;
@@ -171,7 +171,7 @@ class TreeBuilder {
             const float threshold = scaled / space_.scale[axis];
             const auto middle =
                 std::stable_partition(begin, end, [&](uint32_t i) { return Space::raw(ends_[i].end)[axis] < threshold; });
-            if (middle == begin || middle == end) continue;  // all in one place
+            if (middle == begin || middle == end) continue;  // all ends lie on one side
             const uint32_t left = uint32_t(nodes_.size());
             nodes_[task.node] = SubspaceTree::make_inner(uint32_t(axis), threshold, left);
             nodes_.resize(nodes_.size() + 2, SubspaceTree::make_leaf(first_label_ + label));

@@ -20,7 +20,7 @@ struct ClassifierOptions {
     uint32_t first_label = 0;
     float direction_weight = 0.05f;  ///< k_d.
     uint64_t seed = 0;
-    std::stop_token stop;  ///< Requested: returns soon, with a tree of no use.
+    std::stop_token stop;  ///< After a stop request the function returns soon, with a tree of no use.
 };
 
 /// At most options.subspaces labels are used (fewer when there are fewer distinct ends). Labels are in the order of a balanced

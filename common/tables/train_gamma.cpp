@@ -13,7 +13,7 @@
 namespace lightloom {
 namespace {
 
-/// Labels of one level of the nested family: everything that agrees above the lowest `bits` is one.
+/// One level of the nested classifications: labels that agree in all but their lowest `bits` bits are one subspace.
 struct Level {
     uint32_t bits, source_count, coarse_sources, light_count, eye_count;
 
@@ -28,8 +28,8 @@ struct Level {
     uint32_t eye(uint32_t j) const { return j >> bits; }
 };
 
-/// The dataset as a level sees it: what a matrix B (column-major) is worth and how to improve it. Columns that no path names are
-/// left alone: they have no part in the loss, and the prior is what is known of them.
+/// The training problem on one level: evaluates and improves a matrix B (column-major). Columns that no path uses are
+/// left alone: the loss does not depend on them, and nothing but the prior is known of them.
 class LevelProblem {
   public:
     LevelProblem(const GammaDataset& data, uint32_t bits, double mix) : data_(&data), level_(data, bits), mix_(mix) {
@@ -69,7 +69,8 @@ class LevelProblem {
         });
         return prior;
     }
-    /// B of a coarser level as this one's prior: mass goes to the parts of a subspace in proportion to their energy.
+    /// Turns B of a coarser level into this level's prior: the parts of a subspace share its mass in proportion to
+    /// their energy.
     std::vector<float> lifted(const LevelProblem& coarse, const std::vector<float>& b) const {
         std::vector<std::pair<uint32_t, double>> from(level_.light_count);  // the coarse label, and this part's share of it
         for (uint32_t i = 0; i < level_.light_count; ++i) {
@@ -102,7 +103,8 @@ class LevelProblem {
         }
         return paths.empty() ? 0 : sum / double(paths.size());
     }
-    /// Negative gradient of the loss' sum with respect to B, in the columns that paths name; the others of `out` are not touched.
+    /// Negative gradient of the loss' sum with respect to B, in the columns that paths use; the others of `out` are not
+    /// touched.
     void gradient(const std::vector<float>& b, const uint32_t* begin, const uint32_t* end, std::vector<double>* out) const {
         for_columns(columns_.size(), [&](size_t k) {
             double* column = &(*out)[size_t(columns_[k]) * level_.light_count];
@@ -116,8 +118,8 @@ class LevelProblem {
             for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n) (*out)[cells_[n]] += scale * double(gains_[n]);
         }
     }
-    /// One majorise-minimise step per column: B <- sqrt(B^2 G + lambda Gbar pi^2), normalised [algorithms.md 9.2].
-    /// `g` is room for a gradient.
+    /// One majorise-minimise step per column: B <- sqrt(B^2 G + lambda Gbar pi^2), normalised [algorithms.md 9.2]. `g`
+    /// is working memory for a gradient.
     void improve(std::vector<float>* b, const std::vector<float>& prior, double lambda, const std::vector<uint32_t>& paths,
                  std::vector<double>* g) const {
         g->resize(b->size());
@@ -136,7 +138,7 @@ class LevelProblem {
                 (*g)[c] = std::sqrt(old * old * (*g)[c] + lambda * mean * pi * pi);
                 sum += (*g)[c];
             }
-            if (!(sum > 0)) return;  // neither paths nor a prior's strength: it stays
+            if (!(sum > 0)) return;  // neither paths nor the prior have weight here: the column stays
             for (size_t c = column; c < column + level_.light_count; ++c) (*b)[c] = float((*g)[c] / sum);
         });
     }
@@ -163,8 +165,8 @@ class LevelProblem {
     double mix_;
     std::vector<double> energy_;
     std::vector<double> floor_;      ///< What the mix adds to an entry, by light label.
-    std::vector<uint32_t> columns_;  ///< That a path names, ascending.
-    std::vector<uint32_t> cells_;    ///< By node.
+    std::vector<uint32_t> columns_;  ///< Columns that a path uses, ascending.
+    std::vector<uint32_t> cells_;    ///< By node: its entry of B.
     std::vector<float> gains_;       ///< By node: dF / dB.
     std::vector<double> fixed_;      ///< By path: F for B = 0.
 };
@@ -173,10 +175,11 @@ constexpr double kStrengths[] = {0.01, 0.1, 1, 10, 100};
 constexpr double kCoarseStrength = 0.1;
 constexpr int kCoarseSteps = 4, kStepsPerStrength = 4, kFinalSteps = 3;
 
-/// Up to here the prior's strength is chosen: it matters where data are thin, which is at the fine end.
+/// On levels with at most this many bits the prior's strength is chosen by trial. It matters where data are thin, which
+/// is on the fine levels.
 constexpr uint32_t kFineBits = 2;
 
-/// Steps of the finest levels, which take nearly all the time, and what has been done of them.
+/// Counts the steps on the finest levels, which take nearly all the time, and reports the share that is done.
 class Steps {
   public:
     Steps(uint32_t coarsest_bits, const std::function<void(double)>& report)
@@ -192,8 +195,9 @@ class Steps {
 };
 
 std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& options, GammaReport* report) {
-    // A light sub-path that made paths in both parts would confirm itself: whole batches judge, where there are enough of them.
-    // Where there are few, samples do: a guided round's still share light sub-paths then, and the prior comes out weaker.
+    // A light sub-path with paths in both parts would confirm itself; therefore whole batches judge where there are
+    // enough of them. Where there are few, camera samples judge. Those of a guided round then still share light
+    // sub-paths with paths that train, and the prior comes out weaker.
     constexpr uint32_t kFewBatches = 5;
     uint32_t batches = 0;
     for (const GammaPath& p : data.paths) batches = std::max(batches, p.batch + 1);
@@ -209,7 +213,7 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
     std::vector<uint32_t> all(data.paths.size());
     std::iota(all.begin(), all.end(), 0u);
 
-    // From about 16 subspaces a side to the finest, half a subspace's size at a time.
+    // Levels go from about 16 subspaces a side to the finest; each halves the subspaces' size.
     uint32_t bits = 0;
     while ((std::max(data.light_count, data.eye_count) >> bits) > 16) ++bits;
     Steps steps(bits, options.progress);
@@ -239,14 +243,14 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
             report->light_resolution = problem.level().light_count;
             report->eye_resolution = problem.level().eye_count;
             b = std::move(best_b);
-            // What judged may teach as well once the choice is made.
+            // Once the choice is made, the paths that judged may train as well.
             if (finest)
                 for (int i = 0; i < kFinalSteps && !options.stop.stop_requested(); ++i) {
                     problem.improve(&b, prior, strength, all, &room);
                     steps.done_on(bits);
                 }
         } else {
-            b = prior;  // finer subspaces than the data support: keep the coarser model, lifted
+            b = prior;  // The data do not support finer subspaces: the coarser model is kept.
         }
         if (finest) break;
         --bits;
@@ -264,7 +268,7 @@ std::vector<float> train_adam(const GammaDataset& data, const GammaOptions& opti
     constexpr int kEpochs = 2;
     const LevelProblem problem(data, 0, options.mix);
     std::vector<float> b = problem.flat_prior();
-    // The gradient of columns that no path names is never written: it stays zero.
+    // The gradient of columns that no path uses is never written and stays zero.
     std::vector<double> theta(b.size()), first(b.size(), 0), second(b.size(), 0), g(b.size(), 0), column_exp(data.light_count);
     for (size_t c = 0; c < b.size(); ++c) theta[c] = math::log(double(b[c]));
     std::vector<uint32_t> order(data.paths.size());

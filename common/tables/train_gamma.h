@@ -6,7 +6,7 @@
 //                 [algorithms.md 9.2]
 //   adam          stochastic gradient on softmax columns, as the paper does
 //   contribution  share of contribution, blind to the other techniques (the paper's Fig. 6 ablation)
-// All are deterministic. Gamma = (1 - mix) B + mix (uniform + Q-proportional) / 2; the loss knows the mix.
+// All are deterministic. Gamma = (1 - mix) B + mix (uniform + Q-proportional) / 2; the loss includes the mix.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace lightloom {
 
-/// A connection that can make a path.
+/// A connection that can make a path: its subspaces, and g_n of the loss.
 struct GammaNode {
     uint16_t light = 0, eye = 0;
     float g = 0;
@@ -24,16 +24,16 @@ struct GammaNode {
 
 struct GammaPath {
     uint32_t first_node = 0, node_count = 0;
-    float weight = 0;        ///< w_X, see TrainingPath::square over the squared brightness of its block; cut at a quantile.
-    float fixed = 0;         ///< Techniques that Gamma does not change.
-    float contribution = 0;  ///< Relative to the block's brightness.
-    uint32_t batch = 0;      ///< Paths of a batch are not independent of one another: they share light sub-paths.
-    uint32_t sample = 0;     ///< Nor are those of a sample, side by side in the dataset: they share a camera sub-path.
+    float weight = 0;        ///< w_X: TrainingPath::square over the block's squared brightness, cut at a quantile.
+    float fixed = 0;         ///< fixed_X: density of the techniques that Gamma does not change.
+    float contribution = 0;  ///< Estimate relative to the block's brightness.
+    uint32_t batch = 0;      ///< Paths of one batch share light sub-paths: they are not independent.
+    uint32_t sample = 0;     ///< Paths of one sample share a camera sub-path; they are neighbours in the dataset.
 };
 
 struct GammaDataset {
     uint32_t light_count = 1, eye_count = 1;
-    uint32_t source_count = 0;  ///< Light labels below this are cells of emitters; coarsened apart.
+    uint32_t source_count = 0;  ///< Light labels below this are cells of emitters; they are coarsened separately.
     std::vector<GammaNode> nodes;
     std::vector<GammaPath> paths;
     std::vector<float> energy;  ///< Q, positive.
@@ -44,21 +44,21 @@ enum class GammaTrainer : uint8_t { kMm, kAdam, kContribution };
 struct GammaOptions {
     GammaTrainer trainer = GammaTrainer::kMm;
     double mix = 0.1;
-    double held_out = 0.2;  ///< Share of the batches that only judge (mm); of the paths where there are few batches.
+    double held_out = 0.2;  ///< Share of the batches (of camera samples where they are few) that only judge (mm).
     uint64_t seed = 0;
-    std::stop_token stop;                  ///< Requested: returns soon, with a matrix of no use.
+    std::stop_token stop;                  ///< After a stop request the function returns soon, with a matrix of no use.
     std::function<void(double)> progress;  ///< Optional; called now and then with the share of the work that is done.
 };
 
-/// What training found, for reports.
+/// Results of the training, for reports.
 struct GammaReport {
-    double uniform_loss = 0;  ///< Of Q-proportional selection without subspaces, on the held-out paths (mm) or all.
-    double loss = 0;          ///< Of the result, same paths.
+    double uniform_loss = 0;  ///< Loss of the prior (half uniform, half by Q) on the held-out paths (mm) or all.
+    double loss = 0;          ///< Loss of the result on the same paths.
     double prior_strength = 0;
     uint32_t light_resolution = 1, eye_resolution = 1;  ///< Subspaces that the result tells apart (mm).
 };
 
-/// Column-major (eye * light_count + light), every column sums to one, every entry positive.
+/// Returns Gamma, column-major (eye * light_count + light); every column sums to one, every entry is positive.
 std::vector<float> train_gamma(const GammaDataset& data, const GammaOptions& options, GammaReport* report);
 
 /// The loss of a Gamma over the paths first, first + stride, ... of a dataset, divided by their number.

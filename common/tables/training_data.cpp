@@ -36,7 +36,7 @@ Status TrainingData::append(const TrainingData& other, uint64_t max_vertices) {
         block_sum.assign(other.block_sum.size(), 0.0);
     }
     if (blocks_x != other.blocks_x || blocks_y != other.blocks_y || block_sum.size() != other.block_sum.size())
-        return invalid_argument("training data of another frame");
+        return invalid_argument("the training data are those of another frame");
     for (size_t i = 0; i < block_sum.size(); ++i) block_sum[i] += other.block_sum[i];
     samples += other.samples, light_samples += other.light_samples;
     const uint32_t offset = uint32_t(vertices.size());
@@ -55,19 +55,20 @@ Status TrainingData::append(const TrainingData& other, uint64_t max_vertices) {
 
 Status TrainingData::validate(size_t emitter_count) const {
     if (blocks_x < 1 || blocks_y < 1 || block_sum.size() != size_t(blocks_x) * size_t(blocks_y))
-        return data_loss("training data without a frame");
-    if (light_paths.size() > light_samples) return data_loss("training data with more light sub-paths than were traced");
+        return data_loss("the training data have no frame");
+    if (light_paths.size() > light_samples) return data_loss("the training data have more light sub-paths than were traced");
     for (const std::vector<TrainingPath>* list : {&paths, &light_paths}) {
         for (const TrainingPath& p : *list) {
             if (p.vertex_count < 1 || uint64_t(p.first_vertex) + p.vertex_count > vertices.size() || p.block >= block_sum.size() ||
                 vertices[p.first_vertex].emitter >= emitter_count)
-                return data_loss("training data with a malformed path");
+                return data_loss("the training data have a malformed path");
         }
     }
-    // Classifiers sort by these: an order needs numbers.
+    // Classifiers sort by these values, so that none may be NaN.
     const auto finite = [](const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
     for (const TrainingVertex& v : vertices)
-        if (!finite(v.position) || !finite(v.normal)) return data_loss("training data with a vertex that is nowhere");
+        if (!finite(v.position) || !finite(v.normal))
+            return data_loss("the training data have a vertex whose position or normal is not finite");
     return {};
 }
 
@@ -93,20 +94,20 @@ std::string serialize(const TrainingData& d) {
 Result<TrainingData> parse_training_data(std::string_view bytes) {
     Header header;
     const Header expected;
-    if (bytes.size() < sizeof header) return data_loss("training data cut short");
+    if (bytes.size() < sizeof header) return data_loss("the training data are cut short");
     std::memcpy(&header, bytes.data(), sizeof header);
     bytes.remove_prefix(sizeof header);
     if (std::memcmp(header.magic, expected.magic, sizeof header.magic) != 0)
-        return data_loss("not training data of a known version");
+        return data_loss("these are not training data of a known version");
     if (header.blocks_x < 1 || header.blocks_y < 1 || header.blocks_x > 65536 || header.blocks_y > 65536)
-        return data_loss("training data without a frame");
+        return data_loss("the training data have no frame");
     const uint64_t blocks = uint64_t(header.blocks_x) * uint64_t(header.blocks_y);
     const uint64_t limit = bytes.size();
     if (blocks > limit || header.path_count > limit || header.light_path_count > limit || header.vertex_count > limit ||
         blocks * sizeof(double) + (header.path_count + header.light_path_count) * sizeof(TrainingPath) +
                 header.vertex_count * sizeof(TrainingVertex) !=
             limit)
-        return data_loss("training data of the wrong size");
+        return data_loss("the training data have the wrong size");
     TrainingData d;
     d.blocks_x = header.blocks_x, d.blocks_y = header.blocks_y;
     d.samples = header.samples, d.light_samples = header.light_samples;

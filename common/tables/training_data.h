@@ -1,17 +1,20 @@
 #pragma once
-// What training units bring home: full paths (the dataset D), light sub-paths (for Q), and the brightness of the frame by blocks.
-// Everything is a plain array, so that parts from many units are simply joined in the order of their sample numbers.
+// What training units return: full paths (the dataset D), light sub-paths (for Q), and the brightness of the frame by
+// blocks. Everything is a plain array, so that parts from many units are simply joined in the order of their sample
+// numbers.
 //
 // A path X of technique `own` with density p_own (as traced, roulette included) and weight w_own:
 //     estimate = L(w_own f / p_own)                a sample of the image, in expectation
 //     square   = L(f / p_own)^2 w_own              c_X p_own of algorithms.md 1.1: E[square / (F / p_own)] is the loss
-//     densities: n p of a technique, over p_own, as the weights of the render will count it (typical survival of roulette,
-//                corrections) but without what is to be learned, N Gamma / Q; 0 where impossible. vertices[s].density: of hitting
-//                the emitter (s = 0) and of the connection of x_{s-1} and x_s (1 <= s <= k-1); next_event and lens: of choosing
-//                x_0 afresh from x_1, as often as the render will, and of a light sub-path that reached the lens
-// A camera sample keeps at most two paths with two camera vertices (the lens counts), two with three, four, and two with more: what
-// it found is dealt to the two in turn. A light sub-path that reached the lens keeps one. Each is chosen in proportion to its
-// estimate; both numbers are divided by the probability of that choice, so that sums over D stay unbiased.
+//     densities: n p / p_own of each technique, as the render's weights will count it (typical survival of roulette,
+//                corrections) but without the factor that is to be learned, N Gamma / Q; 0 where it is impossible.
+//                vertices[s].density is that of hitting the emitter (s = 0) and of connecting x_{s-1} with x_s
+//                (1 <= s <= k-1); next_event that of choosing x_0 afresh from x_1, as often as the render will; lens
+//                that of a light sub-path that reached the lens
+// A camera sample keeps at most two paths of each length: with two, three, four, and more camera vertices (the lens
+// counts). The paths that it found are dealt to the two places in turn. A light sub-path that reached the lens keeps
+// one path. Each is chosen in proportion to its estimate; estimate and square are divided by the probability of that
+// choice, so that sums over D stay unbiased.
 
 #include <cstdint>
 #include <string>
@@ -27,42 +30,42 @@ struct TrainingVertex {
     Vec3 position;
     Vec3 normal;           ///< Geometric; x_0 of an infinite light: direction of travel. The lens has none.
     float density = 0;     ///< Paths: see above. Light sub-paths: scalar throughput; 0 where not connectible.
-    uint32_t emitter = 0;  ///< x_0 only.
+    uint32_t emitter = 0;  ///< Set for x_0 only.
 };
 
 /// Lengths of camera sub-paths that are told apart, and paths that a camera sample keeps of each.
 inline constexpr int kTrainingLengths = 4, kTrainingPathsPerLength = 2;
 
-/// That a camera sample keeps at most, side by side in TrainingData::paths.
+/// Most paths that a camera sample keeps; they are neighbours in TrainingData::paths.
 inline constexpr size_t kTrainingPathsPerSample = size_t(kTrainingLengths) * kTrainingPathsPerLength;
 
 struct TrainingPath {
     uint32_t first_vertex = 0;
     uint32_t vertex_count = 0;  ///< k + 1, x_0 ... x_k; light sub-paths: y_0 ... y_{n-1}.
-    uint32_t block = 0;         ///< Of the frame. Light sub-paths: 0.
+    uint32_t block = 0;         ///< Index of the pixel's block in the frame. Light sub-paths: 0.
     float estimate = 0, square = 0;
     float next_event = 0, lens = 0;  ///< Densities; see above. Light sub-paths: 0.
 };
 
 struct TrainingData {
     int32_t blocks_x = 0, blocks_y = 0;
-    std::vector<double> block_sum;  ///< Of all estimates, kept or not; blocks_x * blocks_y.
+    std::vector<double> block_sum;  ///< Sums of all estimates, kept or not; blocks_x * blocks_y.
     uint64_t samples = 0;           ///< D: camera samples traced, uniform over the frame.
     uint64_t light_samples = 0;     ///< M': light sub-paths traced to measure Q, those included that left nothing to keep.
     std::vector<TrainingPath> paths;
     std::vector<TrainingPath> light_paths;
-    std::vector<uint32_t> part_ends;  ///< In `paths`, of what append() has joined; not serialized.
+    std::vector<uint32_t> part_ends;  ///< Ends in `paths` of the parts that append() has joined; not serialized.
     std::vector<TrainingVertex> vertices;
 
     static constexpr uint64_t kMaxVertices = UINT32_MAX;  ///< TrainingPath::first_vertex has 32 bits.
 
-    /// Appends another unit's data of the same frame; kInvalidArgument for another one's, kResourceExhausted above
-    /// `max_vertices`.
+    /// Appends another unit's data of the same frame; kInvalidArgument for data of another frame, kResourceExhausted
+    /// above `max_vertices`.
     Status append(const TrainingData& other, uint64_t max_vertices = kMaxVertices);
-    /// Everything that training relies on. Estimates, squares, densities and sums may leave the range of their type in a scene
-    /// of extremes; see in_range().
+    /// Checks everything that training relies on. Estimates, squares, densities and sums may exceed the range of their
+    /// type in an extreme scene; see in_range().
     Status validate(size_t emitter_count) const;
-    /// Whether all numbers of a path that tables are learned from are finite. Training leaves the others out.
+    /// Whether all numbers of a path from which tables are learned are finite. Training leaves other paths out.
     bool in_range(const TrainingPath& path) const;
 };
 

@@ -34,8 +34,8 @@ struct BdptSelection {
     NextEventRays next_event_rays() const { return rays; }
 };
 
-/// Traces one camera sample and one light sub-path and calls contribute(contribution, view) for everything that they give.
-/// light_done(y, n) is called once the light sub-path is complete.
+/// Traces one camera sample and one light sub-path and calls contribute(contribution, view) for each of their
+/// contributions. light_done(y, n) is called once the light sub-path is complete.
 template <ViewDetail detail, class LightDone, class Contribute>
 void trace_bdpt_sample(SampleContext& context, NextEventRays rays, LightDone&& light_done, Contribute&& contribute) {
     const Scene& scene = context.scene;

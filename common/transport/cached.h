@@ -1,17 +1,18 @@
 #pragma once
-// The bidirectional algorithms with a light-vertex cache, but for what tells them apart. A method says which prefixes of
-// the cache a camera vertex is connected to, and with what densities the weights reckon:
+// The common part of the bidirectional algorithms with a light-vertex cache. A method decides which prefixes of the
+// cache a camera vertex is connected to, and which densities the weights use:
 //
 //   struct Method {
-//       Selection selection(const UnitScope&) const;   // the densities of one unit's weights (common/path/mis.h) and the rays of
-//                                                      // its next event estimation beside s = 1 from the cache; made before the
-//                                                      // unit's first sub-path: what it has to trace itself, it traces from
-//                                                      // streams of its own
-//       Selection densities;                           // where all units have the same: weights can be asked about single paths
-//       static constexpr bool kUnitSelection;          // optional; whether they depend on more of the unit than its group
+//       Selection selection(const UnitScope&) const;   // the densities of one unit's weights (common/path/mis.h) and
+//                                                      // the rays of its next event estimation besides s = 1 from the
+//                                                      // cache; made before the unit's first sub-path; if it traces
+//                                                      // sub-paths itself, their random streams are its own
+//       Selection densities;                           // if all units have the same, so that single paths can be
+//                                                      // weighted
+//       static constexpr bool kUnitSelection;          // optional; true if they depend on the unit beyond its group
 //       static constexpr ViewDetail kDetail;
-//       struct / using Index;                          // of a unit's cache, frozen before the first camera sample
-//       uint64_t windows() const;                      // light-only repetitions of the cache that the index may reach into
+//       struct / using Index;                          // of a unit's cache, complete before the first camera sample
+//       uint64_t windows() const;                      // number of windows of light paths that the index may use
 //       Index index(const LightCache&, uint64_t paths) const;                              // paths: of one window
 //       void label_light_path(const Scene&, PathVertex* y, int n) const;
 //       void label_camera_vertex(const Scene&, PathVertex* v) const;
@@ -33,7 +34,7 @@ template <class Method>
 struct CachedAlgorithm {
     Method method;
     Heuristic heuristic = Heuristic::kBalance;
-    uint64_t minimum_paths = 1;  ///< Of a unit's cache.
+    uint64_t minimum_paths = 1;  ///< Least light paths in a unit's cache.
 
     static constexpr bool kUnitSelection = [] {
         if constexpr (requires { Method::kUnitSelection; }) return Method::kUnitSelection;
@@ -52,8 +53,8 @@ struct CachedAlgorithm {
     }
     float weight(const State& state, const PathView& view, Technique own) const { return weight(state.selection, view, own); }
 
-    /// Traces a unit's light sub-paths. `contribute(contribution, view, weight, m, chunk)` is called for every counted one, m, that
-    /// reaches the lens.
+    /// Traces a unit's light sub-paths. `contribute(contribution, view, weight, m, chunk)` is called for every counted
+    /// sub-path m that reaches the lens.
     template <class Contribute>
     State prepare(const UnitScope& scope, UnitPreparation* preparation, Contribute&& contribute) const {
         const Scene& scene = scope.scene;
@@ -78,7 +79,7 @@ struct CachedAlgorithm {
         return state;
     }
 
-    /// Traces one camera sample and calls contribute(contribution, view) for everything that it gives.
+    /// Traces one camera sample and calls contribute(contribution, view) for each of its contributions.
     template <class Contribute>
     void trace(SampleContext& context, const State& state, Contribute&& contribute) const {
         constexpr ViewDetail kDetail = Method::kDetail;
@@ -107,7 +108,7 @@ struct CachedAlgorithm {
                     });
             }
             LightPick picks[kMaxConnections];
-            // Low-discrepancy at the first vertex, over the iterations of the pixel.
+            // The first vertex uses low-discrepancy points over the iterations of the pixel.
             const int count = method.draw(
                 state.cache, state.index, v, [&] { return sampler.connection(t); }, sampler.rng(), context.max_edges + 1 - t,
                 picks);
@@ -127,8 +128,8 @@ struct CachedAlgorithm {
                                             .t = t,
                                             .y = pick.y,
                                             .z = z,
-                                            // Where a light sub-path from an infinite light began says nothing about this one: x_0
-                                            // is a direction.
+                                            // x_0 is a direction; the place where a light sub-path from an infinite
+                                            // light began does not matter here.
                                             .position = direction ? scene.emitters().outside(v.p, -end.ng) : start.p,
                                             .normal = start.ng,
                                             .emitter = uint32_t(start.emitter),

@@ -1,8 +1,8 @@
 #pragma once
-// The catalog: every algorithm with what it is, its parameters, what kind of units it needs, how it is made and how its tables are
-// learned. One row per algorithm, written in the algorithm's own file; the command line, the documentation (`lightloom
-// algorithms`), validation, plans, workers, coordinator and the property suites all read it from here. Besides, an algorithm is
-// named where pbrt's integrators are translated (client/default_algorithm.cpp).
+// The catalog: a row per algorithm with its description, its parameters, the kind of units it needs, how it is made and
+// how its tables are learned. A row stands in the algorithm's own file; the command line, the documentation (`lightloom
+// algorithms`), validation, plans, workers, coordinator and the property suites all read it from here. An algorithm is
+// also named where pbrt's integrators are translated (client/default_algorithm.cpp).
 
 #include <cstdint>
 #include <memory>
@@ -36,7 +36,7 @@ struct ParameterInfo {
 /// What the units of an algorithm cover.
 enum class FrameShape : uint8_t {
     kTiles,  ///< Any tile of the frame.
-    kWhole,  ///< The whole frame: something of the unit belongs to all of its pixels (photon maps, weights of the unit's own).
+    kWhole,  ///< The whole frame: its pixels share something (photon maps, weights that depend on the unit).
 };
 
 /// From which ends an algorithm traces sub-paths of more than one edge, and so which light it can find at all.
@@ -48,11 +48,11 @@ enum class Traces : uint8_t {
 
 /// How the tables of an algorithm are learned before it renders.
 struct LearningInfo {
-    /// What its tables consist of.
+    /// The parts that its tables have.
     std::span<const TablePart* const> parts;
     /// The training set and the rounds in which it is traced.
     LearningPlan (*plan)(const AlgorithmSettings&);
-    /// Tables from the data of one round. kCancelled within about a second of a stop request.
+    /// Makes tables from the data of one round. kCancelled within about a second of a stop request.
     Result<Tables> (*learn)(const LearnRequest&);
 };
 
@@ -67,19 +67,20 @@ struct AlgorithmInfo {
     bool camera_samples = true;  ///< False: all of its light is in splats.
     /// Light paths per pixel and iteration that land anywhere on the frame; null for an algorithm that traces none.
     double (*light_paths_per_pixel)(const AlgorithmSettings&) = nullptr;
-    /// Light paths belong to a unit and serve all of its samples, instead of one to each camera sample.
+    /// Whether light paths belong to a unit and serve all of its samples; otherwise each camera sample has one of its
+    /// own.
     bool shares_light_paths = false;
     /// Null for an algorithm without tables.
     const LearningInfo* learning = nullptr;
     Result<std::unique_ptr<Renderer>> (*make)(const RendererRequest&);
 };
 
-/// The rows, those of add_to_catalog() included, in the order in which they are listed for people.
+/// The rows, those of add_to_catalog() included, in the order in which users see them.
 std::span<const AlgorithmInfo* const> catalog();
 /// kNotFound, listing the known names, for an unknown algorithm.
 Result<const AlgorithmInfo*> find_algorithm(std::string_view name);
-/// A row that a program brings itself, before it uses the catalog; the row must outlive the program. Tests show with it that an
-/// algorithm is one file and one row.
+/// Adds a row of the calling program, before it uses the catalog; the row must live as long as the program. Tests use
+/// this to show that a new algorithm takes one file and one row.
 void add_to_catalog(const AlgorithmInfo& row);
 
 }  // namespace lightloom

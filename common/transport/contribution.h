@@ -1,6 +1,6 @@
 #pragma once
-// What a bidirectional algorithm finds, one connection at a time, before anything is weighted: renders add it to pixels, training
-// units keep some of it.
+// The contributions that a bidirectional algorithm finds, one connection at a time, before they are weighted: renders
+// add them to pixels, training units keep some of them.
 
 #include "common/path/camera_walk.h"
 #include "common/path/light_walk.h"
@@ -9,18 +9,19 @@
 
 namespace lightloom {
 
-/// One way in which a camera sub-path and a light sub-path met: s light vertices y[0 .. s-1] (s >= 2, and s = 1 where the technique
-/// is a connection) and t camera vertices z[0 .. t-1]. x_0 is apart because for s <= 1 it need not be on either array.
+/// One way in which a camera sub-path and a light sub-path met: s light vertices y[0 .. s-1] (s >= 2, and s = 1 where
+/// the technique is a connection) and t camera vertices z[0 .. t-1]. x_0 is stored separately because for s <= 1 it
+/// need not be on either array.
 struct PathContribution {
-    Rgb value;                  ///< Unweighted: f over the density of what was really drawn, all of an iteration's draws together.
-    float inverse_density = 1;  ///< The same density but for roulette, as C(s) A(s) over it; splats: of one light path.
+    Rgb value;                  ///< Unweighted: f over the density of all draws of an iteration together.
+    float inverse_density = 1;  ///< C(s) A(s) over that density, without roulette; splats: of one light path.
     Technique technique;
     int t = 0;
     LightSubPath y;
     const PathVertex* z = nullptr;
-    Vec3 position, normal;  ///< Of x_0; for an infinite light a point outside of the scene and the direction of travel.
+    Vec3 position, normal;  ///< x_0's; for an infinite light a point outside the scene and the direction of travel.
     uint32_t emitter = 0;
-    Vec2 film;           ///< Connections to the lens only.
+    Vec2 film;           ///< For connections to the lens only.
     float survival = 1;  ///< Probability that roulette left both sub-paths: `value` was divided by it.
 };
 

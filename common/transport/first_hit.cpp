@@ -33,7 +33,8 @@ std::vector<ImageLayer> first_hit_layers(const Scene& scene, uint64_t seed, int 
                 layers[0].pixels[3 * pixel + size_t(c)] = albedo[c] * scale;
                 layers[1].pixels[3 * pixel + size_t(c)] = normal[c] * scale;
             }
-            // Not of all rays: at a silhouette before nothing that would be a place in front of everything.
+            // Rays that hit nothing do not count: as zeros, at a silhouette, they would pull the depth in front of the
+            // surface.
             layers[2].pixels[pixel] = hits > 0 ? depth / float(hits) : 0;
         }
     });

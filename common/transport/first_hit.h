@@ -8,9 +8,10 @@
 
 namespace lightloom {
 
-/// Layers "albedo" (RGB, in [0, 1]) and "normal" (XYZ, world, unit normals facing the camera), each the mean of `samples` rays per
-/// pixel of the crop, zero for those that hit nothing; and "depth" (Z, distance along the ray in scene units), the mean of the
-/// rays that hit something, 0 where none does. A pure function of scene and seed, on all threads.
+/// Layers "albedo" (RGB, in [0, 1]) and "normal" (XYZ, world, unit normals facing the camera), each the mean of
+/// `samples` rays per pixel of the crop, where rays that hit nothing count as zero; and "depth" (Z, distance along the
+/// ray in scene units), the mean of the rays that hit something, 0 where none does. All threads work on it; the result
+/// is a pure function of the arguments.
 std::vector<ImageLayer> first_hit_layers(const Scene& scene, uint64_t seed, int samples = 8);
 
 }  // namespace lightloom

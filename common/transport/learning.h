@@ -1,6 +1,6 @@
 #pragma once
-// How an algorithm learns its tables: the size of its training set, the rounds in which that is traced, and what tables come of the
-// data of a round. A row of the catalog answers with these (LearningInfo).
+// How an algorithm learns its tables: the size of its training set, the rounds in which it is traced, and the tables
+// that are learned from the data of a round. LearningInfo in a row of the catalog refers to these.
 
 #include <cstdint>
 #include <vector>
@@ -20,7 +20,7 @@ inline constexpr uint64_t kTrainingUnitSamples = uint64_t(1) << 14;
 struct TrainingWork {
     uint64_t first_sample = 0;
     uint64_t sample_count = 0;
-    uint64_t total_samples = 0;  ///< Of the whole dataset: sets the size of the blocks.
+    uint64_t total_samples = 0;  ///< Samples of the whole dataset, which decide the size of the blocks.
     friend bool operator==(const TrainingWork&, const TrainingWork&) = default;
 };
 
@@ -33,7 +33,7 @@ struct LearningPlan {
     uint64_t samples = 0;     ///< D: camera samples of all rounds.
     double energy_paths = 1;  ///< M' / D: light sub-paths that measure Q, per sample.
     std::vector<LearningRound> rounds;
-    // How the weights of the render will count, where no table decides that.
+    // Parameters of the render's weights that are not in the tables.
     int connections = 1;  ///< N
     Correction correction = Correction::kUncorrected;
     NextEventRays rays{0, 0};
@@ -45,27 +45,27 @@ struct LearningPlan {
         return first;
     }
     TrainingWork work(size_t round) const { return {first_sample(round), rounds[round].samples, samples}; }
-    /// How many light sub-paths the samples before number `sample` measure Q with.
+    /// How many light sub-paths measure Q for all samples before number `sample`.
     uint64_t energy_paths_before(uint64_t sample) const;
 };
 
 struct LearnRequest {
-    const TrainingData& data;  ///< Of one round alone.
+    const TrainingData& data;  ///< The data of this round alone.
     size_t round = 0;
-    const Tables& guide;  ///< Of the round before; empty for the first.
+    const Tables& guide;  ///< The tables that guided the round; empty without a guide.
     const EmitterSet& emitters;
     const RenderSettings& settings;
     TrainingControl control;
     TrainingReport* report;
 };
 
-/// Of an algorithm that learns. Its rounds make up its samples, and none is empty.
+/// The plan of an algorithm that learns. Its rounds add up to its samples, and no round is empty.
 LearningPlan learning_plan(const AlgorithmSettings& algorithm);
-/// The tables of one round, marked as those of the algorithm.
+/// Learns the tables of one round and marks them as those of the algorithm.
 Result<Tables> learn(const LearnRequest& request);
 
-/// One round, or two if a pilot traces `pilot_share` of the samples first to guide the rest. Rounds are whole units, so that both
-/// are planned alike; one round where the set is too small for two.
+/// One round, or two if a pilot first traces `pilot_share` of the samples to guide the rest. The pilot consists of
+/// whole units, so that units are planned alike in both rounds; a set that is too small for two rounds has one.
 std::vector<LearningRound> rounds_with_pilot(uint64_t samples, double pilot_share);
 
 }  // namespace lightloom

@@ -1,10 +1,11 @@
 #pragma once
-// The light-vertex cache of a unit: light sub-paths traced before its first camera sample, frozen, and shared by all of its
-// samples [Davidovic et al. 2014, section 4.1]. The unit owns them: nothing outside its key decides what they are.
+// The light-vertex cache of a unit: light sub-paths traced before its first camera sample, frozen, and shared by all of
+// its samples [Davidovic et al. 2014, section 4.1]. They belong to the unit: its key alone decides what they are.
 //
-// The first work.light_path_count paths are those that the plan counts (N1 per pixel and iteration): they are connected to the
-// lens (t = 1) and they are candidates. Further ones, where that would be too few or where rare subspaces keep a longer
-// window, are candidates only. The bytes do not depend on the number of threads: chunks are fixed and joined in order.
+// The plan counts the first work.light_path_count paths (N1 per pixel and iteration): they are connected to the lens (t
+// = 1) and are candidates for connections. Where these are too few, or where rare subspaces keep a longer window,
+// further paths are traced that are candidates only. The bytes do not depend on the number of threads: chunks are fixed
+// and joined in order.
 
 #include <memory>
 #include <utility>
@@ -23,12 +24,12 @@ struct LightPrefix {
     uint32_t first_vertex = 0;  ///< See LightCache::at().
     uint32_t path = 0;
     uint16_t s = 0;
-    uint16_t label = kNoLabel;  ///< Of y_{s-1}.
+    uint16_t label = kNoLabel;  ///< Label of y_{s-1}.
     float throughput = 0;       ///< Scalar of alpha of y_{s-1}.
 };
 
-/// The sub-paths of a unit. Where a vertex lies depends on the threads that traced it; everything else is in the order of the
-/// paths, and nothing that is computed may depend on anything but that order.
+/// The sub-paths of a unit. The addresses of vertices depend on the threads that traced them; everything else is in the
+/// order of the paths, and no result may depend on anything but that order.
 class LightCache {
     using Vertices = PageStore<LightVertex, kMaxEdges + 2>;
     using Surfaces = PageStore<LightSurface, 1>;
@@ -38,7 +39,7 @@ class LightCache {
         uint32_t first_vertex = 0, length = 0;
     };
     std::vector<Path> paths;
-    std::vector<std::vector<LightPrefix>> prefixes;  ///< By chunk of paths; for the method's index, and empty once that is made.
+    std::vector<std::vector<LightPrefix>> prefixes;  ///< By chunk of paths; dropped once the method has made its index.
 
     uint64_t path_count() const { return paths.size(); }
     /// y_0 of the path or prefix with this `first_vertex`; the others follow it.
@@ -49,7 +50,7 @@ class LightCache {
             for (const LightPrefix& p : chunk) visit(p);
     }
 
-    /// Where one thread puts its paths, one after the other. Several may write at a time.
+    /// Appends the paths of one thread, one after the other. Several writers may be in use at a time.
     class Writer {
       public:
         explicit Writer(LightCache& cache) : vertices_(cache.vertices_), surfaces_(cache.surfaces_) {}
@@ -75,14 +76,15 @@ class LightCache {
 
 inline constexpr int kMaxConnections = 64;
 
-/// A draw from the cache, made before the connections of a vertex so that their memory is on its way.
+/// A draw from the cache. All draws of a camera vertex are made before its connections, so that their memory is already
+/// being fetched.
 struct LightPick {
     const LightVertex* y = nullptr;
     int s = 0;
-    float scale = 0;  ///< Of the contribution: one over what was really drawn.
+    float scale = 0;  ///< Factor of the contribution, for the density of the draw.
 };
 
-/// What a draw finds: a prefix, by its first vertex and length.
+/// A prefix that a draw may find, by its first vertex and length.
 struct LightCandidate {
     uint32_t first_vertex = 0;
     uint32_t s = 0;
@@ -110,8 +112,8 @@ LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPr
             Chunk& chunk = chunks[c];
             for (uint64_t m = c * kChunk; m < std::min(path_count, (c + 1) * kChunk); ++m) {
                 const bool counted = m < work.light_path_count;
-                // The others are numbered within the unit, under its tile's first pixel: no other unit of the group has
-                // those keys.
+                // Uncounted paths are numbered within the unit, and its tile's first pixel is part of their keys: no
+                // other unit of the group has the same keys.
                 const uint64_t tile_key = uint64_t(scope.scene.frame().crop.index(work.owner().x0, work.owner().y0)) << 32;
                 const RngKey key{scope.seed, counted ? Stage::kLight : Stage::kLightPool, work.group_first_iteration,
                                  counted ? work.first_light_path + m : tile_key | m};
@@ -139,9 +141,9 @@ LightCache trace_light_cache(const UnitScope& scope, uint64_t path_count, UnitPr
     return cache;
 }
 
-/// Connects z_{t-1} to the end of a prefix: s = 1 to the point x_0 itself, s >= 2 to y_{s-1}. Unweighted contribution f / p with
-/// the prefix's density as traced, p(y); black when it fails. The view is the path's, whose point x_0 next event might have chosen
-/// too.
+/// Connects z_{t-1} to the end of a prefix: s = 1 to the point x_0 itself, s >= 2 to y_{s-1}. Returns the unweighted
+/// contribution f / p, where p is the prefix's density as traced; black when the connection fails. The view describes
+/// the path and, for s = 1, how next event estimation would have chosen x_0.
 template <ViewDetail detail, class Vertex>
 Rgb connect_candidate(const Scene& scene, const Vertex* y, int s, const PathVertex* z, int t, PathView* view,
                       WalkCounters* counters) {

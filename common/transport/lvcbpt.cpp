@@ -23,7 +23,7 @@ LearningPlan plan(const AlgorithmSettings& s) {
     return {.samples = samples, .rounds = {{samples}}, .connections = CacheParameters::of(s).connections};
 }
 
-/// One subspace on each side: uniform selection, of which only the vertices per path are learned.
+/// Learns with one subspace on each side: selection is uniform, and only the number of vertices per path matters.
 Result<Tables> learn(const LearnRequest& r) {
     const CacheParameters p = CacheParameters::of(r.settings.algorithm);
     TrainingOptions options;

@@ -8,8 +8,8 @@
 //   1 <= s <= k-1  rho = N / v  C(s) A(s)       v: expected number of prefixes per light path, a table. The estimator divides by
 //                                               what was really done, V / (M N): the weight must not know the realised V
 //   s = k          rho = N1 |crop| C(k)
-// each times the share of light sub-paths of s vertices and of camera sub-paths of t that roulette leaves (common/path/survival.h).
-// Tables: v (vertices_per_path). Bias: none. Missing: what `bdpt` misses.
+// each times the share of light sub-paths of s vertices and of camera sub-paths of t vertices that survive roulette
+// (common/path/survival.h). Tables: v (vertices_per_path). Bias: none. Missing: what `bdpt` misses.
 
 #include "common/path/survival.h"
 #include "common/transport/cached.h"
@@ -44,7 +44,7 @@ struct UniformConnections {
     static constexpr ViewDetail kDetail = ViewDetail::kFull;
     struct Index {
         std::vector<LightCandidate> candidates;
-        float inverse_density = 0;  ///< V / (M N), of what the cache really holds.
+        float inverse_density = 0;  ///< V / (M N), with the V that the cache really has.
     };
 
     uint64_t windows() const { return 1; }

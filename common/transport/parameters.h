@@ -1,5 +1,5 @@
 #pragma once
-// Parameters that several algorithms have, and what they mean: rows of the catalog list them, and read them from here.
+// Parameters that several algorithms have, and how their values are read; the catalog's rows list them.
 
 #include "common/path/mis.h"
 #include "common/path/next_event.h"
@@ -15,9 +15,9 @@ inline constexpr ParameterInfo kRouletteStart{"rr-start",
                                               true,
                                               "sub-path vertices below this index never end by Russian roulette "
                                               "[Pharr, Jakob and Humphreys 2023, 2.2.4]"};
-// The weights know a typical survival at best, so that a technique whose sub-path rarely survives is trusted too much: at 0.05,
-// door needs 1.4 (spcbpt), 1.7 (bdpt) and 2.5 (path) times the processor time for the same relMSE; at 1 the walks cost more than
-// they save.
+// The weights know a typical survival at best, so that they trust a technique too much whose sub-path rarely survives:
+// with 0.05 the scene `door` needs 1.4 (spcbpt), 1.7 (bdpt) and 2.5 (path) times the processor time for the same
+// relMSE; with 1 the walks cost more than they save.
 inline constexpr ParameterInfo kRouletteMin{"rr-min",
                                             0.5,
                                             0.01,
@@ -30,21 +30,22 @@ inline constexpr std::string_view kSwitch[] = {"off", "on"};
 inline constexpr ParameterInfo kHeuristic{
     "heuristic", 0, 0, 2, true, "balance [Veach 1997, eq. 9.8], power with exponent 2, or maximum", kHeuristicNames};
 inline constexpr int kMaxNextEventRays = 64;
-/// Of algorithms that are nothing without next event estimation, and of those that connect to points on lights from a cache as
-/// well.
+/// kNextEvent is for algorithms that cannot do without next event estimation, kNextEventBesideCache for those that also
+/// connect to points on lights from a cache.
 inline constexpr ParameterInfo kNextEvent{
     "next-event",      1,    1,
-    kMaxNextEventRays, true, "shadow rays of next event estimation at the camera's first hit; later ones send one"};
-// The cache serves later vertices as well as a ray of their own would, for less: noise times rays, against none at all, is 0.93
-// with one ray for every vertex, 0.93 with one for the first alone and 0.92 with two (`lvcbpt`), and 1.08, 1.02 and 1.01 (`spcbpt`;
-// geometric means of six scenes). Without any, narrow spots are noisier than with `path`.
+    kMaxNextEventRays, true, "shadow rays of next event estimation at the camera's first hit; later hits send one"};
+// The default is one ray at the first hit only, because at later vertices the cache does as well for less work. Noise
+// times rays, relative to no ray at all, is 0.93 with one ray at every vertex, 0.93 with one at the first only and 0.92
+// with two there (`lvcbpt`), and 1.08, 1.02 and 1.01 (`spcbpt`; geometric means of six scenes). Without any ray, narrow
+// spots are noisier than with `path`.
 inline constexpr ParameterInfo kNextEventBesideCache{"next-event",
                                                      1,
                                                      0,
                                                      kMaxNextEventRays,
                                                      true,
                                                      "shadow rays of next event estimation, beside the cache's connections to "
-                                                     "lights, at the camera's first hit; later ones send none"};
+                                                     "lights, at the camera's first hit; later hits send none"};
 inline constexpr ParameterInfo kLightPaths{
     "light-paths",
     0.3,
@@ -65,7 +66,7 @@ inline constexpr ParameterInfo kConnections{
 /// The size of a training set; a time-limited job may make it smaller.
 inline constexpr std::string_view kTrainingPaths = "training-paths";
 
-/// The defaults for an algorithm without these parameters.
+/// The algorithm's rule for Russian roulette; the defaults if it has no such parameters.
 inline RouletteRule roulette_of(const AlgorithmSettings& s) {
     RouletteRule rule;
     if (!s.has(kRouletteStart.name) || !s.has(kRouletteMin.name)) return rule;
@@ -74,7 +75,7 @@ inline RouletteRule roulette_of(const AlgorithmSettings& s) {
     return rule;
 }
 inline NextEventRays next_event_of(const AlgorithmSettings& s) { return {int(s.value(kNextEvent.name)), 1}; }
-/// Beside a cache; see kNextEventBesideCache.
+/// Rays of next event estimation besides a cache; see kNextEventBesideCache.
 inline NextEventRays next_event_beside_cache_of(const AlgorithmSettings& s) {
     return {int(s.value(kNextEventBesideCache.name)), 0};
 }
@@ -90,7 +91,7 @@ inline double chosen_light_paths(const AlgorithmSettings& s) { return s.value(kL
 /// What algorithms with a light-vertex cache have in common.
 struct CacheParameters {
     int connections;         ///< N
-    uint64_t minimum_paths;  ///< Of a unit's cache.
+    uint64_t minimum_paths;  ///< Smallest number of light paths in a unit's cache.
 
     static CacheParameters of(const AlgorithmSettings& s) {
         return {int(s.value(kConnections.name)), uint64_t(s.value(kCache.name))};

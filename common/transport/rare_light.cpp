@@ -24,16 +24,17 @@ using Entry = std::pair<Point, uint32_t>;
 using PhotonMap = bg::index::rtree<Entry, bg::index::quadratic<16>>;
 
 constexpr size_t kPhotonPaths = 32768, kCameraSamples = 16384, kProbes = 2048, kChunk = 512;
-/// Longer chains of mirrors and glass carry next to nothing, and a closed room would be walked through to the end.
+/// Longest chain of mirrors and glass. Longer ones carry next to no light, and in a closed room of mirrors a walk would
+/// not end.
 constexpr int kLongestChain = 12;
-/// Of the length of the camera sub-path: some half degree, as seen from the lens.
+/// Radius over the length of the camera sub-path: about half a degree, as seen from the lens.
 constexpr float kRadiusPerLength = 0.01f;
 
-/// Where light arrived through mirrors and glass alone.
+/// A place at which light arrived through mirrors and glass alone.
 struct Photon {
     Vec3 p, ng, wo;
     Rgb flux;      ///< Per light sub-path.
-    Rgb radiance;  ///< Of the lamp, towards the first mirror or glass, as a camera sub-path from here would see it.
+    Rgb radiance;  ///< Radiance of the lamp towards the chain, as a camera sub-path from here would see it.
     int edges = 0;
     bool can_be_hit = false;
 };
@@ -47,7 +48,7 @@ struct Estimator {
     const Traces traces;
     const RouletteRule endless{.first_vertex = kMaxEdges + 2, .min_survival = 1};
 
-    /// The photon of a light sub-path, if it leaves one; whether it met a mirror or glass at all.
+    /// Appends the photon of a light sub-path, if it leaves one; true if the sub-path met a mirror or glass at all.
     bool trace_photon(size_t number, std::vector<PathVertex>& y, std::vector<Photon>* out) const {
         LightSampler sampler({seed, Stage::kLightPool, 1, number});
         WalkCounters counters;
@@ -57,7 +58,7 @@ struct Estimator {
         while (s < n && is_dirac(y[size_t(s)])) ++s;
         if (s == n) return true;
         const PathVertex &start = y[0], &end = y[size_t(s)];
-        // Where a camera sub-path leaves the glass again, it gets back what refraction took from its radiance.
+        // A camera sub-path that leaves the glass again regains the radiance that refraction took from it.
         float index_ratio = 1;
         for (int i = 1; i < s; ++i) {
             const PathVertex& v = y[size_t(i)];
@@ -71,8 +72,8 @@ struct Estimator {
         return true;
     }
 
-    /// Whether the camera sub-path z[0 .. t-1], whose end is not a Dirac vertex, goes on to a photon's chain without an edge that
-    /// some other technique connects.
+    /// Whether the camera sub-path z[0 .. t-1], whose end is not a Dirac vertex, goes on to a photon's chain without an
+    /// edge that another technique connects.
     bool only_hits_follow(const PathVertex* z, int t) const {
         if (traces == Traces::kCamera) return true;
         bool previous_is_dirac = false;  // the lens
@@ -84,7 +85,7 @@ struct Estimator {
         return true;
     }
 
-    /// What the camera sub-path z[0 .. t-1] meets.
+    /// Adds the energy of the photons near the end of the camera sub-path z[0 .. t-1].
     void gather(const PhotonMap& map, const std::vector<Photon>& photons, const PathVertex* z, int t, float length,
                 RareLight* sum) const {
         const PathVertex& v = z[t - 1];
@@ -108,13 +109,14 @@ struct Estimator {
                 continue;
             }
             sum->by_chance += energy;
-            // Of the camera sample that goes on through the chain to the lamp; what the chain absorbs, and roulette, is neglected.
+            // The value of the camera sample that goes on through the chain to the lamp, without the chain's absorption
+            // and roulette.
             const Rgb hit = v.alpha * event.value * (1 / event.pdf_fwd) * photon.radiance;
             sum->second_moment += double(energy.luminance()) * double(hit.luminance());
         }
     }
 
-    /// Adds what camera sample number i finds; whether it met a mirror or glass.
+    /// Adds the light that camera sample number i finds; true if the sample met a mirror or glass.
     bool trace_camera(size_t i, const PhotonMap* map, const std::vector<Photon>& photons, std::vector<PathVertex>& z,
                       RareLight* sum) const {
         const Rect crop = scene.frame().crop;
@@ -140,7 +142,7 @@ struct Estimator {
     }
 };
 
-/// each(i, worker state) for i in [0, count), in chunks whose results are joined in their order.
+/// Calls each(i, vertices, chunk) for i in [0, count), in chunks whose results are joined in their order.
 template <class Chunk, class Each>
 std::vector<Chunk> in_chunks(size_t count, size_t room, const Each& each) {
     std::vector<Chunk> chunks((count + kChunk - 1) / kChunk);
@@ -161,7 +163,7 @@ RareLight estimate_rare_light(const Scene& scene, const RenderSettings& settings
     const size_t light_room = size_t(std::min(settings.max_edges(), kLongestChain)) + 1,
                  camera_room = size_t(settings.max_edges()) + 2;
 
-    // Most scenes have neither mirrors nor glass: a few sub-paths of both kinds tell.
+    // Most scenes have neither mirrors nor glass: a few sub-paths of both kinds show whether this one does.
     bool met_dirac = false;
     {
         std::vector<PathVertex> vertices(std::max(light_room, camera_room));

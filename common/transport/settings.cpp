@@ -10,7 +10,7 @@
 namespace lightloom {
 namespace {
 
-/// The value of a parameter from its text, or why it has none.
+/// Parses the value of a parameter; the error says what is wrong.
 Result<double> parse_value(const AlgorithmInfo& algorithm, const ParameterInfo& p, const std::string& text) {
     double v = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), v);

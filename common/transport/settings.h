@@ -11,38 +11,39 @@
 
 namespace lightloom {
 
-/// An algorithm of the catalog with a value for each of its parameters. What exists is valid.
+/// An algorithm of the catalog with a value for each of its parameters. Every object of this class is valid.
 class AlgorithmSettings {
   public:
     /// The catalog's first algorithm with its defaults.
     AlgorithmSettings();
-    /// kInvalidArgument for an algorithm that the catalog does not have (naming those that it has), for a parameter that is another
-    /// algorithm's, and for a value that is no number or name of a choice or is out of range.
+    /// kInvalidArgument for an algorithm that the catalog does not have (naming those that it has), for a parameter
+    /// that the algorithm does not have, and for a value that is out of range or neither a number nor the name of a
+    /// choice.
     static Result<AlgorithmSettings> parse(std::string_view name, const std::map<std::string, std::string>& set);
 
     const AlgorithmInfo& info() const { return *info_; }
     std::string name() const { return std::string(info_->name); }
     bool has(std::string_view parameter) const { return index(parameter) < values_.size(); }
-    /// Of a parameter that the algorithm has.
+    /// The value of a parameter, which the algorithm must have.
     double value(std::string_view parameter) const;
     /// Whether the text that these settings come from named the parameter.
     bool chosen(std::string_view parameter) const;
-    /// The same with everything chosen: what the defaults were is written down.
+    /// The same settings with every parameter marked as chosen, so that the defaults in force are recorded.
     AlgorithmSettings completed() const;
-    /// The same with one parameter chosen, a value in its range.
+    /// The same settings with one parameter chosen, at a value in its range.
     AlgorithmSettings with(std::string_view parameter, double value) const;
     /// All parameters with their values as canonical text, so that an image says what was rendered even where defaults applied.
     std::map<std::string, std::string> text() const;
-    /// Of the chosen ones alone; parse() makes these settings again from it.
+    /// The same for the chosen parameters alone; parse() makes these settings from it again.
     std::map<std::string, std::string> chosen_text() const;
 
     /// N1: light paths per pixel and iteration; 0 for an algorithm that traces none.
     double light_paths_per_pixel() const { return info_->light_paths_per_pixel ? info_->light_paths_per_pixel(*this) : 0; }
-    /// N1 |crop| as a whole number, at least one where the algorithm traces light: a constant of the frame, so that the weights of
-    /// every group reckon with what the group really traces.
+    /// N1 |crop| as a whole number, at least one where the algorithm traces light: a constant of the frame, so that the
+    /// weights of every group use the number that the group really traces.
     uint64_t light_paths_per_iteration(int64_t crop_pixels) const;
 
-    /// The same algorithm with the same values, and the same of them chosen.
+    /// True if algorithm and values are the same, and the same parameters are chosen.
     friend bool operator==(const AlgorithmSettings&, const AlgorithmSettings&) = default;
 
   private:
@@ -50,7 +51,7 @@ class AlgorithmSettings {
     size_t index(std::string_view parameter) const;
 
     const AlgorithmInfo* info_;
-    std::vector<double> values_;  ///< By place in info_->parameters.
+    std::vector<double> values_;  ///< In the order of info_->parameters.
     std::vector<bool> chosen_;
 };
 

@@ -14,8 +14,8 @@
 //     s = k          rho = N1 |crop| C(k)
 // each times the share of camera sub-paths of t vertices that roulette leaves, s = k also of light sub-paths of s
 // (common/path/survival.h); the draws among prefixes make up for roulette, a survivor has that much more throughput.
-// Tables: kappa_L, kappa_E, Q, Gamma, J, all frozen before the unit. Bias: none, whatever the tables hold. Missing: what `bdpt`
-// misses.
+// Tables: kappa_L, kappa_E, Q, Gamma, J, all complete before the unit starts. Bias: none, whatever the tables hold.
+// Missing: what `bdpt` misses.
 
 #include <algorithm>
 #include <memory>
@@ -31,7 +31,7 @@
 
 namespace lightloom {
 
-/// The tables and what every unit derives from them once.
+/// The tables, and values derived from them once for all units.
 struct PreparedTables {
     SubspaceTables tables;
     InverseCdfTable draws;          ///< Gamma(. | j)
@@ -45,7 +45,7 @@ struct PreparedTables {
     }
 };
 
-/// What was learned decides how often a camera sub-path meets a prefix: N Gamma(i, j) / Q(i).
+/// The learned tables decide how often a camera sub-path meets a prefix: N Gamma(i, j) / Q(i).
 struct LearnedAffinity {
     std::shared_ptr<const PreparedTables> prepared;
     double connections = 3;  ///< N
@@ -56,13 +56,14 @@ struct LearnedAffinity {
     }
 };
 
-/// `Affinity(view, s, share)`: draws per camera sub-path and unit of a prefix's throughput, if only a share of the N draws counts.
+/// `Affinity(view, s, share)` is the expected number of draws per camera sub-path and unit of a prefix's throughput, if
+/// only a share of the N draws counts.
 template <class Affinity = LearnedAffinity>
 struct SubspaceSelection {
     Affinity affinity;
     double light_paths_per_iteration = 1;  ///< N1 |crop|
     double connections = 3;                ///< N
-    double cache_paths = 0;                ///< M of ris_aware; 0 switches that off.
+    double cache_paths = 0;                ///< M of ris_aware; 0 switches ris_aware off.
     TypicalSurvival survival;
     NextEventRays rays;
 
@@ -70,7 +71,7 @@ struct SubspaceSelection {
         const SubspaceSelection& selection;
         PathSurvival survival;
 
-        /// Draws among prefixes make up for roulette: a survivor has that much more throughput.
+        /// Draws among prefixes compensate for roulette: a survivor has correspondingly more throughput.
         double survivors(int s) const { return s == view.k ? survival.light(s) : survival.camera(view.k + 1 - s); }
         double next_event() const { return selection.rays.sigma(view); }
         double connections() const { return selection.connections; }
@@ -86,10 +87,10 @@ struct SubspaceSelection {
     NextEventRays next_event_rays() const { return rays; }
 };
 
-/// The selection of `spcbpt`, corrected for what its connections share.
+/// The selection of `spcbpt`, corrected for the sub-path that its connections share.
 using SpcbptSelection = Corrected<SubspaceSelection<>>;
 
-/// What it counts besides the tables; see SubspaceSelection.
+/// The selection's parameters besides the tables; see SubspaceSelection.
 struct SpcbptCounts {
     double light_paths_per_iteration = 1;
     int connections = 3;
@@ -118,14 +119,14 @@ struct SubspaceConnections {
     static_assert(kMaxConnections <= InverseCdfTable::Column::kMaxStrata &&
                   SubspaceTables::kMaxSubspaces <= InverseCdfTable::kMaxOutcomes);
 
-    /// A prefix and its part of the alias table of its subspace, drawn in proportion to r.
+    /// A prefix and its entry in the alias table of its subspace, for draws in proportion to r.
     struct Candidate {
         LightCandidate prefix;
         float keep = 1;
-        uint32_t alias = 0;  ///< Within the subspace.
+        uint32_t alias = 0;  ///< Index within the subspace.
     };
     struct Subspace {
-        uint32_t begin = 0, count = 0;  ///< Of its candidates.
+        uint32_t begin = 0, count = 0;  ///< Range of its candidates.
         float scale = 0;                ///< R_i / (M_i N)
     };
     /// The cache's candidates, sorted by light subspace.
@@ -147,7 +148,7 @@ struct SubspaceConnections {
     Index index(const LightCache& cache, uint64_t paths) const {
         const SubspaceTables& tables = prepared->tables;
         Index index;
-        // Counting sort by subspace; path order within one.
+        // This is a counting sort by subspace, in the order of the paths within each.
         index.subspaces.assign(tables.light_count, {});
         const auto each = [&](auto&& visit) {
             cache.for_each_prefix([&](const LightPrefix& p) {
@@ -185,15 +186,16 @@ struct SubspaceConnections {
         return index;
     }
 
-    /// N draws for a labelled camera vertex, stage by stage, so that the candidates of all of them are fetched at once. One number
-    /// serves both stages and is stratified over the draws. Returns how many of them found a prefix.
+    /// Makes N draws for a labelled camera vertex, stage by stage, so that the candidates of all draws are fetched at
+    /// once. One random number serves both stages and is stratified over the draws. Returns how many draws found a
+    /// prefix.
     template <class Stratified>
     int draw(const LightCache& cache, const Index& index, const PathVertex& v, Stratified&& stratified, Rng& rng,
              int longest_prefix, LightPick* picks) const {
         const PreparedTables& tables = *this->prepared;
         const InverseCdfTable::Column column = tables.draws.column(v.label);
         const Vec2 u = stratified(), below = rng.uniform2();
-        // u has 24 bits; the bits below come from the stream.
+        // u has 24 bits; the lower bits come from the stream.
         const double base = double(u.x) + double(below.x) * 0x1p-24;
         struct Draw {
             const Candidate* candidates;
@@ -207,7 +209,7 @@ struct SubspaceConnections {
         for (int n = 0; n < connections; ++n) {
             const InverseCdfTable::Draw& first = firsts[n];
             const Subspace& subspace = index.subspaces[first.outcome];
-            if (subspace.count == 0) continue;  // nothing there: its share of the estimate is zero
+            if (subspace.count == 0) continue;  // the subspace is empty: its share of the estimate is zero
             Draw& d = draws[found++];
             d = {&index.candidates[subspace.begin], subspace.count, alias_part(subspace.count, first.rest), first.rest,
                  subspace.scale / first.probability};

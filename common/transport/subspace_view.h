@@ -12,18 +12,20 @@ struct SubspaceLabeller {
     const SubspaceTables& tables;
     const EmitterSet& emitters;
 
-    /// Labels the sub-path that ends at `v` as traced, and finds where the other kind's labels begin to depend on the direction.
+    /// Labels the sub-path that ends at `v` as traced, and notes where the other tree's labels begin to depend on the
+    /// direction.
     static void label(const SubspaceTree& own, const SubspaceTree& other, SubPathVertex* v) {
         const auto settled = own.label_and_settle(sub_path_end(v->p, v->ng, v->wo), other);
         v->label = uint16_t(settled.label);
         v->reverse_branch = settled.other_branch;
     }
-    /// The label of the other kind, of a sub-path that reaches `v` from `to_predecessor`.
+    /// The label by `tree`, that of the other kind of sub-path, for one that reaches `v` from the side of
+    /// `to_predecessor`.
     static uint16_t reverse_label(const SubspaceTree& tree, const SubPathVertex& v, const Vec3& to_predecessor) {
         const bool same_side = (dot(v.ng, to_predecessor) < 0) == (dot(v.ng, v.wo) < 0);
         return uint16_t(tree.label(sub_path_end(v.p, v.ng, to_predecessor), same_side ? v.reverse_branch : 0));
     }
-    /// Point x_0 on `emitter`; `travel` is the emission's direction for the environment.
+    /// Label of point x_0 on `emitter`; `travel` is the direction of emission of the environment.
     uint16_t source(uint32_t emitter, const Vec3& position, const Vec3& travel) const {
         return uint16_t(tables.division.label(emitters, emitter, position, travel));
     }
@@ -41,9 +43,9 @@ struct SubspaceLabeller {
     /// The eye label of a camera vertex, before it is connected.
     void label_camera_vertex(PathVertex* v) const { label(tables.eye_tree, tables.light_tree, v); }
 
-    /// Labels, throughput and footprint of a path made with ViewDetail::kSubspace. `towards`: unit, from z_{t-1} to x_{s-1} (to the
-    /// emitter of an escaped ray); not read for s = 0 on a surface, where z_{t-1} is x_0. Vertices of z get their reverse
-    /// labels on demand.
+    /// Fills in labels, throughput and footprint of a path made with ViewDetail::kSubspace. `towards` is the unit
+    /// vector from z_{t-1} to x_{s-1} (to the emitter of an escaped ray); it is not read for s = 0 on a surface, where
+    /// z_{t-1} is x_0. Vertices of z get their reverse labels on demand.
     void complete(const LightSubPath& y, int s, PathVertex* z, int t, const Vec3& towards, PathView* view) const {
         view_throughput(y, s, z, view);
         const int k = view->k;
@@ -70,7 +72,7 @@ struct SubspaceLabeller {
                 view->light_label[k - j + 1] = z[j].reverse_label;
             }
         }
-        // The weight reads Gamma once per technique, each time in a column of its own.
+        // The weight will read Gamma once per technique, each time in another column.
         for (int i = 1; i < k; ++i)
             if (view->light_label[i] != kNoLabel && view->eye_label[i] != kNoLabel)
                 __builtin_prefetch(tables.column(view->eye_label[i]) + view->light_label[i]);

@@ -19,14 +19,14 @@ constexpr uint64_t kTrainingSeed = 0x7472'6169'6e69'6e67ull;
 constexpr uint64_t kChunk = kTrainingChunkSamples;
 constexpr double kSamplesPerBlock = 200;
 
-/// Where nothing is learned yet: one draw per prefix and unit of its throughput.
+/// The affinity while nothing is learned: one draw per prefix and unit of its throughput.
 struct UnlearnedAffinity {
     double operator()(const PathView&, int, double share) const { return share; }
 };
-/// The selection of the render to come, as far as no table decides it.
+/// The selection that the render will use, except for what the tables will decide.
 using RenderSelection = Corrected<SubspaceSelection<UnlearnedAffinity>>;
 
-/// What Reservoir::offer() needs to know of the render.
+/// What Reservoir::offer() needs to know of the render that the tables are for.
 struct RenderToCome {
     const EmitterSet& emitters;
     RenderSelection selection;
@@ -35,7 +35,8 @@ struct RenderToCome {
 /// Keeps one of the contributions of a sub-path, in proportion to their estimates.
 class Reservoir {
   public:
-    /// `weight`, of the generator's techniques; `scale` of what it found. Returns the estimate.
+    /// Offers a contribution, whose weight is that of the generator's techniques and whose value is to be multiplied by
+    /// `scale`. Returns the estimate.
     double offer(const PathContribution& c, PathView& view, double weight, double scale, uint32_t block, const RenderToCome& render,
                  Rng& rng) {
         const double contribution = double(scalar_of(c.value)) * scale, estimate = weight * contribution;
@@ -72,7 +73,7 @@ class Reservoir {
         for_each_split(view, own, 0, k, [&](int s, const WideProduct& chain) { keep(s, chain.value(1)); });
         return estimate;
     }
-    /// Adds what was kept to `data`, and is empty again.
+    /// Adds the path that was kept, if any, to `data`; the reservoir is empty again.
     void move_to(TrainingData* data) {
         if (sum_ > 0) {
             path_.first_vertex = uint32_t(data->vertices.size());
@@ -85,7 +86,8 @@ class Reservoir {
     }
 
   private:
-    /// Infinity beyond single precision: training leaves the path out and says so (TrainingData::in_range).
+    /// Values beyond single precision become infinity: training leaves the path out and reports it
+    /// (TrainingData::in_range).
     static float single(double v) { return v > double(std::numeric_limits<float>::max()) ? HUGE_VALF : float(v); }
 
     TrainingPath path_;
@@ -93,9 +95,9 @@ class Reservoir {
     std::vector<TrainingVertex> vertices_;
 };
 
-/// What a camera sample keeps: paths for every length of its sub-path, because each teaches another eye subspace. One vertex'
-/// connections teach different light subspaces, so each length has more than one reservoir. Which one a contribution meets does not
-/// depend on its value.
+/// The reservoirs of a camera sample: some for every length of its sub-path, because each length teaches another eye
+/// subspace. The connections of one vertex teach different light subspaces, so each length has more than one reservoir.
+/// Which reservoir a contribution is offered to does not depend on its value.
 class CameraReservoirs {
   public:
     Reservoir& of(const PathContribution& c) {
@@ -127,7 +129,7 @@ void keep_light_path(const LightSubPath& y, int n, int max_edges, TrainingData* 
     data->light_paths.push_back(path);
 }
 
-/// The frame in blocks of about kSamplesPerBlock samples.
+/// Divides the frame into blocks of about kSamplesPerBlock samples.
 struct Blocks {
     Rect crop;
     int edge = 1;
@@ -156,7 +158,7 @@ Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const Re
         LL_RETURN_IF_ERROR(guide.validate(scene.emitters()));
         const auto subspaces = guide.get<SubspaceTables>();
         if (!subspaces) return failed_precondition("the tables of the first round have no subspaces to guide the second one");
-        // One light sub-path per camera sample, however large the caches of the render will be.
+        // Training traces one light sub-path per camera sample, however large the caches of the render will be.
         SubspaceTables tables = *subspaces;
         std::fill(tables.window.begin(), tables.window.end(), uint16_t(1));
         generator.guide_ = std::make_shared<const PreparedTables>(std::move(tables));
@@ -278,7 +280,8 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
                 if (unit.energy_share(context.light_path) > 0) keep_light_path(y, count, context.max_edges, &data);
             },
             [&](const PathContribution& found, PathView& view) {
-                // A light path may land in any pixel, a camera sample in one: the scale of algorithms.md 0, N1.
+                // A light path may land in any pixel and a camera sample in one, hence the scale of splats
+                // (algorithms.md 0, N1).
                 const bool splat = found.technique.splats();
                 const uint32_t block = splat ? unit.blocks().at(int(found.film.x), int(found.film.y)) : camera_block;
                 const double weight = mis_weight(view, found.technique, generator.on(view));
@@ -299,10 +302,10 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
     const SpcbptAlgorithm<> generator{{selection, guide_, plan_.connections}, heuristic_, 1};
     const RenderUnit work = unit.light_work();
     const RenderToCome render = unit.render();
-    // Light sub-paths are traced in parallel; what they bring is joined in their order.
+    // Light sub-paths are traced in parallel; their results are joined in the order of their numbers.
     struct FromLight {
         Reservoir reservoir;
-        std::vector<std::pair<uint32_t, double>> estimates;  ///< By block.
+        std::vector<std::pair<uint32_t, double>> estimates;  ///< Pairs of block and estimate.
     };
     std::vector<FromLight> from_light(work.light_path_count);
     UnitPreparation preparation;
@@ -355,7 +358,7 @@ Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, s
         auto learned = learn({data, round, guide, scene.emitters(), settings, {stop, {}}, &of_round});
         if (!learned.ok()) return learned.status();
         tables = *std::move(learned);
-        // What is said of the tables is the last round's, but every round takes its time.
+        // The report describes the last round's tables, but its times are those of all rounds together.
         of_round.classifier_seconds += report->classifier_seconds;
         of_round.energy_seconds += report->energy_seconds;
         of_round.gamma_seconds += report->gamma_seconds;

@@ -1,6 +1,7 @@
 #pragma once
-// Training units: full paths of the scene for the tables, made by bidirectional algorithms with all of their techniques, so that
-// light that is hard to find is in them too. They never enter an image, and their random numbers are not those of the same job's.
+// Training units: full paths of the scene for the tables, made by bidirectional algorithms with all of their
+// techniques, so that light that is hard to find is in them too. These paths never enter an image, and their random
+// numbers differ from those of the job's image.
 
 #include <cstdint>
 #include <memory>
@@ -14,21 +15,22 @@ namespace lightloom {
 
 struct PreparedTables;
 
-/// What one thread traces at a time.
+/// Samples that one thread traces at a time.
 inline constexpr uint64_t kTrainingChunkSamples = 512;
 
-/// Traces training units of one scene: without a guide by classic pairing, which needs nothing; guided by the tables of an earlier
-/// round by subspace connections, which find far more of the light that is hard to find. What renders is learned from the last
-/// round alone: its paths have the smaller variance, and the few of a pilot would outvote them.
+/// Traces training units of one scene. Without a guide it pairs camera with light sub-paths, which needs no tables;
+/// with the tables of an earlier round as guide it makes subspace connections, which find far more of the light that is
+/// hard to find. The tables of the render are learned from the last round alone: its paths have the smaller variance,
+/// and the few paths of a pilot would outweigh them.
 class TrainingGenerator {
   public:
     /// `scene` must outlive the generator. The algorithm must be one that learns.
     static Result<TrainingGenerator> create(const Scene& scene, const RenderSettings& settings, const Tables& guide = {});
 
-    /// Camera samples first_sample .. of a sequence that is spread evenly over the frame, and as many light sub-paths: each
-    /// sample its own (no guide), or all of the unit's shared in a cache (guided). Of these, and of more where they are not enough,
-    /// energy_paths per sample are kept for Q. The result does not depend on the number of
-    /// threads. kCancelled after a stop request.
+    /// Traces the camera samples first_sample .. of a sequence that is spread evenly over the frame, and as many light
+    /// sub-paths: each sample has its own (no guide), or all of the unit's are shared in a cache (guided). Of these,
+    /// and of more where they are not enough, energy_paths per sample are kept for Q. The result does not depend on the
+    /// number of threads. kCancelled after a stop request.
     Result<TrainingData> trace(const TrainingWork& work, std::stop_token stop) const;
 
   private:
@@ -42,14 +44,14 @@ class TrainingGenerator {
     RouletteRule roulette_;
     LearningPlan plan_;
     Heuristic heuristic_ = Heuristic::kBalance;
-    uint64_t light_paths_per_iteration_ = 0;  ///< Of the render to come.
+    uint64_t light_paths_per_iteration_ = 0;  ///< Of the render that the tables are for.
     std::shared_ptr<const PreparedTables> guide_;
     uint64_t seed_ = 0;
     int max_edges_ = 0;
 };
 
-/// Learning on this machine alone: traces unit by unit, as a coordinator has it done by workers, and learns. The tables
-/// have the same bytes as that coordinator's. Empty for an algorithm that needs none.
+/// Learns on this machine alone: traces unit by unit, as workers do for a coordinator, and learns. The tables have the
+/// same bytes as the coordinator's. Empty for an algorithm that needs none.
 Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, std::stop_token stop, TrainingReport* report);
 
 /// Renderer::create() for a process on its own: makes the tables first where the algorithm needs them.

@@ -27,7 +27,7 @@ namespace lightloom {
 
 struct Splat {
     uint32_t pixel;      ///< Row-major in the crop.
-    uint64_t iteration;  ///< For the report, should the value not be finite.
+    uint64_t iteration;  ///< Reported if the value is not finite.
     Rgb value;
 };
 
@@ -57,15 +57,16 @@ struct UnitScope {
     std::stop_token stop;
 };
 
-/// What making a unit's state has already added to the image.
+/// What has been added to the image while a unit's state was made.
 struct UnitPreparation {
     std::vector<std::vector<Splat>> splats;  ///< By chunk, in path order.
     WalkCounters counters;
     uint64_t light_paths = 0;  ///< Traced in all, splatted or not.
 };
 
-/// Where an algorithm that does its own loops puts its light. Threads write to lanes of their own; the lanes are joined in the
-/// order of their numbers, so that the sums depend on how the algorithm deals its work to lanes and not on threads.
+/// Takes the light of an algorithm that does its own loops. Each thread writes to lanes of its own; the lanes are
+/// joined in the order of their numbers, so that the sums depend on how the algorithm deals its work to lanes and not
+/// on threads.
 class UnitSink {
   public:
     struct Lane {
@@ -74,13 +75,13 @@ class UnitSink {
     };
 
     explicit UnitSink(const RenderUnit& work) : work_(work) {}
-    /// Once, before the first lane is written to.
+    /// Must be called once, before the first lane is written to.
     void open(size_t lanes) { lanes_.resize(lanes); }
-    /// A camera sample, or a part of one, of a pixel of the unit's tile. `pixel` is row-major in the tile.
+    /// Adds a camera sample, or a part of one, of a pixel of the unit's tile. `pixel` is row-major in the tile.
     void camera(size_t lane, uint32_t pixel, uint64_t iteration, const Rgb& value) {
         lanes_[lane].camera.push_back({pixel, iteration, value});
     }
-    /// A light path's contribution to a pixel of the crop.
+    /// Adds a light path's contribution to a pixel of the crop.
     void splat(size_t lane, uint32_t pixel, uint64_t iteration, const Rgb& value) {
         lanes_[lane].splats.push_back({pixel, iteration, value});
     }
@@ -184,8 +185,8 @@ class UnitSums {
             add(chunk.counters);
             add(chunk.splats);
         }
-        // Their memory stays until the unit is done: freed before the partial's splats are allocated it would go back to the
-        // system, which costs bdpt two per cent in page faults.
+        // The chunks' memory stays until the unit is done: freed before the partial's splats are allocated it would go
+        // back to the system, which costs bdpt two per cent in page faults.
         last_chunks_ = std::move(chunks);
     }
     void add(const UnitSink& sink) {
@@ -281,7 +282,7 @@ void add_samples(const UnitScope& scope, const Trace& trace, const Weight& weigh
     sums->add(std::move(chunks));
 }
 
-/// One preparation and the samples that share its state.
+/// Adds one preparation and the samples that share its state.
 template <PreparedAlgorithm A>
 void add_prepared(const A& algorithm, const UnitScope& scope, UnitSums* sums) {
     UnitPreparation preparation;
@@ -316,8 +317,8 @@ requires UnitAlgorithm<A> || PreparedAlgorithm<A> || OwnedAlgorithm<A> Result<Pa
         algorithm.run(scope, sink);
         sums.add(sink);
     } else if constexpr (PreparedAlgorithm<A> && prepares_per_iteration<A>()) {
-        // Light paths of an iteration follow those of the one before. What an iteration traces beside those that are counted has
-        // keys of the iteration, or it would be the same in all of them.
+        // Light paths of an iteration follow those of the one before. The iteration is part of the keys of its
+        // uncounted paths, which would otherwise be the same in every iteration.
         const uint64_t light_paths = work.iteration_count > 0 ? work.light_path_count / work.iteration_count : 0;
         if (light_paths * work.iteration_count != work.light_path_count)
             return invalid_argument("the unit's light paths are not the same number in every iteration");

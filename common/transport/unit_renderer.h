@@ -1,5 +1,5 @@
 #pragma once
-// From an algorithm of one of the three shapes (unit_loop.h) to a Renderer. Only the files of algorithms include this.
+// Makes a Renderer of an algorithm of one of the three shapes (unit_loop.h). Only the files of algorithms include this.
 
 #include <tbb/task_arena.h>
 
@@ -14,7 +14,7 @@ namespace detail {
 
 using See = std::function<void(const SeenContribution&)>;
 
-/// Whether an algorithm gives the subspace labels of the paths that it finds.
+/// Whether an algorithm fills in the subspace labels of the paths that it finds.
 template <class A>
 consteval bool labels_paths() {
     if constexpr (requires { std::remove_cvref_t<decltype(std::declval<const A&>().method)>::kDetail; })
@@ -22,14 +22,14 @@ consteval bool labels_paths() {
     return false;
 }
 
-/// An algorithm of which every contribution is shown.
+/// Wraps an algorithm and shows each of its contributions to `see`.
 template <class A>
 struct Watched {
     const A& inner;
     const See& see;
 
     static constexpr bool kPerIteration = prepares_per_iteration<A>();
-    /// Views of the other algorithms hold whatever was there before, and so do those of paths of one edge.
+    /// Without this, and for paths of one edge, a view's labels are leftovers of earlier paths.
     static constexpr bool kLabels = labels_paths<A>();
 
     template <class Contribute>
@@ -71,7 +71,7 @@ struct Watched {
     }
 };
 
-/// An algorithm without labels asks nothing of a path but its view.
+/// Weights of an algorithm without labels, which depend on a path's view alone.
 template <class Selection>
 struct PlainWeights : PathWeights {
     Selection selection;
@@ -87,7 +87,7 @@ struct PlainWeights : PathWeights {
     }
 };
 
-/// One with a method of cached.h.
+/// Weights of an algorithm with a method of cached.h.
 template <class Method>
 struct CachedWeights : PlainWeights<std::remove_cvref_t<decltype(std::declval<const Method&>().densities)>> {
     Method method;
@@ -124,7 +124,7 @@ class UnitRenderer final : public Renderer {
           settings_(request.settings),
           roulette_(roulette_of(request.settings.algorithm)),
           algorithm_(std::move(algorithm)) {
-        // What a row says of its algorithm, where the algorithm itself can tell.
+        // Checks the catalog's row against the algorithm, as far as the algorithm's type shows it.
         const AlgorithmInfo& info = settings_.algorithm.info();
         const double light_paths = settings_.algorithm.light_paths_per_pixel();
         LL_CHECK(info.frame == FrameShape::kWhole || !(has_unit_selection<A>() || prepares_per_iteration<A>()));
@@ -179,8 +179,8 @@ class UnitRenderer final : public Renderer {
 
 }  // namespace detail
 
-/// The renderer of `make(select)`, where `select(selection)` is that selection without the techniques that the request leaves out.
-/// An algorithm that makes a selection for each unit keeps a copy of `select`.
+/// Makes the renderer of the algorithm `make(select)`, where `select(selection)` is that selection without the
+/// techniques that the request leaves out. An algorithm that makes a selection for each unit keeps a copy of `select`.
 template <class Make>
 std::unique_ptr<Renderer> make_unit_renderer(const RendererRequest& request, Make&& make) {
     const auto finish = [&](auto algorithm) -> std::unique_ptr<Renderer> {

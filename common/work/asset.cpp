@@ -20,7 +20,7 @@ std::optional<std::string_view> take_line(std::string_view& text) {
     return line;
 }
 
-/// "a,b,c": lower-case letters, digits and hyphens, ascending.
+/// Parses "a,b,c": words of lower-case letters, digits and hyphens, ascending.
 bool parse_names(std::string_view text, std::vector<std::string>* names) {
     for (size_t begin = 0; begin <= text.size();) {
         const size_t end = std::min(text.find(',', begin), text.size());

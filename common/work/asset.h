@@ -1,5 +1,5 @@
 #pragma once
-// Scenes as content: the list of a scene's files (its digest is the scene's root), and a directory of files by digest.
+// Scenes by content: the list of a scene's files, whose digest is the scene's root, and a directory of files by digest.
 
 #include <cstdint>
 #include <filesystem>
@@ -27,8 +27,8 @@ struct AssetEntry {
 struct AssetManifest {
     std::string main;  ///< Path of the scene file; one of the entries.
     std::vector<AssetEntry> entries;
-    /// What is left out of the scene when it is read: ImportOptions::without, ascending, no name twice. The scene's root depends on
-    /// it, so that all who read the scene see the same one.
+    /// ImportOptions::without: what is left out of the scene when it is read; ascending, no name twice. The scene's
+    /// root depends on it, so that everyone who reads the scene sees the same one.
     std::vector<std::string> without;
 
     /// The canonical text that proto/lightloom/v1/asset_service.proto describes.
@@ -37,50 +37,51 @@ struct AssetManifest {
     Digest root() const { return sha256(canonical_text()); }
     /// Accepts canonical text only: parse(t).canonical_text() == t. kInvalidArgument names the line.
     static Result<AssetManifest> parse(std::string_view text);
-    /// Hashes files below `directory`; the first is the main file. Fails on a name that may not travel or a file that
-    /// cannot be read.
+    /// Hashes files below `directory`; the first one is the main file. Fails on a name that the protocol forbids or a
+    /// file that cannot be read.
     static Result<AssetManifest> of_files(const std::filesystem::path& directory, const std::vector<std::string>& files,
                                           std::vector<std::string> without = {});
 };
 
-/// Relative, UTF-8, no empty, "." or ".." component, no backslash, no control character, components up to 255 bytes.
+/// Checks that the path is relative UTF-8 without empty, "." or ".." components, backslashes or control characters, and
+/// that components have at most 255 bytes.
 Status validate_asset_path(std::string_view path);
 
-/// SHA-256 of a file. kNotFound if it cannot be read.
+/// SHA-256 of a file. kNotFound if it does not exist, kInternal if it cannot be read.
 Result<Digest> digest_file(const std::filesystem::path& path);
-/// A directory of immutable files named by digest. Safe for any number of threads, and for several processes that share the
-/// directory: files appear by rename, complete and verified.
+/// A directory of immutable files named by digest. Safe for any number of threads, and for several processes that share
+/// the directory: files appear by rename, when they are complete and verified.
 class AssetStore {
   public:
     explicit AssetStore(std::filesystem::path directory, uint64_t max_asset_bytes = uint64_t(16) << 30);
 
     bool contains(const Digest& digest) const;
     std::filesystem::path path_of(const Digest& digest) const;
-    /// Bytes of an unfinished upload; the whole size if it is complete; 0 if unknown.
+    /// Bytes that an unfinished upload has stored; the whole size of a complete file; 0 if the digest is unknown.
     uint64_t committed_size(const Digest& digest) const;
     Result<std::string> read(const Digest& digest) const;
     /// Stores `bytes`; a complete file of that digest is trusted and left as it is.
     Status put(const Digest& digest, std::string_view bytes);
     /// Forgets a file that turned out to be damaged, so that it can be fetched or stored again.
     void remove(const Digest& digest);
-    /// Says that a file was used, for trim().
+    /// Marks a file as used now, for trim().
     void touch(const Digest& digest) const;
-    /// Removes the complete files that were used least recently until those that are left have `max_bytes` at most, but never
-    /// `newest`, and uploads that broke off an hour ago.
+    /// Removes the complete files that were used least recently until the rest have at most `max_bytes`, but never
+    /// `newest`; also removes uploads that broke off more than an hour ago.
     void trim(uint64_t max_bytes, const Digest& newest) const;
-    /// Removes the complete files that begin with `prefix`; their number.
+    /// Removes the complete files that begin with `prefix`; returns their number.
     size_t remove_all_that_begin_with(std::string_view prefix);
 
-    /// One upload in progress. Destroyed before it is complete, it leaves its bytes for a later one to go on from.
+    /// One upload in progress. If it is destroyed before it is complete, a later upload goes on from its bytes.
     class Upload {
       public:
         Upload(Upload&& other) noexcept;
         Upload& operator=(Upload&&) = delete;
         ~Upload();
         uint64_t offset() const { return offset_; }
-        /// Appends; kInvalidArgument beyond the declared size, kResourceExhausted when the disk is full.
+        /// Appends bytes; kInvalidArgument beyond the declared size, kResourceExhausted when the disk is full.
         Status append(std::string_view bytes);
-        /// Verifies and publishes. kDataLoss (and the bytes are thrown away) if they do not have the digest.
+        /// Verifies and publishes the file. kDataLoss, and the bytes are thrown away, if they do not have the digest.
         Status finish();
 
       private:
@@ -91,7 +92,8 @@ class AssetStore {
         uint64_t size_, offset_;
         int file_;
     };
-    /// kAborted while another upload of the asset runs in this process, kResourceExhausted above the size limit.
+    /// Begins or resumes an upload. kAborted while another upload of the asset runs, kResourceExhausted above the size
+    /// limit.
     Result<Upload> begin_upload(const Digest& digest, uint64_t size_bytes);
 
     /// Fills `directory` with the manifest's files (hard links, or copies across file systems). Every file is verified

@@ -57,7 +57,7 @@ Result<Digest> digest_file(const fs::path& path) {
 AssetStore::AssetStore(fs::path directory, uint64_t max_asset_bytes)
     : directory_(std::move(directory)),
       max_asset_bytes_(max_asset_bytes) {
-    std::error_code ignored;  // a directory that cannot be made shows as an error of the first write
+    std::error_code ignored;  // the first write reports a directory that cannot be made
     fs::create_directories(directory_ / "incoming", ignored);
 }
 
@@ -144,7 +144,8 @@ Result<AssetStore::Upload> AssetStore::begin_upload(const Digest& digest, uint64
     const int error = errno;
     Upload upload(this, digest, size_bytes, 0, file);
     if (file < 0) return io_error(path, error);
-    // Another process may share the directory; and it may have published or removed this very file between our open and our lock.
+    // Another process may share the directory, and it may have published or removed this very file between open() and
+    // flock().
     struct stat ours {
     }, named{};
     if (::flock(file, LOCK_EX | LOCK_NB) != 0 || contains(digest) || ::fstat(file, &ours) != 0 ||
@@ -199,7 +200,7 @@ Status AssetStore::Upload::finish() {
     std::error_code error;
     if (*digest != digest_) {
         fs::remove(from, error);
-        return data_loss("the bytes have digest " + digest->hex() + ", declared was " + digest_.hex());
+        return data_loss("the bytes have digest " + digest->hex() + ", but the declared one is " + digest_.hex());
     }
     const fs::path to = store_->path_of(digest_);
     fs::create_directories(to.parent_path(), error);

@@ -27,7 +27,7 @@ string(SHA256 digest "${text}")
 string(SUBSTRING ${digest} 0 16 short)
 list(JOIN sources "\n" lines)
 file(CONFIGURE OUTPUT ${LIST} CONTENT "${lines}\n" @ONLY)
-# Left alone where nothing changed, so that nothing is compiled and linked again after a change elsewhere.
+# The file is left alone where nothing changed, so that nothing is compiled and linked again after a change elsewhere.
 file(CONFIGURE OUTPUT ${OUT} @ONLY CONTENT "#include \"common/work/identity.h\"
 namespace lightloom {
 const char* const kBuildId = \"${VERSION}+${short}\";

@@ -17,7 +17,7 @@ void trim_cache(const std::vector<fs::path>& directories, uint64_t max_bytes, co
     std::vector<File> entries, abandoned;
     uint64_t total = 0;
     const auto hour_ago = fs::file_time_type::clock::now() - std::chrono::hours(1);
-    std::error_code error;  // another process may remove a file under our eyes
+    std::error_code error;  // another process may remove a file meanwhile
     for (const fs::path& directory : directories) {
         for (fs::directory_iterator item(directory, error), end; item != end; item.increment(error)) {
             const CacheFile kind = item->is_regular_file(error) ? kind_of(item->path()) : CacheFile::kForeign;

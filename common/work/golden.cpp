@@ -24,7 +24,7 @@ struct GoldenBuilder {
         scene.materials.push_back(std::move(m));
         return MaterialId(scene.materials.size() - 1);
     }
-    /// `value(x, y, c)` of every texel.
+    /// Adds an image with value(x, y, c) in every texel.
     template <class Value>
     int32_t image(int size, int channels, const Value& value) {
         Image i;
@@ -37,7 +37,7 @@ struct GoldenBuilder {
         scene.images.push_back(std::move(i));
         return int32_t(scene.images.size() - 1);
     }
-    /// Stores an image as 8-bit files are: codes, and what each of them means.
+    /// Stores an image as 8-bit files do: as codes, with a table of the value of each code.
     void code(int32_t index) {
         Image& i = scene.images[size_t(index)];
         for (size_t c = 0; c < i.decode.size(); ++c) i.decode[c] = float(c * c) / (255.0f * 255.0f);
@@ -139,7 +139,7 @@ SceneDescription golden_courtyard() {
     g.scene.emissions.push_back({.radiance = {2, 3, 4}, .two_sided = true});
     g.quad({-2, 0, -2}, {0, 0, 4}, {4, 0, 0}, ground);
     g.quad({-2, 0, 2}, {0, 2.5f, 0}, {4, 0, 0}, lacquer);
-    // Normals that are not those of the plane, and one that points to the other side.
+    // These normals differ from the plane's, and one points to the other side.
     g.scene.meshes.back().normals = {normalize(Vec3{-0.3f, 0, -1}), normalize(Vec3{-0.3f, 0.2f, -1}),
                                      normalize(Vec3{0.3f, 0.2f, -1}), normalize(Vec3{0.3f, 0, -1})};
     g.quad({-1.2f, 0.1f, 1.6f}, {0.8f, 0, 0}, {0, 0.8f, 0.1f}, poster);
@@ -185,7 +185,7 @@ Status hash_units(SceneDescription description, Sha256& hash) {
     if (!built.ok()) return built.status();
     const std::shared_ptr<const Scene> scene = std::move(built).value();
     for (const AlgorithmInfo* row : catalog()) {
-        // Tables and caches large enough to run every line, small enough for a registration that nobody waits for.
+        // Training sets and caches are large enough to run every line and small enough to keep registration short.
         auto algorithm = AlgorithmSettings::parse(row->name, {});
         if (!algorithm.ok()) return algorithm.status();
         for (const auto& [name, value] : {std::pair{"training-paths", 2000}, std::pair{"cache", 500},

@@ -10,13 +10,14 @@ namespace lightloom {
 /// A room with one area light, one diffuse-transmitting curtain, metal and glass: easy to connect.
 SceneDescription golden_scene();
 
-/// What the room lacks: environments (an image and a constant one), point, spot and distant lights, a sphere that shines, a
-/// two-sided light, instances, cut-outs, interpolated normals, image textures, coats, rough glass, a pane, a mix of materials and a
-/// thin lens. Every material, light and shape of it decides about the bytes of its unit (work_test).
+/// A courtyard with what the room lacks: environments (an image and a constant one), point, spot and distant lights, a
+/// sphere that shines, a two-sided light, instances, cut-outs, interpolated normals, image textures, coats, rough
+/// glass, a pane, a mix of materials and a thin lens. Each of its materials, lights and shapes influences the bytes of
+/// its unit (work_test).
 SceneDescription golden_courtyard();
 
-/// Renders one 32 x 32 unit of both per algorithm of the catalog, with the tables that it needs, and digests tables and
-/// partials. Takes about a second; the result is a constant of (build, correct host).
+/// Renders one 32 x 32 unit of each scene per algorithm of the catalog, with the tables that it needs, and digests
+/// tables and partials. This takes about a second; the result is the same on every correct host with the same build.
 Result<Digest> golden_unit_digest();
 
 }  // namespace lightloom

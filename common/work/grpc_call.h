@@ -1,5 +1,6 @@
 #pragma once
-// Calls to the coordinator's services, the same for clients and workers: a deadline, cancellation, and errors as ours.
+// Calls to the coordinator's services, the same for clients and workers: they add a deadline and cancellation, and turn
+// errors into a Status.
 
 #include <grpcpp/client_context.h>
 
@@ -16,7 +17,7 @@ inline void set_deadline(grpc::ClientContext& context, double seconds) {
                          std::chrono::duration_cast<std::chrono::system_clock::duration>(std::chrono::duration<double>(seconds)));
 }
 
-/// Asks once and waits for the one answer. kDeadlineExceeded after `seconds`, kCancelled soon after a stop request.
+/// Makes one call and waits for its answer. kDeadlineExceeded after `seconds`, kCancelled soon after a stop request.
 template <class Stub, class Request, class Response>
 Result<Response> call(Stub& stub, grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                       const Request& request, double seconds, std::stop_token stop = {}) {
@@ -29,14 +30,14 @@ Result<Response> call(Stub& stub, grpc::Status (Stub::*method)(grpc::ClientConte
     return response;
 }
 
-/// Ends a stream whose rest nobody wants.
+/// Ends a stream whose rest is not wanted.
 template <class Stream>
 void abandon(grpc::ClientContext& context, Stream& stream) {
     context.TryCancel();
     (void)stream.Finish();
 }
 
-/// The values of a message's list; the error of the first one that the protocol forbids.
+/// Converts a message's list; returns the error of the first value that the protocol forbids.
 template <class Value, class Messages>
 Result<std::vector<Value>> get_all(const Messages& messages) {
     std::vector<Value> values;

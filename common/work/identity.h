@@ -1,5 +1,5 @@
 #pragma once
-// What this build computes light with, and the proof that it does so on this host.
+// Identifies the code and the machine arithmetic that compute light, and proves on this host that they work.
 
 #include "common/core/result.h"
 #include "common/work/service.h"
@@ -16,7 +16,7 @@ std::string math_profile();
 
 /// The identity of this process; renders the golden units once.
 Result<BuildIdentity> build_identity();
-/// What a service says before such an error, which keeps it from starting.
+/// A service that cannot start for such an error prints this text before it.
 inline constexpr const char* kNoIdentity = "the golden unit failed on this host: ";
 
 }  // namespace lightloom

@@ -1,6 +1,7 @@
 #pragma once
-// JobSpec: what a user asks for, immutable once submitted. WorkUnit: the smallest self-contained piece of it. plan(): the
-// pure function between them. Nothing here knows about workers, clocks or networks.
+// JobSpec: what a user asks for, immutable once submitted. WorkUnit: the smallest self-contained piece of it. Plan: a
+// pure function from frame, algorithm and number of iterations to units. None of these depends on workers, clocks or
+// networks.
 
 #include <cstdint>
 #include <string>
@@ -19,13 +20,13 @@ namespace lightloom {
 struct JobSpec {
     static constexpr uint32_t kMaxSamplesPerPixel = 1u << 24;
 
-    AlgorithmSettings algorithm;  ///< As they were chosen; once the job is accepted, with every default written down.
+    AlgorithmSettings algorithm;  ///< As chosen by the user; with every default written down once the job is accepted.
     uint64_t seed = 0;
     uint32_t samples_per_pixel = 0;  ///< Iterations; 0 when time-limited.
     double time_limit_seconds = 0;   ///< 0 when bounded by samples. Exactly one of the two is set.
     int32_t max_depth = -1;          ///< Bounces; -1: the scene's.
     int32_t width = 0, height = 0;   ///< 0: the scene's.
-    Digest scene_root;               ///< Of the scene's file list (asset manifest).
+    Digest scene_root;               ///< Digest of the scene's file list (asset manifest).
     FrameLayout frame;               ///< Filled from the scene when the job is accepted.
     bool first_hit_layers = false;   ///< Also write albedo, normal and depth of the first hit.
 
@@ -34,7 +35,7 @@ struct JobSpec {
     friend bool operator==(const JobSpec&, const JobSpec&) = default;
 };
 
-/// True unless they differ in what those who submit give; what the coordinator fills in does not count.
+/// True if the two agree in everything that the submitter gives; fields that the coordinator fills in do not count.
 bool same_request(const JobSpec& a, const JobSpec& b);
 
 /// What light transport needs of a spec.
@@ -45,7 +46,7 @@ inline RenderSettings render_settings(const JobSpec& spec) {
 enum class UnitKind : uint8_t {
     kRender,    ///< A partial of the image.
     kTraining,  ///< Paths that the job's tables are learned from; never part of an image.
-    kProbe,     ///< The same, only to measure how many of them a time-limited job can afford.
+    kProbe,     ///< Paths of the same kind, traced only to measure how many a time-limited job can afford.
 };
 
 /// Identity of a unit inside a job. Units of one group complete one another: their techniques' weights sum to one only
@@ -54,14 +55,14 @@ struct UnitKey {
     uint32_t group = 0;
     uint32_t tile = 0;
     UnitKind kind = UnitKind::kRender;
-    uint32_t round = 0;  ///< kTraining: of the algorithm's LearningPlan.
+    uint32_t round = 0;  ///< kTraining: index into the rounds of the algorithm's LearningPlan.
     friend auto operator<=>(const UnitKey&, const UnitKey&) = default;
 };
 
 struct WorkUnit {
     UnitKey key;
-    RenderUnit render = {};      ///< kRender. Light paths: a share of the group's that is proportional to the tile.
-    TrainingWork training = {};  ///< The other kinds.
+    RenderUnit render = {};      ///< For kRender; the light paths are a share in proportion to the tile.
+    TrainingWork training = {};  ///< For the other kinds.
 };
 
 /// One full-frame group of iterations.
@@ -71,29 +72,29 @@ struct Group {
     uint32_t iteration_count = 0;
 };
 
-/// What the plan of an image must know besides the frame.
+/// What the plan of an image depends on besides the frame.
 struct PlanOptions {
     uint64_t light_paths_per_iteration = 0;  ///< N1 |crop|; 0 for algorithms that splat nothing.
-    bool whole_frame = false;                ///< No tiles.
-    bool splats_only = false;                ///< Units without camera samples.
+    bool whole_frame = false;                ///< Units cover the whole frame instead of tiles.
+    bool splats_only = false;                ///< Units have no camera samples.
 };
-/// As the row of the algorithm says.
+/// The options that follow from the algorithm's row of the catalog.
 PlanOptions plan_options(const FrameLayout& frame, const AlgorithmSettings& algorithm);
 
-/// The units of a group: one per tile, in order. The group's light paths, so many per iteration, are shared out in proportion to
-/// the tiles' areas with exact cumulative rounding.
+/// The units of a group: one per tile, in order. The group's light paths are shared out in proportion to the tiles'
+/// areas with exact cumulative rounding.
 std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& tiles, const PlanOptions& options);
 
-/// The plan is a pure function of frame, options and the number of iterations. Group sizes grow geometrically: a group is at
-/// most 5 % of all iterations before it (at least one iteration, at most what makes about 2^18 camera samples), so that a
-/// job stopped at any group boundary wastes little, and rendering it again with that number of iterations makes the very
-/// same groups.
+/// The plan is a pure function of frame, options and the number of iterations. Group sizes grow geometrically: a group
+/// is at most 5 % of all iterations before it (at least one iteration, at most what makes about 2^18 camera samples per
+/// unit or 8 iterations of the whole frame), so that a job stopped at any group boundary wastes little, and rendering
+/// it again with that number of iterations makes the very same groups.
 class Plan {
   public:
     Plan(const FrameLayout& frame, const PlanOptions& options);
     Plan(const FrameLayout& frame, const AlgorithmSettings& algorithm) : Plan(frame, plan_options(frame, algorithm)) {}
-    /// The plan of a part of a training set, `work`: group i is the unit of its samples i * kTrainingUnitSamples onwards, its
-    /// iterations are samples.
+    /// The plan of a part of a training set, `work`: group i is one unit, of the samples from i * kTrainingUnitSamples
+    /// on, and iterations stand for samples.
     static Plan training(UnitKind kind, uint32_t round, const TrainingWork& work);
 
     /// Group `index` of an unbounded job.
@@ -102,12 +103,12 @@ class Plan {
     uint32_t max_group_iterations() const { return max_group_iterations_; }
     /// The groups that make exactly `iterations` iterations; the last one is cut short where need be.
     std::vector<Group> groups_for(uint64_t iterations) const;
-    /// How many groups these are, without making them.
+    /// The number of these groups, without making them.
     uint32_t group_count(uint64_t iterations) const;
     /// The units of a group, tile by tile.
     std::vector<WorkUnit> units(const Group& group) const;
     uint32_t tile_count() const { return uint32_t(tiles_.size()); }
-    /// Of a unit of this plan.
+    /// The key of a unit of this plan.
     UnitKey key(uint32_t group, uint32_t tile) const { return {group, tile, kind_, round_}; }
 
   private:

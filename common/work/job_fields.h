@@ -1,7 +1,7 @@
 #pragma once
-// The fields of a JobSpec, listed once, with what each of them decides. The spec's digest, the key of its tables, the equality of
-// requests and the JSON of manifests are made from the list; the wire and the command for a replay, which are written out, are
-// checked against it by job_fields_test.
+// The fields of a JobSpec, listed once, each with the things that it decides. The spec's digest, the key of its tables,
+// the equality of requests and the JSON of manifests are made from this list; the code for the wire and for the replay
+// command is written by hand and checked against the list by job_fields_test.
 
 #include <cstddef>
 #include <string>
@@ -13,21 +13,21 @@
 
 namespace lightloom {
 
-/// What a field decides or where it shows; every field travels on the wire.
+/// The roles of a field; every field travels on the wire.
 namespace job_role {
-inline constexpr unsigned kSettings = 1u << 0;  ///< Light transport is told of it: render_settings().
-inline constexpr unsigned kImage = 1u << 1;     ///< The image, however many iterations it has: JobSpec::spec_digest().
-inline constexpr unsigned kTables = 1u << 2;    ///< The tables that are learned first: table_key().
-inline constexpr unsigned kRequest = 1u << 3;   ///< Who submits gives it, the coordinator does not fill it in: same_request().
+inline constexpr unsigned kSettings = 1u << 0;  ///< It is a setting of light transport: render_settings().
+inline constexpr unsigned kImage = 1u << 1;     ///< It decides the image, with any number of iterations: spec_digest().
+inline constexpr unsigned kTables = 1u << 2;    ///< It decides the tables that are learned first: table_key().
+inline constexpr unsigned kRequest = 1u << 3;   ///< The submitter gives it, not the coordinator: same_request().
 inline constexpr unsigned kManifest = 1u << 4;  ///< The manifest shows it.
 inline constexpr unsigned kReplay = 1u << 5;    ///< The command that renders a sample again names it.
 }  // namespace job_role
 
 template <unsigned Roles, class T>
 struct JobField {
-    std::string_view name;  ///< In digests and JSON.
+    std::string_view name;  ///< Name in digests and JSON.
     T JobSpec::*member;
-    std::string_view yes = "yes", no = "no";  ///< What digests call the two values of a bool.
+    std::string_view yes = "yes", no = "no";  ///< Words of digests for the values of a bool.
 };
 
 template <unsigned Roles, class T, class... Words>
@@ -35,7 +35,7 @@ constexpr JobField<Roles, T> job_field(std::string_view name, T JobSpec::*member
     return {name, member, yes_no...};
 }
 
-/// In the order in which digests, table keys and manifests show them; all of these depend on it.
+/// The fields, in the order of digests, table keys and manifests, which all depend on it.
 inline constexpr auto kJobFields = [] {
     using namespace job_role;
     constexpr unsigned kSetting = kSettings | kImage | kTables | kRequest | kManifest | kReplay;
@@ -44,21 +44,21 @@ inline constexpr auto kJobFields = [] {
         job_field<kSetting>("algorithm", &JobSpec::algorithm),
         job_field<kSetting>("seed", &JobSpec::seed),
         job_field<kSetting>("max_depth", &JobSpec::max_depth),
-        // A time limit that ended a job is of no use for a replay: what is left of it is a number of samples.
+        // A replay needs no time limit: a job that it ended has a number of samples.
         job_field<kBound | kReplay>("requested_samples_per_pixel", &JobSpec::samples_per_pixel),
         job_field<kBound>("time_limit_seconds", &JobSpec::time_limit_seconds),
-        // The frame says what these two and the scene come to.
+        // The frame results from these two and the scene.
         job_field<kRequest | kReplay>("width", &JobSpec::width),
         job_field<kRequest | kReplay>("height", &JobSpec::height),
-        // A replay reads the scene from a path, and makes the frame again from the scene and the resolution.
+        // A replay reads the scene from a path and derives the frame from the scene and the resolution.
         job_field<kImage | kTables | kRequest | kManifest>("scene_root", &JobSpec::scene_root),
         job_field<kImage | kTables | kManifest>("frame", &JobSpec::frame),
         job_field<kImage | kRequest | kManifest>("layers", &JobSpec::first_hit_layers, "first-hit", "none"),
     };
 }();
 
-/// Calls visit(field) for each of them, best with a lambda that names what it needs of the type:
-/// [&]<unsigned Roles, class T>(const JobField<Roles, T>& field) { ... spec.*field.member ... }
+/// Calls visit(field) for each field, best with a lambda that names the needed parts of the type: [&]<unsigned Roles,
+/// class T>(const JobField<Roles, T>& field) { ... spec.*field.member ... }
 template <class Visit>
 constexpr void for_each_job_field(Visit&& visit) {
     std::apply([&](const auto&... field) { (visit(field), ...); }, kJobFields);
@@ -66,13 +66,13 @@ constexpr void for_each_job_field(Visit&& visit) {
 
 namespace detail {
 
-/// Stands for a value of whatever type a member has.
+/// Stands for a value of any member's type.
 struct AnyMember {
     template <class T>
     operator T() const;
 };
 
-/// How many values a JobSpec can be made from: as many as it has members.
+/// The number of members of JobSpec: the most values from which one can be made.
 template <class... Members>
 constexpr size_t job_spec_members() {
     if constexpr (requires { JobSpec{Members{}..., AnyMember{}}; })
@@ -86,7 +86,7 @@ constexpr size_t job_spec_members() {
 static_assert(std::tuple_size_v<decltype(kJobFields)> == detail::job_spec_members<>(),
               "a member of JobSpec is missing from kJobFields, or no longer a member");
 
-/// Appends a line with name and value. The length stands before the value, so that no two sets of values have the same text.
+/// Appends a line with name and value. The length precedes the value, so that no two sets of values have the same text.
 void append_text(std::string& out, std::string_view name, std::string_view value);
 
 /// The text of the fields that have the role, as digests read it.

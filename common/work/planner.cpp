@@ -7,9 +7,9 @@ namespace lightloom {
 namespace {
 
 constexpr int64_t kUnitSamples = int64_t(1) << 18;  // camera samples that a unit should have
-constexpr int kTileWidth = 512;                     // about; tiles are equal parts of the crop window
+constexpr int kTileWidth = 512;                     // approximate: tiles are equal parts of the crop window
 constexpr int kMinTileRows = 256;
-constexpr int64_t kWholeFrameIterations = 8;  // that the groups of whole frames may grow to, however large these are
+constexpr int64_t kWholeFrameIterations = 8;  // groups of whole frames may grow to this, however large the frame is
 
 int ceil_div(int64_t a, int64_t b) { return int((a + b - 1) / b); }
 
@@ -44,8 +44,8 @@ std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& t
     int64_t area = 0;
     for (const Rect& tile : tiles) area += tile.area();
     const uint64_t total = options.light_paths_per_iteration * group.iteration_count;
-    // Cumulative rounding in integers: the shares differ from the exact proportion by less than one path and sum to the
-    // total whatever the tiles are.
+    // The rounding is cumulative and in integers: the shares differ from the exact proportion by less than one path and
+    // add up to the total, whatever the tiles are.
     std::vector<WorkUnit> units;
     units.reserve(tiles.size());
     int64_t pixels = 0;
@@ -71,7 +71,7 @@ Plan::Plan(const FrameLayout& frame, const PlanOptions& options)
       tiles_(make_tiles(frame.crop, options.whole_frame)) {
     int64_t largest = 1;
     for (const Rect& tile : tiles_) largest = std::max(largest, tile.area());
-    // A unit of a whole large frame is large, and so is its partial: it should not be of one iteration for ever.
+    // The partial of a large whole frame is large, so that its groups should not stay at one iteration for ever.
     const int64_t least = options.whole_frame ? kWholeFrameIterations : 1;
     max_group_iterations_ = uint32_t(std::max(least, kUnitSamples / largest));
 }
@@ -94,7 +94,7 @@ Group Plan::group(uint32_t index) const {
     uint64_t done = 0;
     for (uint32_t i = 0; i < index; ++i) {
         const uint32_t size = group_size(done, max_group_iterations_);
-        // From here on every group has the largest size: no need to walk through them.
+        // From here on every group has the largest size, so that a product replaces the loop.
         if (size == max_group_iterations_) {
             done += uint64_t(index - i) * size;
             break;

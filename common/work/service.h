@@ -1,6 +1,7 @@
 #pragma once
-// The service as plain C++: what its parts say to one another, and the two doors (ports) to the coordinator. Each port has
-// two implementations, one over gRPC and one in process, so that a job runs through the same code in both forms.
+// The service as plain C++: the data that its parts exchange, and the two ports (interfaces) of the coordinator. Each
+// port has two implementations, one over gRPC and one in process, so that a job runs through the same code in both
+// forms.
 
 #include <cstdint>
 #include <functional>
@@ -16,11 +17,11 @@
 
 namespace lightloom {
 
-/// What must be equal on every host for the bytes of an image not to depend on the host.
+/// The identity that must be equal on all hosts, so that the bytes of an image do not depend on the host.
 struct BuildIdentity {
     std::string build_id;      ///< Version and digest of the sources that compute light.
     std::string math_profile;  ///< Compiler, instruction set, ray tracer.
-    Digest golden_digest;      ///< Of what the golden units render to here.
+    Digest golden_digest;      ///< Digest of what golden units render to on this host.
     friend bool operator==(const BuildIdentity&, const BuildIdentity&) = default;
 };
 
@@ -53,7 +54,7 @@ struct UnitLease {
     std::string job_id;
     JobSpec spec;
     WorkUnit unit;
-    AssetReference tables;  ///< What the unit reads; none where the algorithm needs none.
+    AssetReference tables;  ///< Tables that the unit reads; none where the algorithm needs none.
     UnitReference reference() const { return {job_id, unit.key}; }
 };
 
@@ -73,7 +74,7 @@ enum class JobState { kPreparing, kRunning, kFinishing, kSucceeded, kFailed, kCa
 bool is_terminal(JobState state);
 /// What a job in kPreparing is doing.
 enum class PreparePhase { kReadingScene, kProbing, kTracing, kLearning, kWaitingForTables };
-/// For people: "tracing training paths".
+/// Text for people, for example "tracing training paths".
 std::string_view to_string(PreparePhase phase);
 
 /// The tables that a job renders with, and what making them cost; see the message TablesSummary.
@@ -89,15 +90,15 @@ struct TablesInfo {
     Digest cache_key;
 };
 
-/// Lower-case word.
+/// The state as a lower-case word.
 std::string_view to_string(JobState state);
 
 /// A snapshot of a job; see the message Job in proto/lightloom/v1/job_service.proto for units and meaning.
 struct JobInfo {
     std::string job_id;
     JobState state = JobState::kPreparing;
-    JobSpec spec;           ///< A client that does not know the algorithm has the catalog's first one in its place.
-    std::string algorithm;  ///< Its name, whoever knows it.
+    JobSpec spec;           ///< It has the catalog's first algorithm where the client does not know the job's.
+    std::string algorithm;  ///< Name of the job's algorithm, also where it is unknown here.
     std::string message;
     uint64_t revision = 0;
     uint64_t unit_total = 0, unit_done = 0, unit_leased = 0;
@@ -111,18 +112,18 @@ struct JobInfo {
     uint64_t image_size_bytes = 0;
     uint64_t duplicates_same = 0, duplicates_different = 0;
     double prepare_seconds = 0, finish_seconds = 0;
-    PreparePhase phase = PreparePhase::kReadingScene;  ///< In kPreparing.
-    uint64_t phase_done = 0, phase_total = 0;          ///< Training samples; in kLearning thousandths of the work.
+    PreparePhase phase = PreparePhase::kReadingScene;  ///< Valid in kPreparing.
+    uint64_t phase_done = 0, phase_total = 0;          ///< In training samples; thousandths of the work in kLearning.
     std::string waits_for;                             ///< The job that makes the tables, in kWaitingForTables.
     TablesInfo tables;
-    RareLightReport rare_light;  ///< Of a finished job.
+    RareLightReport rare_light;  ///< Set for a finished job.
 };
-/// For people: "waiting for the tables of job-0123".
+/// Text for people, for example "waiting for the tables of job-0123".
 std::string phase_text(const JobInfo& job);
 
 enum class ImageKind { kFinal, kPreview };
 
-/// What a client sees of a coordinator. Errors are those of JobService and AssetService.
+/// A coordinator's interface to clients. Errors are those of JobService and AssetService.
 class JobPort {
   public:
     virtual ~JobPort() = default;
@@ -137,23 +138,24 @@ class JobPort {
     virtual Result<std::string> image(const std::string& job_id, ImageKind kind) = 0;
     virtual Result<std::string> manifest(const std::string& job_id) = 0;
     virtual Result<std::vector<Digest>> find_missing(const std::vector<Digest>& digests) = 0;
-    /// Sends `size_bytes` of `path` (resuming where an earlier attempt broke off); a no-op if the asset is complete there.
+    /// Sends the file `path`, resuming where an earlier attempt broke off; does nothing if the asset is already
+    /// complete there.
     virtual Status upload(const Digest& digest, const std::filesystem::path& path) = 0;
     virtual Status upload_bytes(const Digest& digest, std::string_view bytes) = 0;
 };
 
-/// What a worker sees of a coordinator. Errors are those of WorkerService and AssetService.
+/// A coordinator's interface to workers. Errors are those of WorkerService and AssetService.
 class WorkerPort {
   public:
     virtual ~WorkerPort() = default;
     virtual Result<WorkerGrant> register_worker(const WorkerHello& hello) = 0;
-    /// At most one unit; empty after `wait_seconds` without work, or soon after a stop request.
+    /// Returns at most one unit; none after `wait_seconds` without work, or soon after a stop request.
     virtual Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds, std::stop_token stop) = 0;
     /// Returns the units whose results are not wanted any more.
     virtual Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running) = 0;
     virtual Result<SubmitAck> submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial,
                                             double render_seconds) = 0;
-    /// The serialized training data of a unit of any kind but kRender.
+    /// Submits the serialized training data of a unit of any kind but kRender.
     virtual Result<SubmitAck> submit_training(const std::string& worker_id, const UnitLease& lease, std::string_view payload,
                                               double trace_seconds) = 0;
     virtual Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why) = 0;

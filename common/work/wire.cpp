@@ -7,7 +7,7 @@
 namespace lightloom::wire {
 namespace {
 
-// Enumerations cross the wire by casts. A value more on one side, or another order, must not compile.
+// Enumerations cross the wire by casts. If one side has another value or another order, this must not compile.
 template <typename Ours, typename Theirs>
 constexpr bool one_below(Ours ours, Theirs theirs) {
     return int(ours) + 1 == int(theirs);
@@ -157,7 +157,7 @@ void put(const JobSpec& in, v1::JobSpec* out) {
 
 namespace {
 
-/// All but the algorithm.
+/// Reads all fields but the algorithm.
 Result<JobSpec> get_rest(const v1::JobSpec& in) {
     JobSpec spec;
     spec.seed = in.seed();
@@ -228,7 +228,7 @@ Result<JobInfo> get(const v1::Job& in) {
     if (in.state() < v1::JOB_STATE_PREPARING || in.state() > v1::JOB_STATE_CANCELLED)
         return invalid_argument("job " + in.job_id() + " has an unknown state; is the coordinator newer than this client?");
     info.state = JobState(int(in.state()) - 1);
-    // A coordinator may know algorithms and parameters that this client does not: that is no reason not to show its jobs.
+    // A coordinator may know algorithms and parameters that this client does not; its jobs are shown all the same.
     auto spec = get(in.spec());
     if (!spec.ok()) spec = get_rest(in.spec());
     if (!spec.ok()) return spec.status();

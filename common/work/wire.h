@@ -1,5 +1,5 @@
 #pragma once
-// The protocol's messages <-> the C++ types. The only place that sees both; limits of the protocol are checked here.
+// Converts between the protocol's messages and the C++ types, and checks the limits of the protocol.
 
 #include <grpcpp/support/status.h>
 
@@ -11,7 +11,7 @@
 
 namespace lightloom::wire {
 
-/// Bytes of a message about an error, at most; what is longer is cut.
+/// Most bytes of an error message; a longer one is cut.
 inline constexpr size_t kMaxMessageBytes = 2000;
 
 grpc::Status to_grpc(const Status& status);
@@ -26,7 +26,7 @@ void put(const UnitLease& in, v1::UnitLease* out);
 void put(const WorkerHello& in, v1::WorkerHello* out);
 void put(const WorkerGrant& in, v1::WorkerGrant* out);
 void put(const SubmitAck& in, v1::SubmitResultResponse* out);
-/// Everything but worker, unit and render time.
+/// Fills in everything but worker, unit and render time.
 void put(const PartialDescriptor& in, v1::SubmitResultHeader* out);
 
 // Each fails with kInvalidArgument on what the protocol forbids (a digest of another length, an UNSPECIFIED enum).

@@ -1,5 +1,5 @@
 #pragma once
-// What the benchmarks make of their command lines. They print what is wrong and exit with 2.
+// Interprets the benchmarks' command lines. Errors are printed and end the program with exit code 2.
 
 #include <algorithm>
 #include <cstdio>
@@ -27,7 +27,7 @@ struct LoadedScene {
     int max_depth = 0;
 };
 
-/// `resolution`: "WxH", or empty for the scene's.
+/// Loads a scene; `resolution` is "WxH", or empty for the scene's.
 inline LoadedScene load(const std::string& path, const std::string& resolution) {
     ImportedScene imported = value_or_exit(import_pbrt(path));
     SceneOptions options;
@@ -39,7 +39,7 @@ inline LoadedScene load(const std::string& path, const std::string& resolution) 
     return {value_or_exit(Scene::build(std::move(imported.description), options)), max_depth};
 }
 
-/// `set`: key=value each.
+/// Settings of an algorithm; each item of `set` is "key=value".
 inline RenderSettings settings_of(const std::string& algorithm, const std::vector<std::string>& set, const LoadedScene& loaded) {
     std::map<std::string, std::string> parameters;
     for (const std::string& item : set) {

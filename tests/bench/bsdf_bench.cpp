@@ -1,5 +1,5 @@
-// Nanoseconds per Bsdf::eval (value and both densities), per Bsdf::sample and per construction, for each kind. One thread;
-// the smallest of several repetitions, because everything else on the machine only adds.
+// Nanoseconds per Bsdf::eval (value and both densities), per Bsdf::sample and per construction, for each kind. It uses
+// one thread and reports the smallest of several repetitions, because other programs can only add time.
 //
 //     build/release/bin/bsdf_bench
 
@@ -32,7 +32,7 @@ double nanoseconds(const std::vector<Inputs>& inputs, Work work) {
         for (int round = 0; round < kRounds; ++round)
             for (const Inputs& in : inputs) sink += work(in);
         const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        // The sum must be used, or the work may be left out.
+        // The sum must be used, because otherwise the compiler may leave the work out.
         if (sink == 1.2345f) std::puts("");
         best = std::min(best, seconds * 1e9 / (double(kRounds) * double(inputs.size())));
     }

@@ -1,4 +1,5 @@
-// Throughput of the film's hot operations, on a dense 512 x 512 unit. Prints one line per operation; no pass or fail.
+// Throughput of the film's most frequent operations on a dense 512 x 512 unit. Prints one line per operation; nothing
+// passes or fails.
 
 #include <algorithm>
 #include <chrono>
@@ -16,7 +17,7 @@ namespace {
 
 using namespace lightloom;
 
-/// Best of several runs, in milliseconds: what the machine can do when others leave it alone.
+/// Shortest of several runs, in milliseconds: the speed of the machine when nothing else disturbs it.
 double best_milliseconds(const std::function<void()>& run) {
     double best = 1e30;
     for (int i = 0; i < 15; ++i) {

@@ -1,10 +1,11 @@
-// What selection costs `spcbpt`: the share of the rendering time, of one thread, that goes into kappa (labels of light sub-paths,
-// of camera vertices, and of the prefixes and suffixes that weights ask for), into the index of the cache, and into two-stage
-// sampling.
+// The cost of selection in `spcbpt`: the share of the rendering time, of one thread, that goes into kappa (labels of
+// light sub-paths, of camera vertices, and of the prefixes and suffixes that weights ask for), into the index of the
+// cache, and into two-stage sampling.
 //
 //   selection_cost SCENE [--iterations N] [--resolution WxH] [--set key=value ...]
 //
-// Each is timed by the processor's counter around every call; what reading the counter takes is subtracted from calls and whole.
+// Every call is timed by the processor's counter; the time that reading the counter takes is subtracted from the calls
+// and from the total.
 
 #include <tbb/global_control.h>
 #include <x86intrin.h>
@@ -67,7 +68,7 @@ struct TimedConnections : SubspaceConnections<> {
     }
 };
 
-/// Cycles that an empty call seems to take, and that it really takes.
+/// Cycles that an empty call seems to take (`seen`), and that it really takes (`whole`).
 struct Overhead {
     double seen, whole;
 };
@@ -114,7 +115,7 @@ int main(int argc, char** argv) {
         {{selection, prepared, cache.connections}}, heuristic_of(chosen), cache.minimum_paths};
     const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
     const Overhead empty = overhead();
-    // The units of a job: caches as large as there.
+    // The units are those of a job, so that caches have the same size.
     const Plan plan(scene->frame(), chosen);
     const uint64_t begin = __rdtsc();
     for (const Group& group : plan.groups_for(iterations)) {

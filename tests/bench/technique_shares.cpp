@@ -1,7 +1,7 @@
-// Where an image's light and an algorithm's noise come from: for emitter hits, next event, longer connections, light tracing and
-// merging, the share of the mean that the weights give to them, and the share of the variance per iteration (of single
-// pixels, relative to their brightness, without the noisiest 0.1 %). Any algorithm of the catalog will do, unless it makes its
-// loops itself and shows no single contribution.
+// Shows where an image's light and an algorithm's noise come from: for emitter hits, next event, longer connections,
+// light tracing and merging, the share of the mean that they get by the weights, and the share of the variance per
+// iteration (of single pixels, relative to their brightness, without the noisiest 0.1 %). Works for any algorithm of
+// the catalog except those that do their own loops and show no single contributions.
 //
 //   technique_shares SCENE [--algorithms bdpt,lvcbpt,spcbpt] [--iterations N] [--seeds N] [--resolution WxH]
 //                    [--set key=value ...]
@@ -33,7 +33,7 @@ Class class_of(Technique t) {
     return kHits;
 }
 
-/// What each class adds to the image, one number per pixel.
+/// The contribution of each class to the image, one number per pixel.
 using Images = std::vector<std::vector<double>>;
 
 Images images_of(const Renderer& renderer, const Scene& scene, const RenderUnit& unit) {
@@ -101,7 +101,7 @@ int main(int argc, char** argv) {
         const Tables tables = bench::value_or_exit(make_tables(*loaded.scene, settings, {}, &training));
         const RenderUnit unit = bench::whole_frame(*loaded.scene, settings.algorithm, iterations);
         std::vector<Images> by_seed(seeds);
-        // A renderer that is watched uses one thread.
+        // A renderer that is being watched uses one thread, so that seeds run in parallel.
         fork_join(seeds, [&](size_t first, size_t last) {
             for (size_t i = first; i < last; ++i) {
                 RenderSettings own = settings;

@@ -1,6 +1,6 @@
-// Throughput of light transport alone: samples and rays per second of each algorithm on a scene, one process, a given
-// number of threads, algorithms interleaved over repetitions so that a drift of the machine hits all of them. Any algorithm of the
-// catalog will do; tables are made first and not timed.
+// Throughput of light transport alone: samples and rays per second of each algorithm on a scene, in one process with a
+// given number of threads. Algorithms alternate over the repetitions, so that a drift of the machine affects all of
+// them. Works for any algorithm of the catalog; tables are made first and not timed.
 //
 //   throughput SCENE [--algorithms path,bdpt] [--iterations N] [--repetitions N] [--threads N] [--resolution WxH]
 
@@ -50,7 +50,7 @@ int main(int argc, char** argv) {
     const double samples = double(crop.area()) * iterations;
     for (int rep = 0; rep < repetitions; ++rep)
         for (Row& row : rows) {
-            // Other camera samples each time; the light paths are those of the first.
+            // Camera samples differ in each repetition; the light paths are those of the first.
             RenderUnit unit = bench::whole_frame(*scene, row.algorithm, uint32_t(iterations));
             unit.first_iteration = uint64_t(rep) * uint64_t(iterations);
             const auto start = std::chrono::steady_clock::now();

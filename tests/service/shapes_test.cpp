@@ -353,8 +353,8 @@ TEST(WrongTables, FailTheJobWithTheReason) {
     const JobInfo info = service.wait_end(id);
     EXPECT_EQ(info.state, JobState::kFailed);
     EXPECT_NE(info.message.find("the tables " + foreign.digest.hex() +
-                                " do not serve this scene: the tables have a part 'foreign' "
-                                "that this algorithm does not read; they are another one's"),
+                                " do not fit this scene: the tables have a part 'foreign' "
+                                "that this algorithm does not read; they belong to another algorithm"),
               std::string::npos)
         << info.message;
 

@@ -9,14 +9,14 @@
 
 namespace lightloom::testing {
 
-/// Throws what the catalog has against them.
+/// Throws the catalog's error if the settings are invalid.
 inline AlgorithmSettings algorithm_of(const std::string& name, const std::map<std::string, std::string>& chosen = {}) {
     auto settings = AlgorithmSettings::parse(name, chosen);
     if (!settings.ok()) throw std::runtime_error(settings.status().message());
     return *std::move(settings);
 }
 
-/// The same with the parameter left to its default.
+/// The same settings with the default of this parameter.
 inline AlgorithmSettings without(const AlgorithmSettings& settings, const std::string& parameter) {
     auto chosen = settings.chosen_text();
     chosen.erase(parameter);

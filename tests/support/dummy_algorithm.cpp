@@ -1,7 +1,8 @@
-// An algorithm in one file with one row of the catalog: what it takes to add one. It traces paths with next event estimation, as
-// `path` does, and its weights trust next event estimation more the brighter the frame was found to be. That is of no use, but it
-// has a parameter of its own and a table of its own that it learns, and its mean is right whatever both are. A program that links
-// this file has the algorithm in its catalog, and every suite that walks the catalog tests it.
+// An algorithm in one file with one row of the catalog, which shows what it takes to add one. It traces paths with next
+// event estimation, as `path` does, and its weights trust next event estimation more the brighter the frame was found
+// to be. This serves no purpose, but the algorithm has a parameter of its own and learns a table of its own, and its
+// mean is right whatever their values. A program that links this file has the algorithm in its catalog, and every suite
+// that runs over the catalog tests it.
 
 #include <cmath>
 #include <cstring>
@@ -13,7 +14,7 @@
 namespace lightloom {
 namespace {
 
-/// What is learned: the mean of the frame.
+/// The learned table: the mean of the frame.
 struct Brightness {
     double mean = 0;
 
@@ -41,7 +42,7 @@ Status validate_brightness(const void* part, const EmitterSet&) {
 
 const TablePart Brightness::kPart{"brightness", serialize_brightness, parse_brightness, validate_brightness};
 
-/// As PathSelection, but for how much next event estimation counts.
+/// As PathSelection, except for how much next event estimation counts.
 struct TrustingSelection {
     double trust = 1;
 

@@ -28,7 +28,7 @@ inline std::vector<double> develop(const Partial& partial, const Rect& crop) {
     return image;
 }
 
-/// Settings from text, as a user would write them; throws what the catalog has against them.
+/// Settings from text, as a user would write them; throws the catalog's error if they are invalid.
 inline RenderSettings settings_of(const std::string& algorithm, const std::map<std::string, std::string>& parameters = {},
                                   uint64_t seed = 0, int max_depth = 5) {
     auto settings = AlgorithmSettings::parse(algorithm, parameters);
@@ -36,25 +36,26 @@ inline RenderSettings settings_of(const std::string& algorithm, const std::map<s
     return {*std::move(settings), seed, max_depth};
 }
 
-/// A unit of the whole frame with so many light paths per iteration.
+/// A unit of the whole frame with the given number of light paths per iteration.
 inline RenderUnit whole_frame(const Scene& scene, uint32_t iterations, uint64_t light_paths_per_iteration) {
     return {.iteration_count = iterations, .tile = scene.frame().crop, .light_path_count = iterations * light_paths_per_iteration};
 }
-/// The one that the algorithm's plan would make.
+/// The unit that the algorithm's plan would make.
 inline RenderUnit whole_frame(const Scene& scene, const AlgorithmSettings& algorithm, uint32_t iterations) {
     RenderUnit unit = whole_frame(scene, iterations, algorithm.light_paths_per_iteration(scene.frame().crop.area()));
     unit.splats_only = !algorithm.info().camera_samples;
     return unit;
 }
 
-/// Of these parameters, those that the algorithm has.
+/// Those of the parameters that the algorithm has.
 inline std::map<std::string, std::string> those_of(const std::string& algorithm, std::map<std::string, std::string> parameters) {
     const AlgorithmSettings row = settings_of(algorithm).algorithm;
     std::erase_if(parameters, [&](const auto& p) { return !row.has(p.first); });
     return parameters;
 }
 
-/// Training and caches that suit 32 x 32 pixels, for the rows of the catalog that have them; what is set already stays.
+/// Training and caches that suit 32 x 32 pixels, for the rows of the catalog that have them; parameters that are
+/// already set stay.
 inline std::map<std::string, std::string> with_small_training(const std::string& algorithm,
                                                               std::map<std::string, std::string> parameters) {
     parameters.merge(
@@ -62,15 +63,16 @@ inline std::map<std::string, std::string> with_small_training(const std::string&
     return parameters;
 }
 
-/// Whether an algorithm samples every path of a scene. `list` names, space-separated, algorithms that do; what an algorithm finds
-/// depends on the ends that it traces from, so that those which trace from the same ends as one of the list do as well.
+/// Whether an algorithm samples every path of a scene. `list` names, space-separated, algorithms that do; what an
+/// algorithm finds depends on the ends that it traces from, so that algorithms that trace from the same ends as one in
+/// the list count as well.
 inline bool complete(const AlgorithmInfo& row, const std::string& list) {
     std::istringstream words(list);
     for (std::string name; words >> name;)
         if ((*find_algorithm(name))->traces == row.traces) return true;
     return false;
 }
-/// The rows of the catalog for which that holds.
+/// The rows of the catalog that sample every path.
 inline std::vector<std::string> algorithms_of(const std::string& list) {
     std::vector<std::string> names;
     for (const AlgorithmInfo* row : catalog())
@@ -91,7 +93,7 @@ inline TrainingData trace_training(const Scene& scene, const RenderSettings& set
 /// Makes the image of one seed.
 using ImageOfSeed = std::function<std::vector<double>(uint64_t seed)>;
 
-/// What a renderer makes of one unit.
+/// The image that a renderer makes of one unit.
 inline std::vector<double> image_of(const Result<std::unique_ptr<Renderer>>& renderer, const Scene& scene, const RenderUnit& unit) {
     if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
     const Result<Partial> partial = (*renderer)->render(unit, {});
@@ -159,10 +161,10 @@ inline RegionMeans replicate(const ImageOfSeed& image, const Rect& crop, int see
     return means;
 }
 
-/// The t statistic needs means that are nearly normal, and a mean whose variance sits in rare,
-/// bright samples that no seed may have met is not. A region enters with its own test when both
-/// estimates know it to this relative standard error: over 32 seeds one replication then scatters
-/// by no more than 17 % of the mean. The regions that do not enter are tested as one.
+/// The t statistic needs means that are nearly normally distributed. A mean whose variance comes from rare, bright
+/// samples, which perhaps no seed has met, is not. A region gets a test of its own when both estimates have at most
+/// this relative standard error: over 32 seeds one replication then scatters by no more than 17 % of the mean. The
+/// other regions are tested as one.
 inline constexpr double kInformative = 0.03;
 
 /// Adds the tests of "a and b have the same mean" for the frame and its regions. False when the
@@ -186,11 +188,12 @@ inline bool compare(const RegionMeans& a, const RegionMeans& b, const std::strin
     return frame;
 }
 
-/// Light paths per iteration as production sets it.
+/// The selection with the production number of light paths per iteration.
 inline BdptSelection bdpt_selection(const Scene& scene) { return {double(scene.frame().crop.area())}; }
 
-/// Estimates of the path lengths 1 .. max_length, each from an image of its own: images of different depths share samples, so
-/// that their difference would do for some algorithms and be far noisier than the length for others. One set of tables per seed.
+/// Estimates of the path lengths 1 .. max_length, each from an image of its own: images of different depths share
+/// samples in some algorithms only, so that their difference would be far noisier than the length's own image in
+/// others. One set of tables per seed.
 inline std::vector<RegionMeans> lengths_of(const std::shared_ptr<const Scene>& scene, const std::string& name, int max_length,
                                            uint32_t iterations, int seeds, uint64_t first_seed) {
     std::vector<RegionMeans> lengths(static_cast<size_t>(max_length));

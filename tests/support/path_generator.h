@@ -17,7 +17,8 @@ inline void for_each_path(const Scene& scene, int count, int max_edges, uint64_t
     constexpr ViewDetail kDetail = ViewDetail::kSubspace;
     std::vector<PathVertex> y(size_t(max_edges) + 2), z(size_t(max_edges) + 3);
     const Rect crop = scene.frame().crop;
-    // Harsher than the default, so that weights which saw what roulette did to the path would be found out.
+    // The rule is harsher than the default, so that weights that depend on what roulette did to the path would be found
+    // out.
     const RouletteRule rule{.min_survival = 0.05f};
     WalkCounters counters;
     PathView view;

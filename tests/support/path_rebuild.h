@@ -1,6 +1,6 @@
 #pragma once
-// Rebuilds a full path under any technique through the production code: what a technique would have known had it made this
-// very path. Used to show that PathViews agree and that weights sum to one.
+// Rebuilds a full path under any technique through the production code: the result is what a technique would have known
+// if it had made this very path. This is used to show that PathViews agree and that weights sum to one.
 
 #include <optional>
 #include <vector>
@@ -14,7 +14,7 @@ namespace lightloom::testing {
 
 /// A full path: x_0 .. x_{k-1} (x_k is the lens point), and for infinite lights the direction of travel.
 struct FullPath {
-    std::vector<PathVertex> x;  ///< k vertices; x[0] may be an emitter endpoint only (its ng and emitter are valid).
+    std::vector<PathVertex> x;  ///< k vertices; x[0] may be a bare emitter endpoint (with ng and emitter).
     Vec3 lens;
     bool infinite = false;  ///< x[0] is a direction: x[0].ng is the direction of travel.
     int k() const { return int(x.size()); }
@@ -83,7 +83,7 @@ bool leave_towards(PathVertex* v, PathVertex* previous, const Vec3& w, bool delt
     return true;
 }
 
-/// The light sub-path of the first s vertices, as light tracing would have made it. Nothing if it cannot.
+/// The light sub-path of the first s vertices, as light tracing would have made it; nothing if it cannot make it.
 inline std::optional<std::vector<PathVertex>> rebuild_light(const Scene& scene, const FullPath& path, int s) {
     std::vector<PathVertex> y;
     const EmitterSet& emitters = scene.emitters();
@@ -177,8 +177,8 @@ struct Rebuilt {
     PathView view;
 };
 
-/// The path as a technique would have produced it; nothing when that technique cannot. With `weights`: as that algorithm would
-/// have, the view with what it adds.
+/// The path as a technique would have produced it; nothing when that technique cannot. With `weights`, it is as that
+/// algorithm would have produced it, and the view has what the algorithm adds.
 inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, Technique technique,
                                       const PathWeights* weights = nullptr) {
     const int k = path.k(), s = technique.s;
@@ -260,7 +260,8 @@ inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, 
     return r;
 }
 
-/// Calls visit(technique) for everything that could have made a path of k edges, whoever has such a technique.
+/// Calls visit(technique) for every technique that could have made a path of k edges, whether or not an algorithm has
+/// it.
 template <class Visit>
 void for_each_technique(int k, Visit&& visit) {
     for (int s = 0; s <= k; ++s) for_each_technique_of_split(s, k, visit);

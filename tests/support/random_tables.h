@@ -1,5 +1,6 @@
 #pragma once
-// Tables of SPCBPT that know nothing: random classifiers, random Q, random Gamma, random windows. No image may depend on them.
+// Tables of SPCBPT without any knowledge: random classifiers, random Q, random Gamma, random windows. No image's mean
+// may depend on them.
 
 #include "common/core/rng.h"
 #include "common/tables/subspace_tables.h"
@@ -35,7 +36,8 @@ inline SubspaceTree random_tree(Rng& rng, uint32_t leaves, uint32_t label_count,
     return SubspaceTree(std::move(nodes));
 }
 
-/// Valid for the emitters; labels of points on lights and of longer prefixes may coincide, which the contract of kappa allows.
+/// Tables that are valid for the emitters; labels of points on lights and of longer prefixes may coincide, which the
+/// contract of kappa allows.
 inline SubspaceTables random_tables(const EmitterSet& emitters, uint64_t seed, const RandomTableOptions& options = {}) {
     Rng rng({seed, Stage::kTraining, 77, 0});
     const auto positive = [&] { return std::exp(options.spread * (rng.uniform_double() - 0.5)); };

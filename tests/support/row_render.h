@@ -1,5 +1,5 @@
 #pragma once
-// Units of any row of the catalog, with small tables of its own where it learns.
+// Renders units of any row of the catalog, with small tables of its own if the algorithm learns.
 
 #include <cstring>
 
@@ -20,7 +20,7 @@ inline RenderUnit frame_of(const Scene& scene, const AlgorithmInfo& row, uint32_
     return whole_frame(scene, row_settings(row).algorithm, iterations);
 }
 
-/// Samples of such a row share the light sub-paths of their unit.
+/// Whether samples of the row share the light sub-paths of their unit.
 inline bool has_cache(const AlgorithmInfo& row) { return row_settings(row).algorithm.has(kCache.name); }
 
 inline Partial render(const std::shared_ptr<const Scene>& scene, const AlgorithmInfo& row, const RenderUnit& work,
@@ -32,7 +32,7 @@ inline Partial render(const std::shared_ptr<const Scene>& scene, const Algorithm
     return std::move(partial).value();
 }
 
-/// Bit for bit, counters included.
+/// Expects equal bits, counters included.
 inline void expect_identical(const Partial& a, const Partial& b, const std::string& what) {
     ASSERT_EQ(a.camera.size(), b.camera.size()) << what;
     EXPECT_EQ(std::memcmp(a.camera.data(), b.camera.data(), a.camera.size() * sizeof(double)), 0) << what;

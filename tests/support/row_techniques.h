@@ -1,5 +1,5 @@
 #pragma once
-// Which techniques a row of the catalog has, found out by asking it about paths.
+// Finds out which techniques a row of the catalog has, by asking it about paths.
 
 #include "tests/support/path_generator.h"
 #include "tests/support/table_render.h"
@@ -45,7 +45,7 @@ inline TechniqueMask mask_of(Technique t, int k) {
     return mask;
 }
 
-/// Nothing for a row that cannot be asked about single paths. `scene` has lights that can be hit.
+/// Returns no techniques for a row that cannot be asked about single paths. `scene` has lights that can be hit.
 inline RowTechniques techniques_of(const AlgorithmInfo& row, const std::shared_ptr<const Scene>& scene) {
     RowTechniques found;
     const std::string name(row.name);
@@ -66,7 +66,7 @@ inline RowTechniques techniques_of(const AlgorithmInfo& row, const std::shared_p
                     found.connect_to_light |= own.s == 1;
                     break;
                 case TechniqueKind::kLens: found.lens = true; break;
-                case TechniqueKind::kMerge: break;  // no path here is made so
+                case TechniqueKind::kMerge: break;  // no path here is made this way
             }
         },
         weights.get());

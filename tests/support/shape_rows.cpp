@@ -1,5 +1,5 @@
-// Algorithms of the shapes that the product has none of yet, as rows of the catalog: one that does its own loops, one of which all
-// light is in splats, and one that makes its state anew for every iteration. Their means are those of `bdpt`.
+// Rows of the catalog with shapes that no algorithm of the product has yet: one does its own loops, one puts all of its
+// light into splats, and one makes its state anew for every iteration. Their means are those of `bdpt`.
 
 #include "common/transport/bdpt.h"
 #include "common/transport/lvcbpt.h"
@@ -8,7 +8,7 @@
 namespace lightloom {
 namespace {
 
-/// bdpt by its own loops: rows of pixels are dealt to lanes.
+/// bdpt with loops of its own, which deal rows of pixels to lanes.
 template <class Selection>
 struct OwnedStub {
     Selection selection;
@@ -56,7 +56,7 @@ struct OwnedStub {
     }
 };
 
-/// bdpt with a pixel drawn at random for every light path: what the camera finds there is one splat as well.
+/// bdpt with a random pixel for every light path; what the camera finds there is a splat as well.
 template <class Selection>
 struct SplatStub {
     Selection selection;
@@ -117,7 +117,7 @@ Result<std::unique_ptr<Renderer>> make_pairing(const RendererRequest& r) {
 
 Result<std::unique_ptr<Renderer>> make_anew(const RendererRequest& r) {
     constexpr int kConnections = 2;
-    constexpr double kVerticesPerPath = 2.5;  // about right
+    constexpr double kVerticesPerPath = 2.5;  // approximate
     return make_unit_renderer(r, [&](auto&& select) {
         const auto selection = select(UniformSelection{double(r.light_paths_per_iteration()), kConnections / kVerticesPerPath,
                                                        TypicalSurvival(roulette_of(r.settings.algorithm))});

@@ -7,7 +7,7 @@
 
 namespace lightloom::testing {
 
-/// Grows a SceneDescription piece by piece.
+/// Builds a SceneDescription piece by piece.
 class SceneBuilder {
   public:
     SceneBuilder() {
@@ -67,7 +67,7 @@ class SceneBuilder {
         description_.spheres.push_back(std::move(s));
         return description_.spheres.back();
     }
-    /// Makes the last quad a surface that emits and is nothing else, or the last sphere.
+    /// Makes the last quad, or the last sphere, a surface that emits but that no ray meets.
     TriangleMesh& hide_quad() { return move_last(description_.meshes, description_.hidden_meshes); }
     Sphere& hide_sphere() { return move_last(description_.spheres, description_.hidden_spheres); }
     void look(const Vec3& eye, const Vec3& target, float fov) {

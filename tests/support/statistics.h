@@ -1,7 +1,7 @@
 #pragma once
-// The statistics that tests decide by: Pearson's chi-square for samplers, Student's and Welch's t
-// for means, and Sidak's correction for many tests at once. Every decision is a p-value against a
-// stated family-wise level; nothing is tuned.
+// The statistics by which tests decide: Pearson's chi-square for samplers, Student's and Welch's t for means, and
+// Sidak's correction for many tests at once. Every decision is a p-value against a stated family-wise level; nothing is
+// tuned.
 
 #include <gtest/gtest.h>
 
@@ -42,8 +42,8 @@ struct ChiSquare {
     double p_value = 1;
 };
 
-/// `expected` holds counts that sum to the number of samples. Cells expecting fewer than five are
-/// pooled in order, as the test's asymptotics ask.
+/// `expected` holds counts that sum to the number of samples. Cells that expect fewer than five are pooled in order, as
+/// the test's asymptotics require.
 inline ChiSquare chi_square_test(const std::vector<double>& observed, const std::vector<double>& expected) {
     ChiSquare r;
     double pooled_observed = 0, pooled_expected = 0;
@@ -64,8 +64,8 @@ inline ChiSquare chi_square_test(const std::vector<double>& observed, const std:
             pooled_observed = pooled_expected = 0;
         }
     }
-    // What remains expects fewer than five: exact enough by the Poisson tail when it holds far more
-    // than that.
+    // The remaining cells expect fewer than five together. If they hold far more, the Poisson tail shows clearly enough
+    // that the hypothesis is false.
     if (pooled_observed > 30) r.p_value = 0;
     r.degrees = cells - 1;
     if (r.degrees > 0 && r.p_value > 0) r.p_value = upper_gamma(0.5 * r.degrees, 0.5 * r.statistic);
@@ -76,10 +76,10 @@ using lightloom::normal_p_value;
 using lightloom::sidak;
 using lightloom::student_p_value;
 
-/// Mean of independent replications (renders with different seeds) and what is known of its error.
+/// Mean of independent replications (renders with different seeds) with an estimate of its error.
 struct Sample {
     double mean = 0;
-    double variance = 0;  ///< Of the mean, not of one replication.
+    double variance = 0;  ///< Variance of the mean, not of one replication.
     int count = 0;
 
     explicit Sample(const std::vector<double>& values) : count(int(values.size())) {

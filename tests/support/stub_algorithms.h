@@ -1,7 +1,6 @@
 #pragma once
-// Stand-ins for methods to come, made of production pieces only: they show that pairing over the whole frame, and merging
-// need no change of the core. Slow on purpose (every photon is looked at); never part of the
-// product.
+// Stand-ins for future methods, made of production pieces only. They show that pairing over the whole frame and merging
+// need no change of the core. They are slow on purpose (every photon is examined) and never part of the product.
 
 #include "common/transport/bdpt.h"
 #include "common/transport/unit_renderer.h"
@@ -36,13 +35,13 @@ struct PairingStubSelection {
     OnPath on(const PathView& view) const { return OnPath{connections.on(view), pairs}; }
 };
 
-/// What a selection without labels says of single paths.
+/// Weights of single paths by a selection without labels.
 template <class Selection>
 std::unique_ptr<PathWeights> weights_of(const Selection& selection, Heuristic heuristic = Heuristic::kBalance) {
     return std::make_unique<lightloom::detail::PlainWeights<Selection>>(selection, heuristic);
 }
 
-/// Light sub-paths of a whole frame, each as long as it went.
+/// Light sub-paths of a whole frame, each at its full length.
 using LightPool = std::vector<std::vector<PathVertex>>;
 
 inline LightPool trace_light_pool(const Scene& scene, uint64_t seed, int count, int max_edges) {
@@ -56,15 +55,15 @@ inline LightPool trace_light_pool(const Scene& scene, uint64_t seed, int count, 
     return pool;
 }
 
-/// bdpt whose light vertices come from a pool: `pairs` of its paths are connected, and with a
-/// radius all vertices merged.
+/// bdpt whose light vertices come from a pool: `pairs` of its paths are connected, and with a positive radius all
+/// vertices are merged.
 template <class Selection>
 struct PoolAlgorithm {
     Selection selection;
     const LightPool* pool;
     int pairs = 1;
     float radius = 0;        ///< 0: no merges.
-    bool add_merges = true;  ///< False: they keep their share of the weights, but their light is left out.
+    bool add_merges = true;  ///< False: merges keep their share of the weights, but their light is left out.
 
     float weight(const PathView& view, Technique own) const { return float(mis_weight(view, own, selection.on(view))); }
 

@@ -10,7 +10,7 @@
 namespace lightloom::testing {
 namespace {
 
-// ---- Merging: prepared, per iteration, weights of the unit's own.
+// ---- Merging: prepared, per iteration, with weights that depend on the unit.
 
 constexpr ParameterInfo kPhotons{"photons", 3e-4, 1e-6, 1, false, "photons' light sub-paths per pixel and iteration"};
 constexpr ParameterInfo kRadius{"radius", 0.1, 1e-3, 1, false, "radius of the first iteration, in scene units"};
@@ -31,7 +31,7 @@ struct MergingSelection {
 template <class Select>
 struct StubMerging {
     Select select;
-    MergingSelection first;  ///< Of the first iteration.
+    MergingSelection first;  ///< For the first iteration.
 
     static constexpr bool kPerIteration = true, kUnitSelection = true;
 
@@ -125,14 +125,14 @@ const AlgorithmInfo kMergingRow{
     },
 };
 
-// ---- Pairing: loops of its own.
+// ---- Pairing: has loops of its own.
 
 template <class Selection>
 struct StubPairing {
     Selection selection;
 
     void run(const UnitScope& scope, UnitSink& sink) const {
-        constexpr uint64_t kLane = 2048;  ///< Light paths or camera samples, whatever the number of threads.
+        constexpr uint64_t kLane = 2048;  ///< Light paths or camera samples per lane, whatever the number of threads.
         const RenderUnit& work = scope.work;
         const uint64_t samples = uint64_t(work.tile.area()) * work.iteration_count, paths = work.light_path_count;
         const uint64_t light_lanes = (paths + kLane - 1) / kLane, camera_lanes = (samples + kLane - 1) / kLane;
@@ -176,7 +176,7 @@ struct StubPairing {
         return y;
     }
 
-    /// Sample i: those of a pixel follow one another.
+    /// Traces sample i; the samples of a pixel follow one another.
     void trace_camera(const UnitScope& scope, uint64_t i, const std::vector<PathVertex>& y, PathVertex* z, size_t lane,
                       UnitSink& sink) const {
         const Scene& scene = scope.scene;
@@ -225,7 +225,7 @@ const AlgorithmInfo kPairingRow{
     },
 };
 
-// ---- Splats alone: per sample.
+// ---- Splats only: per sample.
 
 struct SplatSelection {
     struct OnPath : PlainTechniques {

@@ -1,16 +1,16 @@
 #pragma once
-// Three algorithms that the product does not have, one for each shape of unit, as rows of the catalog: they show that merging over
-// the whole frame, pairing within a unit, and units that only splat pass through plan, coordinator, workers and sums without any
-// code of their own there. Slow on purpose; never part of the product.
+// Three algorithms that the product does not have, one for each shape of unit, as rows of the catalog: they show that
+// merging over the whole frame, pairing within a unit, and units that only splat pass through plan, coordinator,
+// workers and sums without any code of their own there. They are slow on purpose and never part of the product.
 
 namespace lightloom::testing {
 
-/// Vertex merging with the photons of an iteration: units of the whole frame, photons anew for each iteration, and a radius that
-/// shrinks from group to group, so that the weights are the unit's own.
+/// Vertex merging with the photons of an iteration: units of the whole frame, photons anew for each iteration, and a
+/// radius that shrinks from group to group, so that the weights depend on the unit.
 inline constexpr char kStubMerging[] = "stub-merging";
-/// Every camera sub-path of a unit connected to a light sub-path of the same unit, in loops of its own.
+/// Connects every camera sub-path of a unit to a light sub-path of the same unit, in loops of its own.
 inline constexpr char kStubPairing[] = "stub-pairing";
-/// Light tracing alone: no camera samples, and what the camera sees directly is left out.
+/// Light tracing without camera samples; what the camera sees directly is missing.
 inline constexpr char kStubSplats[] = "stub-splats";
 
 /// Adds the three to the catalog; true, so that a test can call it before main().

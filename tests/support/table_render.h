@@ -1,5 +1,5 @@
 #pragma once
-// Settings and random tables of the rows of the catalog that learn, for renders that must not depend on either.
+// Settings and random tables of the rows of the catalog that learn, for renders whose means must not depend on them.
 
 #include "common/tables/subspace_tables.h"
 #include "tests/support/estimates.h"
@@ -7,8 +7,9 @@
 
 namespace lightloom::testing {
 
-/// Tables that know nothing, with all parts that the algorithm reads; empty for one that learns nothing. A part that has no random
-/// values here yet is learned from a small training set instead, which no image may depend on either.
+/// Tables without knowledge, with all parts that the algorithm reads; empty for an algorithm that learns nothing. A
+/// part for which there are no random values here yet is learned from a small training set instead, on which no image's
+/// mean may depend either.
 inline Tables random_tables_for(const AlgorithmInfo& row, const Scene& scene, uint64_t seed,
                                 const RandomTableOptions& options = {}) {
     Tables tables;
@@ -28,7 +29,7 @@ inline Tables random_tables_for(const AlgorithmInfo& row, const Scene& scene, ui
     return tables;
 }
 
-/// What a render is made with besides its tables.
+/// Options of a render besides its tables.
 struct CacheOptions {
     int connections = 3;     ///< N
     uint64_t paths = 1000;   ///< M
@@ -36,7 +37,8 @@ struct CacheOptions {
     bool ris_aware = false, correlation_aware = false;
 };
 
-/// The same for an algorithm with a light-vertex cache; those that it has no parameter for are left out.
+/// The settings for these options of an algorithm with a light-vertex cache; options for which it has no parameter are
+/// left out.
 inline RenderSettings cache_settings(const std::string& algorithm, const CacheOptions& o, int max_depth) {
     return settings_of(algorithm,
                        those_of(algorithm, {{"connections", std::to_string(o.connections)},

@@ -1,5 +1,5 @@
 #pragma once
-// Deviations of numbers that are equal but for rounding.
+// Counts deviations of numbers that should be equal except for rounding.
 
 #include <gtest/gtest.h>
 
@@ -11,10 +11,10 @@
 
 namespace lightloom::testing {
 
-/// Weights come from float densities, recomputed along directions that differ in the last bits; grazing events and refraction
-/// near the critical angle amplify that. 1e-4 must hold for nearly all paths, one per cent for all but those. A Dirac event
-/// leaves from a point beside the surface (offset_origin(), 3e-5 of a coordinate), so that seen from its neighbours it is a
-/// mirror only up to that over their distance: 1e-3.
+/// Weights come from float densities, recomputed along directions that differ in the last bits; grazing events and
+/// refraction near the critical angle amplify that. 1e-4 must hold for all but 0.2 % of the paths (`loose_share`), and
+/// 1e-2 for all but 0.02 %. A Dirac event leaves from a point beside the surface (offset_origin(), 3e-5 of a
+/// coordinate), so that seen from its neighbours it is a mirror only up to that over their distance: 1e-3.
 struct Tally {
     uint64_t count = 0, loose = 0, gross = 0;
 

@@ -164,8 +164,8 @@ inline std::shared_ptr<const Scene> textured_and_two_sided() {
     return b.build();
 }
 
-/// What a pbrt scene is made of: an object shown twice (once mirrored and stretched), a curtain with holes from a texture, a floor
-/// with an image, a rough coat over metal; seen all around.
+/// Typical parts of pbrt scenes: an object shown twice (once mirrored and stretched), a curtain with holes from a
+/// texture, a floor with an image, a rough coat over metal; the camera sees all around.
 inline std::shared_ptr<const Scene> instances_and_cutouts() {
     SceneBuilder b = cornell_builder();
     Image picture;
@@ -212,8 +212,9 @@ inline std::shared_ptr<const Scene> instances_and_cutouts() {
     return b.build();
 }
 
-/// Textures of the place in space: marble, a solid checkerboard as a colour and as the cut-outs of an object shown twice (turned
-/// and mirrored), noise in a mix of materials and of opacities that are 0 or 1, a planar mapping.
+/// Textures that depend on the position in space: marble, a solid checkerboard as a colour and as the cut-outs of an
+/// object shown twice (turned and mirrored), noise in a mix of materials and of opacities that are 0 or 1, a planar
+/// mapping.
 inline std::shared_ptr<const Scene> textures_in_space() {
     SceneBuilder b = cornell_builder();
     auto& d = b.description();
@@ -285,9 +286,9 @@ inline std::shared_ptr<const Scene> spherical_lights() {
     return b.build();
 }
 
-/// Lamps that no ray meets, hanging in front of the camera: a square that shines down, and a sphere that shines to both sides and
-/// has a ball inside of it. Lamps whose light an image gives: a screen on the wall, a sphere, and a square that no ray meets. Seen
-/// by parallel rays that start in the middle of the box.
+/// Lamps that no ray meets, hanging in front of the camera: a square that shines down, and a sphere that shines to both
+/// sides and has a ball inside of it. Lamps whose light an image gives: a screen on the wall, a sphere, and a square
+/// that no ray meets. The camera has parallel rays that start in the middle of the box.
 inline std::shared_ptr<const Scene> hidden_and_pictured_lamps() {
     SceneBuilder b = cornell_builder();
     b.description().emissions[0].radiance = {2, 2, 3};
@@ -319,7 +320,7 @@ inline std::shared_ptr<const Scene> hidden_and_pictured_lamps() {
     return b.build();
 }
 
-/// The Cornell box without what stands in it.
+/// The Cornell box without the objects in it.
 inline SceneBuilder empty_box_builder() {
     SceneBuilder b = cornell_builder();
     b.description().spheres.clear();
@@ -327,10 +328,10 @@ inline SceneBuilder empty_box_builder() {
     return b;
 }
 
-/// Shading normals tilted by displacement and normal maps: on a floor, half of a mixed wall, a coated sphere turned inside out, a
-/// sheet that scatters to both sides, and a mirrored instance with normals of its own. (No rough glass: its total reflection
-/// amplifies rounding beyond what the weight suites allow. The tilts are gentle: where they let rays enter solids, short edges
-/// between a solid's faces do the same.)
+/// Shading normals tilted by displacement and normal maps: on a floor, half of a mixed wall, a coated sphere turned
+/// inside out, a sheet that scatters to both sides, and a mirrored instance with normals of its own. (There is no rough
+/// glass, because its total reflection amplifies rounding beyond the tolerance of the weight suites. The tilts are
+/// gentle, because where they let rays enter solids, short edges between the faces of a solid amplify it, too.)
 inline std::shared_ptr<const Scene> bumped() {
     SceneBuilder b = empty_box_builder();
     SceneDescription& d = b.description();
@@ -389,8 +390,8 @@ inline std::shared_ptr<const Scene> bumped() {
     return b.build();
 }
 
-/// Diffuse surfaces inside smooth glass: a light sub-path is refracted on its way in and can be connected afterwards, so that the
-/// throughput of light prefixes has to know what a Dirac refraction does to it.
+/// Diffuse surfaces inside smooth glass: a light sub-path is refracted on its way in and can be connected afterwards,
+/// so that the throughput of light prefixes must include the effect of a Dirac refraction.
 inline std::shared_ptr<const Scene> spheres_in_glass() {
     SceneBuilder b = empty_box_builder();
     Material glass;
@@ -426,8 +427,8 @@ inline std::shared_ptr<const Scene> mixes_and_pane() {
     return b.build();
 }
 
-/// Surfaces of fractional opacity: a veil that is the same everywhere, a sphere, and a screen with a checkered opacity. Every ray
-/// decides anew whether it passes. `veil` is the opacity of all three in units of what the scene has: 0 takes them away.
+/// Surfaces of fractional opacity: a veil that is the same everywhere, a sphere, and a screen with a checkered opacity.
+/// Every ray decides anew whether it passes. `veil` scales the opacity of all three: 0 takes them away.
 inline std::shared_ptr<const Scene> translucent(float veil) {
     SceneBuilder b = cornell_builder();
     const auto opacity = [&](float value) { return b.constant(Rgb(value * veil)); };
@@ -445,8 +446,8 @@ inline std::shared_ptr<const Scene> translucent(float veil) {
 inline std::shared_ptr<const Scene> fractional_opacity() { return translucent(1); }
 inline std::shared_ptr<const Scene> fractional_opacity_taken_away() { return translucent(0); }
 
-/// A caustic: a point light behind a glass ball and beside a mirror, neither of them seen by the
-/// camera. Next event and hits never find it, light sub-paths do.
+/// A caustic: a point light behind a glass ball and beside a mirror, neither of them seen by the camera. Next event
+/// estimation and hits never find it, but light sub-paths do.
 inline std::shared_ptr<const Scene> caustic_of_a_point_light() {
     SceneBuilder b;
     const MaterialId white = b.diffuse(Rgb(0.7f));
@@ -465,8 +466,8 @@ inline std::shared_ptr<const Scene> caustic_of_a_point_light() {
     return b.build();
 }
 
-/// Diffuse surfaces that nowhere touch: 1 / d^2 is bounded between any two of them, so every
-/// technique has a finite variance even alone, without weights.
+/// Diffuse surfaces that do not touch anywhere: 1 / d^2 is bounded between any two of them, so that every technique has
+/// a finite variance even alone, without weights.
 inline SceneBuilder apart_builder() {
     SceneBuilder b;
     const MaterialId white = b.diffuse(Rgb(0.7f)), red = b.diffuse({0.7f, 0.2f, 0.1f});
@@ -498,14 +499,15 @@ struct NamedScene {
     std::shared_ptr<const Scene> (*make)();
     /// The algorithms that sample every path of the scene, space-separated.
     const char* complete;
-    /// `path` meets caustics here only by rare, bright hits: the variance that its samples show is
-    /// not the one that it has, and only paths too short for caustics (k <= 2) can be tested.
+    /// `path` meets caustics here only by rare, bright hits: the variance of its samples is not the true one, and only
+    /// paths too short for caustics (k <= 2) can be tested.
     bool caustics = false;
-    /// The same scene without its surfaces of fractional opacity. Whether a ray passes them is decided anew for every ray and is no
-    /// matter of weights, so that the other techniques of a path that came through are rebuilt where nothing is in their way.
+    /// The same scene without its surfaces of fractional opacity. Whether a ray passes them is decided anew for every
+    /// ray and does not concern the weights. Therefore the other techniques of a path that came through are rebuilt
+    /// where nothing is in their way.
     std::shared_ptr<const Scene> (*unveiled)() = nullptr;
 
-    /// Where paths of `scene`, which make() made, are rebuilt.
+    /// The scene in which paths of `scene`, which make() made, are rebuilt.
     std::shared_ptr<const Scene> stage(const std::shared_ptr<const Scene>& scene) const {
         return unveiled != nullptr ? unveiled() : scene;
     }
