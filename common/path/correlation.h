@@ -1,7 +1,7 @@
 #pragma once
-// Correlation of connections that share a sub-path [Grittmann, Georgiev and Slusallek 2021, section 4; algorithms.md 3.1]: N
-// prefixes connected to one camera vertex are N samples of the light, but one of the camera sub-path. Counting them as N in the
-// weights trusts them too much where the camera sub-path is the poor one.
+// Correlation of connections that share a sub-path [Grittmann, Georgiev and Slusallek 2021, section 3; common/path/README.md,
+// "Correlation"]: N prefixes connected to one camera vertex are N samples of the light, but one of the camera sub-path. Counting
+// them as N in the weights trusts them too much where the camera sub-path is the poor one.
 
 #include <algorithm>
 

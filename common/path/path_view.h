@@ -1,6 +1,6 @@
 #pragma once
 // PathView: everything that a weight may know about a full path x_0 (light) ... x_k (camera), the same whichever technique
-// produced the path. [algorithms.md section 0 defines C(s), A(s) and the effective densities]
+// produced the path. [common/path/README.md, "Notation" and "The weight": C(s), A(s), effective densities]
 
 #include <cstdint>
 

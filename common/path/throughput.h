@@ -1,7 +1,7 @@
 #pragma once
-// light_throughput[s], the scalar of F(s) / C(s) for every hypothetical light prefix of a full path [algorithms.md section 0]:
-// what light tracing would carry to x_{s-1}, free of Russian roulette. Methods that select light vertices in proportion to
-// it need it in their weights, whichever technique made the path.
+// light_throughput[s], the scalar of F(s) / C(s) for every hypothetical light prefix of a full path [common/path/README.md,
+// "Notation"]: what light tracing would carry to x_{s-1}, free of Russian roulette. Methods that select light vertices in
+// proportion to it need it in their weights, whichever technique made the path.
 //
 // F and C share the geometry of every edge, so their ratio is a product of BSDF values over solid-angle densities: no areas, no
 // distances, and single precision is enough for it at any scale of the scene.

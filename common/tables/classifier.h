@@ -1,6 +1,7 @@
 #pragma once
 // kappa, the classifier of sub-paths: a decision tree over the end of a sub-path. The label is a function of the end alone, so
-// that every technique gives the same prefix or suffix the same label. [Su, Li and Wang 2022, section 5.1; algorithms.md 1.4]
+// that every technique gives the same prefix or suffix the same label. [Su, Li and Wang 2022, section 6.4; common/path/README.md,
+// "Classifier"]
 
 #include <array>
 #include <cstdint>

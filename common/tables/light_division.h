@@ -1,7 +1,7 @@
 #pragma once
 // The light subspaces of prefixes of a single vertex, x_0, which lies on the light. Emitters share a fixed number of
 // cells in proportion to their power: an area light gets a grid on its surface, the environment an equal-area grid of
-// directions, and weak lights share a cell with their neighbours in the list. [Su, Li and Wang 2022, section 5.1: 20 %
+// directions, and weak lights share a cell with their neighbours in the list. [Su, Li and Wang 2022, section 7.2.1: 20 %
 // of the light subspaces]
 
 #include <cstdint>

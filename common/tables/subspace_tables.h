@@ -1,6 +1,6 @@
 #pragma once
 // The tables of SPCBPT, complete before a unit that reads them starts: kappa (two classifiers and the division of the
-// lights), Q, Gamma, and the windows of rarely hit subspaces. [Su, Li and Wang 2022; algorithms.md 1]
+// lights), Q, Gamma, and the windows of rarely hit subspaces. [Su, Li and Wang 2022; common/path/README.md, "Subspaces"]
 //
 // Light subspaces: 0 .. division.cell_count() - 1 belong to prefixes of one vertex, the rest to longer ones.
 
@@ -30,7 +30,7 @@ struct SubspaceTables {
     /// share (TrainingOptions::mix) is included.
     std::vector<float> gamma;
     /// J, light_count entries, 1 .. kMaxWindow: from how many windows of light paths a subspace takes its prefixes;
-    /// only paths of the first window are splatted. [algorithms.md 1.6]
+    /// only paths of the first window are splatted. [common/path/README.md, "Windows"]
     std::vector<uint16_t> window;
     /// Mean number of connectible light vertices (y_0 included) per light path; lvcbpt, which selects uniformly, needs
     /// it.

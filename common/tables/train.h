@@ -1,5 +1,5 @@
 #pragma once
-// Learns tables from training data: brightness of blocks, kappa, Q, Gamma, windows. [Su, Li and Wang 2022, section 5]
+// Learns tables from training data: brightness of blocks, kappa, Q, Gamma, windows. [Su, Li and Wang 2022, section 7]
 //
 // The dataset is cleaned for training only (no image is made of it). A path without a connectible edge teaches Gamma
 // nothing and is left out, as is a path whose numbers left the range of single precision (these are counted). w_X is

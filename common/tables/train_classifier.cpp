@@ -16,8 +16,8 @@ constexpr size_t kAxes = SubspaceTree::kAxes;
 constexpr double kPurity = 0.99;
 constexpr uint32_t kNodesPerSubspace = 64;
 
-/// An end as a point of a Euclidean space in which the squared distance of two ends is the distance of algorithms.md
-/// 1.3 over sigma^2: |dx|^2 / sigma^2 + (1 - n n') + k_d (1 - d d'), where 1 - n n' = |n - n'|^2 / 2 for unit vectors.
+/// An end as a point of a Euclidean space in which the squared distance of two ends is the distance of [Su, Li and Wang 2022, eq.
+/// 18] over sigma^2: |dx|^2 / sigma^2 + (1 - n n') + k_d (1 - d d'), where 1 - n n' = |n - n'|^2 / 2 for unit vectors.
 using Point = std::array<float, kAxes>;
 
 struct Space {

@@ -1,6 +1,7 @@
 #pragma once
 // Learns kappa: centroids among the ends of important sub-paths, labels by the nearest centroid, and a decision tree that
-// reproduces those labels. Deterministic for a given seed. [Su, Li and Wang 2022, section 5.1; algorithms.md 1.3, 1.4]
+// reproduces those labels. Deterministic for a given seed. [Su, Li and Wang 2022, sections 6.4 and 7.2; common/path/README.md,
+// "Classifier"]
 
 #include <cstdint>
 #include <stop_token>

@@ -45,7 +45,8 @@ class LevelProblem {
             const uint32_t i = level_.light(n.light), j = level_.eye(n.eye);
             named[j] = true;
             cells_.push_back(j * level_.light_count + i);
-            // g holds 1 / Q of the finest subspace; Gamma_IJ Q_i / Q_I is its lifted entry [algorithms.md 9.1].
+            // g holds 1 / Q of the finest subspace; Gamma_IJ Q_i / Q_I is its lifted entry [common/path/README.md, "Nested
+            // families"].
             gains_.push_back(float(double(n.g) * double(data.energy[n.light]) / energy_[i]));
         }
         for (uint32_t j = 0; j < level_.eye_count; ++j)
@@ -118,8 +119,8 @@ class LevelProblem {
             for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n) (*out)[cells_[n]] += scale * double(gains_[n]);
         }
     }
-    /// One majorise-minimise step per column: B <- sqrt(B^2 G + lambda Gbar pi^2), normalised [algorithms.md 9.2]. `g`
-    /// is working memory for a gradient.
+    /// One majorise-minimise step per column: B <- sqrt(B^2 G + lambda Gbar pi^2), normalised [common/path/README.md, "Trainer"].
+    /// `g` is working memory for a gradient.
     void improve(std::vector<float>* b, const std::vector<float>& prior, double lambda, const std::vector<uint32_t>& paths,
                  std::vector<double>* g) const {
         g->resize(b->size());

@@ -3,7 +3,7 @@
 //     loss(Gamma) = sum_X w_X / F_X,   F_X = fixed_X + sum_n g_n Gamma(i_n, j_n)     [Su, Li and Wang 2022, Eq. 14-16]
 // over the paths X of a dataset. Three trainers:
 //   mm            majorise-minimise with a prior from coarser subspaces, its strength chosen on held-out paths
-//                 [algorithms.md 9.2]
+//                 [common/path/README.md, "Trainer"]
 //   adam          stochastic gradient on softmax columns, as the paper does
 //   contribution  share of contribution, blind to the other techniques (the paper's Fig. 6 ablation)
 // All are deterministic. Gamma = (1 - mix) B + mix (uniform + Q-proportional) / 2; the loss includes the mix.

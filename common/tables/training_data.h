@@ -5,7 +5,7 @@
 //
 // A path X of technique `own` with density p_own (as traced, roulette included) and weight w_own:
 //     estimate = L(w_own f / p_own)                a sample of the image, in expectation
-//     square   = L(f / p_own)^2 w_own              c_X p_own of algorithms.md 1.1: E[square / (F / p_own)] is the loss
+//     square   = L(f / p_own)^2 w_own              E[square / (F / p_own)] is the loss [common/path/README.md, "Training set"]
 //     densities: n p / p_own of each technique, as the render's weights will count it (typical survival of roulette,
 //                corrections) but without the factor that is to be learned, N Gamma / Q; 0 where it is impossible.
 //                vertices[s].density is that of hitting the emitter (s = 0) and of connecting x_{s-1} with x_s

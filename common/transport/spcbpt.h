@@ -1,5 +1,6 @@
 #pragma once
-// `spcbpt`: subspace-based probabilistic connections [Su, Li and Wang 2022; algorithms.md 1.1 corrects Eq. 10 and 20].
+// `spcbpt`: subspace-based probabilistic connections [Su, Li and Wang 2022]. Their Eq. 10 and 20 need corrections, see
+// common/path/README.md, "Subspaces" and "Corrections of the papers".
 //
 // Light prefixes of the unit's cache lie in light subspaces i = kappa_L(prefix), camera suffixes in eye subspaces
 // j = kappa_E(suffix). Every camera vertex draws N times: i ~ Gamma(. | j), then a prefix Y of subspace i with probability

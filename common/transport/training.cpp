@@ -281,7 +281,7 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
             },
             [&](const PathContribution& found, PathView& view) {
                 // A light path may land in any pixel and a camera sample in one, hence the scale of splats
-                // (algorithms.md 0, N1).
+                // (common/path/README.md, "Training set").
                 const bool splat = found.technique.splats();
                 const uint32_t block = splat ? unit.blocks().at(int(found.film.x), int(found.film.y)) : camera_block;
                 const double weight = mis_weight(view, found.technique, generator.on(view));

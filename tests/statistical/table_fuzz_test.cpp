@@ -1,6 +1,6 @@
 // No table may change the mean of an image: random classifiers, Gamma and Q, any number of connections, caches of two paths and
 // windows all have the mean of the same scene without tables, for every row of the catalog that learns. (technique_test leaves
-// techniques out of them.) [algorithms.md 6: table fuzz, tiny M, reuse]
+// techniques out of them.) [common/path/README.md, "What would bias"]
 
 #include <gtest/gtest.h>
 
@@ -106,7 +106,8 @@ TEST(TableFuzz, RandomTablesKeepTheMean) {
     family.check();
 }
 
-/// What a normalisation by realised numbers would get wrong shows in caches of a few paths: -20 % with two [algorithms.md 1.5].
+/// What a normalisation by realised numbers would get wrong shows in caches of a few paths: some -20 % with two
+/// [common/path/README.md, "What would bias"].
 TEST(TableFuzz, TinyCachesKeepTheMean) {
     TestFamily family;
     int frames = 0, tested = 0;

@@ -14,7 +14,7 @@ namespace lightloom {
 namespace {
 
 /// Given the cache, the expected sum over the draws of scale / r is 1 / M_i for each of its prefixes, M_i the light sub-paths that
-/// subspace i may reach into: with algorithms.md 1.1 that makes the estimator the mean over the cache.
+/// subspace i may reach into: with the estimator of common/path/README.md, "Subspaces", that makes it the mean over the cache.
 TEST(Draws, AreScaledByTheirProbability) {
     const auto scene = testing::glossy();
     testing::RandomTableOptions random;

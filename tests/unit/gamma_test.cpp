@@ -16,7 +16,7 @@ double normal_deviate(Rng& rng) {
 }
 
 /// Heavy-tailed affinities without structure between `size` light and `size` eye subspaces: paths of one to three connections
-/// that light tracing in proportion to Q and a uniform choice of eye subspaces generate. [algorithms.md 9.3]
+/// that light tracing in proportion to Q and a uniform choice of eye subspaces generate. [common/path/README.md, "Trainer"]
 struct Problem {
     uint32_t size;
     std::vector<double> affinity, energy, cumulative;
@@ -93,7 +93,7 @@ TEST(Gamma, GradientEqualsFiniteDifferences) {
     }
 }
 
-/// Without a prior the step is a majorisation: the training loss never rises [algorithms.md 9.2].
+/// Without a prior the step is a majorisation: the training loss never rises [common/path/README.md, "Trainer"].
 TEST(Gamma, StepsWithoutPriorNeverRaiseTheLoss) {
     for (const size_t paths : {size_t(300), size_t(20000)}) {
         const GammaDataset data = Problem(16, 3).draw(paths, 4);

@@ -233,7 +233,7 @@ TEST(Labels, PermutedWithTheirRowsKeepEveryWeight) {
 }
 
 /// A subspace that is split, with Gamma shared in proportion to Q, has the same weights: coarse tables are among the fine ones
-/// [algorithms.md 9.1].
+/// [common/path/README.md, "Nested families"].
 TEST(Labels, SplitSubspacesWithSharedGammaKeepEveryWeight) {
     const auto scene = testing::glossy();
     const SubspaceTables tables = random_tables(scene->emitters(), 9);
