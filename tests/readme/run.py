@@ -143,7 +143,7 @@ def parse(file, lines):
 
 def tracked(root):
     """The files of the tree as they are now; without git, all that are not built."""
-    listed = subprocess.run(["git", "ls-files", "-z"], cwd=root, capture_output=True, text=True)
+    listed = subprocess.run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=root, capture_output=True, text=True)
     if listed.returncode == 0:
         return [f for f in listed.stdout.split("\0") if f and os.path.isfile(os.path.join(root, f))]
     found = []
