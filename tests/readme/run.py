@@ -6,21 +6,21 @@
     tests/readme/run.py --list                what would run, as it would run
     tests/readme/run.py --clone               on a clone that deploy/quickstart.sh has built (takes minutes)
 
-A command is a line of an indented block, or of one fenced by ```sh. Blocks fenced with another name hold no commands. A line
-that ends with a backslash goes on with the next one. The commands of one README run in one shell, in its order, from the top of
-the tree; each must succeed. A coordinator or worker (lightloom-server, lightloom-worker) is started in the background and stopped
-when the README ends. An HTML comment on the line before a block, or two before it, keeps the block from being run and says why:
+A command is a line of a block that is fenced by ```sh, or of an indented block in which some line begins with a program, a word of
+the shell or an assignment. Other indented blocks (a formula, a drawing) and blocks fenced with another name hold none; --list shows
+them. A line that ends with a backslash goes on with the next one. The commands of one README run in one shell, in its order, from
+the top of the tree, and each must succeed. A coordinator or worker is started in the background and stopped when the README ends.
+An HTML comment before a block keeps the block from being run, and says why:
 
     <!-- not run: needs a second host -->
 
-Other indented blocks (a drawing, a format) are marked in the same way by <!-- not a command -->. What is neither run nor marked fails
-the test. Long commands are shortened by RULES, and nothing else is changed.
+A block that only looks like commands is marked by <!-- not a command -->. What is neither run nor marked fails the test. Long
+commands are shortened by RULES; nothing else is changed in them.
 """
 
 import argparse
 import os
 import re
-import shlex
 import shutil
 import signal
 import socket
@@ -33,11 +33,11 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 FRONT_PAGE = "README.md"
 FRONT_PAGE_WORDS = 700
 TIMEOUT = 120  # seconds for one README
+PROGRAMS = os.environ["PATH"]  # and what --bin names
 
-# What is changed in a command before it runs: (pattern, replacement, reason). The first group that a rule looks for decides whether
-# it applies; the test shows the command as it ran.
-RENDERS = r"^(?=(?:\S+/)?lightloom (?:render|submit)\b)"
+# What is changed in a command before it runs: (pattern, replacement, reason). The test prints commands as they ran.
 RULES = [
+    (r"(?<![\w/.-])(?:\./)?scene\.pbrt\b", "tests/scenes/quickstart.pbrt", "the reader's own scene"),
     (r"--time (?:\d{2,}|[2-9])\b", "--time 1", "a time limit is a second at most"),
     (r"--cross-time \d+", "--cross-time 1", "the same for a cross-check"),
     (r"--spp (?:\d{2,}|[3-9])\b", "--spp 2", "two samples per pixel at most"),
@@ -89,6 +89,17 @@ def join_lines(file, block):
     return commands
 
 
+def is_command(line):
+    """Whether a line begins with a program, a word of the shell, or an assignment."""
+    line = line.strip()
+    if re.match(r"\w+=\S", line):
+        return True
+    word = re.split(r"[\s;|&]", line)[0]
+    if re.match(r"(?:\S*/)?lightloom(?:-\w+)?$", word) or re.match(r"(?:\./)?(?:build|deploy|tests)/\S", word):
+        return True
+    return bool(shutil.which(word, path=PROGRAMS)) or word in ("export", "for", "cd", "if", "while", "source", "(", "{")
+
+
 def is_whole(text):
     """Whether the shell would run this, rather than wait for more lines."""
     check = subprocess.run(["bash", "-n"], input=text + "\n", text=True, capture_output=True)
@@ -96,7 +107,7 @@ def is_whole(text):
 
 
 def parse(file, lines):
-    """(commands, marked, texts): what runs, how many blocks are marked with a reason, and what is wrong with the blocks."""
+    """(commands, notes, faults): what runs, [(line, why it does not run)] of other blocks, and what is wrong with any."""
     commands, marked, faults = [], [], []
     i, note, in_list = 0, None, False
     while i < len(lines):
@@ -124,10 +135,14 @@ def parse(file, lines):
                 i += 1
             if note:
                 marked.append((block[0][0], note))
-            else:
+            elif any(is_command(text) for _, text in block):
                 commands += join_lines(file, block)
+            else:
+                marked.append((block[0][0], "text"))
             note = None
             continue
+        if in_list and line.startswith("    ") and blank_before and is_command(line):
+            faults.append(f"{file}:{i + 1}: these commands belong to the list above them; write a line of text between, or a fence")
         found = NOT_RUN.search(line)
         if found:
             note = found.group(1)
@@ -250,13 +265,13 @@ def run_readme(file, commands, tree):
                                  stdout=out, stderr=subprocess.STDOUT, start_new_session=True)
         try:
             shell.wait(TIMEOUT)
+            timed_out = False
         except subprocess.TimeoutExpired:
-            pass
+            timed_out = True
         try:
-            os.killpg(shell.pid, signal.SIGKILL if shell.poll() is None else 0)
+            os.killpg(shell.pid, signal.SIGKILL)
         except ProcessLookupError:
-            pass
-        timed_out = shell.poll() is None
+            pass  # nothing is left of it, as it should be
         shell.wait()
     return report(file, commands, open(out_path, errors="replace").read(), timed_out)
 
@@ -305,6 +320,8 @@ def main():
     parser.add_argument("--list", action="store_true", help="print the commands instead of running them")
     parser.add_argument("--clone", action="store_true", help="clone the last commit and build it with deploy/quickstart.sh first")
     arguments = parser.parse_args()
+    global PROGRAMS
+    PROGRAMS += ":" + arguments.bin
     files = tracked(ROOT)
     readmes = arguments.files or sorted((f for f in files if os.path.basename(f) == "README.md"), key=lambda f: (f.count("/"), f))
     faults, plans = [], []
