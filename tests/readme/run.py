@@ -51,6 +51,16 @@ RULES = [
     (r"(?<=lightloom-server)(?!.*--(?:listen|help|version))(?= |$)", " --listen 127.0.0.1:${PORT} --status 127.0.0.1:${STATUS_PORT}",
      "the defaults may be taken by somebody else's coordinator"),
 ]
+# What no test may run, so that it has to be marked: (pattern, reason).
+NEVER = [
+    (r"(?:ctest|quickstart\.sh|test\.sh|sanitize\.sh|package\.sh|run\.py)\b", "this builds or tests for minutes"),
+    (r"cmake\b", "this configures or builds"),
+    (r"(?:xargs\b.*\s)?clang-tidy\S*", "this takes many minutes"),
+    (r"(?:sudo|su|apt|apt-get|dpkg|install-deps\.sh|systemctl)\b", "this changes the host"),
+    (r"(?:ssh|scp|rsync)\b", "this needs a second host"),
+    (r"git (?:add|checkout|commit|merge|push|reset|stash)\b", "this changes the repository"),
+    (r"(?:\$EDITOR|vi|vim|nano|emacs)(?!\w)", "this waits for a person"),
+]
 DAEMON = re.compile(r"^(?:\S*/)?lightloom-(server|worker)\b(?!.*--(?:help|version))")
 NOT_RUN = re.compile(r"<!--\s*(not run: \S.*?|not a command)\s*-->")
 MACHINE_PATH = re.compile(r"(?<![\w.:/-])/(?:work|root|home|tmp|mnt|media|Users)(?=/|\s|$)")
@@ -108,8 +118,8 @@ def is_whole(text):
 
 def parse(file, lines):
     """(commands, notes, faults): what runs, [(line, why it does not run)] of other blocks, and what is wrong with any."""
-    commands, marked, faults = [], [], []
-    i, note, in_list = 0, None, False
+    commands, notes, faults = [], [], []
+    i, note, indent = 0, None, 4  # so far is a block indented; more inside of a list
     while i < len(lines):
         line = lines[i]
         fence = re.match(r"^(\s*)(```+|~~~+)\s*([\w-]*)", line)
@@ -118,42 +128,45 @@ def parse(file, lines):
             while end < len(lines) and not lines[end].strip().startswith(fence.group(2)):
                 end += 1
             language = fence.group(3)
-            block = [(n + 1, lines[n].removeprefix(fence.group(1))) for n in range(i + 1, end)]
             if note:
-                marked.append((i + 1, note))
+                notes.append((i + 1, note))
             elif language in ("sh", "bash", "shell", "console"):
-                commands += join_lines(file, block)
+                commands += join_lines(file, [(n + 1, lines[n].removeprefix(fence.group(1))) for n in range(i + 1, end)])
             elif not language:
                 faults.append(f"{file}:{i + 1}: a fenced block without a name; write ```sh for commands, ```text for others")
+            else:
+                notes.append((i + 1, language))
             i, note = end + 1, None
             continue
-        blank_before = i == 0 or not lines[i - 1].strip() or NOT_RUN.search(lines[i - 1])
-        if line.startswith("    ") and line.strip() and blank_before and not in_list:
+        after_gap = i == 0 or not lines[i - 1].strip() or NOT_RUN.search(lines[i - 1])
+        if line.startswith(" " * indent) and line.strip() and after_gap:
             block = []
-            while i < len(lines) and (lines[i].startswith("    ") or not lines[i].strip()):
-                block.append((i + 1, lines[i][4:].rstrip()))
+            while i < len(lines) and (lines[i].startswith(" " * indent) or not lines[i].strip()):
+                block.append((i + 1, lines[i][indent:].rstrip()))
                 i += 1
             if note:
-                marked.append((block[0][0], note))
+                notes.append((block[0][0], note))
             elif any(is_command(text) for _, text in block):
                 commands += join_lines(file, block)
             else:
-                marked.append((block[0][0], "text"))
+                notes.append((block[0][0], "text"))
             note = None
             continue
-        if in_list and line.startswith("    ") and blank_before and is_command(line):
+        if line.startswith("    ") and after_gap and is_command(line):
             faults.append(f"{file}:{i + 1}: these commands belong to the list above them; write a line of text between, or a fence")
-        found = NOT_RUN.search(line)
-        if found:
+        if found := NOT_RUN.search(line):
             note = found.group(1)
         elif line.strip():
             note = None
-        if re.match(r"^\s{0,3}(?:[-*+]|\d+[.)])\s", line):
-            in_list = True
+        if item := re.match(r"^\s*(?:[-*+]|\d+[.)])\s+", line):
+            indent = len(item.group(0)) + 4
         elif line.strip() and not line.startswith(" "):
-            in_list = False
+            indent = 4
         i += 1
-    return commands, marked, faults
+    for command in commands:
+        faults += [f"{command.where()}: {why}; mark the block with <!-- not run: ... -->" for pattern, why in NEVER
+                   if re.search(r"(?:^|&&\s*|;\s*|\|\s*)(?:\S*/)?" + pattern, command.text)]
+    return commands, notes, faults
 
 
 def tracked(root):
@@ -245,12 +258,12 @@ def script_of(commands):
             out.append("wait_for_server $!" if command.daemon.group(1) == "server" else "sleep 0.1; kill -0 $!")
         else:
             out.append(text)
-        out.append("code=$?; echo \"@code $code\"; [ $code = 0 ] || exit 1")
+        out.append("code=$?; echo; echo \"@code $code $EPOCHREALTIME\"; [ $code = 0 ] || exit 1")
     return "\n".join(out) + "\n"
 
 
 def run_readme(file, commands, tree):
-    """Faults. Prints each command with its seconds."""
+    """Faults of its commands, run in one shell."""
     port, status_port = free_ports()
     logs = os.path.join(tree, "..", "logs-" + file.replace("/", "-"))
     home = os.path.join(tree, "..", "home")
@@ -282,33 +295,38 @@ def worker_fix(script):
 
 
 def report(file, commands, output, timed_out):
-    faults, current, begin, said, codes = [], None, 0.0, [], {}
+    """Faults of what the shell printed, and a line with its seconds for every command that ran."""
+    faults, current, begin, said, done = [], None, 0.0, [], 0
     for line in output.split("\n"):
-        if started := re.match(r"@run (\d+) ([\d.,]+)", line):
-            now = float(started.group(2).replace(",", "."))
-            current, begin, said = int(started.group(1)), now, []
-        elif line.startswith("@code ") and current is not None:
-            codes[current] = int(line[6:])
-            print(f"  {commands[current].where():28} {commands[current].reduced()[:150]}")
-            if codes[current] != 0:
-                faults.append(f"{commands[current].where()}: exit code {codes[current]}: {commands[current].reduced()}\n    " +
-                              "\n    ".join(said[-15:]))
-        elif line.startswith("@fault"):
-            faults.append(f"{file}: a program ended with exit code {line[7:]}\n    " + "\n    ".join(output.split("\n")[-12:]))
+        mark, *values = line.split(" ") if line.startswith("@") else ("", )
+        if mark == "@run":
+            current, begin, said = commands[int(values[0])], float(values[1].replace(",", ".")), []
+        elif mark == "@code":
+            done += 1
+            seconds = float(values[1].replace(",", ".")) - begin
+            print(f"  {current.where():28} {seconds:5.1f} s  {current.reduced()[:140]}")
+            if values[0] != "0":
+                faults.append(f"{current.where()}: exit code {values[0]}: {current.reduced()}" + quoted(said))
+        elif mark == "@fault":
+            faults.append(f"{file}: a program ended with exit code {' '.join(values)}" + quoted(output.split("\n")))
         else:
             said.append(line)
     if timed_out:
-        where = commands[current].where() if current is not None else file
-        faults.append(f"{where}: not done after {TIMEOUT} s\n    " + "\n    ".join(said[-15:]))
-    elif len(codes) < len(commands) and not faults:
-        faults.append(f"{file}: the shell ended after {len(codes)} of {len(commands)} commands\n    " + "\n    ".join(said[-15:]))
+        faults.append(f"{current.where() if current else file}: not done after {TIMEOUT} s" + quoted(said))
+    elif done < len(commands) and not faults:
+        faults.append(f"{file}: the shell ended after {done} of {len(commands)} commands" + quoted(said))
     return faults
+
+
+def quoted(lines):
+    return "".join("\n    " + line for line in [line for line in lines if line.strip()][-15:])
 
 
 def copy_tree(root, files, binaries, target):
     for file in files:
         os.makedirs(os.path.dirname(os.path.join(target, file)), exist_ok=True)
         shutil.copy2(os.path.join(root, file), os.path.join(target, file), follow_symlinks=False)
+    subprocess.run("git init -q . && git add -A", cwd=target, shell=True, capture_output=True)  # for `git ls-files` and its like
     os.makedirs(os.path.join(target, "build/release"))
     os.symlink(binaries, os.path.join(target, "build/release/bin"))
 
@@ -327,13 +345,13 @@ def main():
     faults, plans = [], []
     for file in readmes:
         lines = open(os.path.join(ROOT, file), encoding="utf-8").read().split("\n")
-        commands, marked, wrong = parse(file, lines)
+        commands, notes, wrong = parse(file, lines)
         faults += wrong + check_text(ROOT, file, lines, files)
-        plans.append((file, commands, marked))
+        plans.append((file, [] if wrong else commands, notes))
         if arguments.list:
             for command in commands:
                 print(f"{command.where():28} {command.reduced()}")
-            for line, why in marked:
+            for line, why in notes:
                 print(f"{file}:{line}: {why}")
     if not arguments.list:
         with tempfile.TemporaryDirectory(prefix="lightloom-readme-") as scratch:
@@ -341,9 +359,11 @@ def main():
             if arguments.clone:
                 subprocess.run(["git", "clone", "--quiet", ROOT, clone], check=True)
                 subprocess.run(["deploy/quickstart.sh"], cwd=clone, check=True)
-            for number, (file, commands, marked) in enumerate(plans):
+                # What READMEs run of the tests.
+                subprocess.run(["cmake", "--build", "--preset", "release"], cwd=clone, check=True)
+            for number, (file, commands, notes) in enumerate(plans):
                 begin = time.time()
-                print(f"{file}: {len(commands)} commands, {len(marked)} marked blocks")
+                print(f"{file}: {len(commands)} commands, {len(notes)} other blocks")
                 if not commands:
                     continue
                 tree = clone if arguments.clone else os.path.join(scratch, str(number), "lightloom")
