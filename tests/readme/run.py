@@ -6,11 +6,11 @@
     tests/readme/run.py --list                what would run, as it would run
     tests/readme/run.py --clone               on a clone that deploy/quickstart.sh has built (takes minutes)
 
-A command is a line of a block that is fenced by ```sh, or of an indented block in which some line begins with a program, a word of
-the shell or an assignment. Other indented blocks (a formula, a drawing) and blocks fenced with another name hold none; --list shows
-them. A line that ends with a backslash goes on with the next one. The commands of one README run in one shell, in its order, from
-the top of the tree, and each must succeed. A coordinator or worker is started in the background and stopped when the README ends.
-An HTML comment before a block keeps the block from being run, and says why:
+A command is a line of a block that is fenced by ```sh, or of an indented block in which some line begins with a program, a word
+of the shell or an assignment. Other indented blocks (a formula, a drawing) and blocks fenced with another name hold none; --list
+shows them. A line that ends with a backslash goes on with the next one. The commands of one README run in one shell, in its order,
+from the top of the tree, and each must succeed. A coordinator or worker is started in the background and stopped when the README
+ends. An HTML comment before a block keeps the block from being run, and says why:
 
     <!-- not run: needs a second host -->
 
@@ -38,18 +38,21 @@ PROGRAMS = os.environ["PATH"]  # and what --bin names
 # What is changed in a command before it runs: (pattern, replacement, reason). The test prints commands as they ran.
 RULES = [
     (r"(?<![\w/.-])(?:\./)?scene\.pbrt\b", "tests/scenes/quickstart.pbrt", "the reader's own scene"),
-    (r"--time (?:\d{2,}|[2-9])\b", "--time 1", "a time limit is a second at most"),
-    (r"--cross-time \d+", "--cross-time 1", "the same for a cross-check"),
-    (r"--spp (?:\d{2,}|[3-9])\b", "--spp 2", "two samples per pixel at most"),
+    (r"--time [\d.]+", "--time 0.5", "half a second instead of minutes"),
+    (r"--cross-time [\d.]+", "--cross-time 0.5", "the same for a cross-check"),
+    (r"--spp \d+", "--spp 1", "one sample per pixel"),
+    (r"^(?!.*--(?:spp|time|pyramid|help)\b)((?:.*[( ])?(?:\S+/)?lightloom (?:render|submit)\b)", r"\1 --spp 1",
+     "also where the scene asks for more"),
     (r"--seeds \d+", "--seeds 1", "one run of each algorithm"),
     (r"(?<=--resolution )320x180\b", "80x45", "a smaller picture"),
     (r"(?<=--resolution )160x90\b", "32x18", "a smaller picture"),
-    (r"^(?!.*--(?:spp|time|pyramid|help)\b)((?:.*[( ])?(?:\S+/)?lightloom (?:render|submit)\b)", r"\1 --spp 2", "not the scene's own 64 samples per pixel"),
-    (r"^(?!.*(?:--time|training-paths))(.*(?:-a|--algorithm) (?:spc|lvc)bpt\b)", r"\1 --set training-paths=2000", "a small training set"),
+    (r"training-paths=\d+", "training-paths=2000", "a small training set"),
+    (r"^(?!.*(?:--time|training-paths))(.*(?:-a|--algorithm) (?:spc|lvc)bpt\b)", r"\1 --set training-paths=2000",
+     "also where it is the default"),
     (r"127\.0\.0\.1:50051", "127.0.0.1:${PORT}", "a free port instead of the default"),
     (r"127\.0\.0\.1:9464", "127.0.0.1:${STATUS_PORT}", "the same for the status page"),
-    (r"(?<=lightloom-server)(?!.*--(?:listen|help|version))(?= |$)", " --listen 127.0.0.1:${PORT} --status 127.0.0.1:${STATUS_PORT}",
-     "the defaults may be taken by somebody else's coordinator"),
+    (r"(?<=lightloom-server)(?!.*--(?:listen|help|version))(?= |$)",
+     " --listen 127.0.0.1:${PORT} --status 127.0.0.1:${STATUS_PORT}", "the defaults may be somebody else's"),
 ]
 # What no test may run, so that it has to be marked: (pattern, reason).
 NEVER = [
@@ -83,7 +86,7 @@ class Command:
 
 
 def join_lines(file, block):
-    """Commands of [(number, line)]: continued lines are joined, and lines of a here-document or of an open quote stay together."""
+    """Commands of [(number, line)]: continued lines are joined, and those of a here-document or of an open quote stay together."""
     commands, open_text, begin = [], "", 0
     for number, line in block:
         if not open_text:
@@ -153,7 +156,7 @@ def parse(file, lines):
             note = None
             continue
         if line.startswith("    ") and after_gap and is_command(line):
-            faults.append(f"{file}:{i + 1}: these commands belong to the list above them; write a line of text between, or a fence")
+            faults.append(f"{file}:{i + 1}: these commands belong to the list above; write a line of text between, or a fence")
         if found := NOT_RUN.search(line):
             note = found.group(1)
         elif line.strip():
@@ -171,7 +174,8 @@ def parse(file, lines):
 
 def tracked(root):
     """The files of the tree as they are now; without git, all that are not built."""
-    listed = subprocess.run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=root, capture_output=True, text=True)
+    listed = subprocess.run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=root,
+                            capture_output=True, text=True)
     if listed.returncode == 0:
         return [f for f in listed.stdout.split("\0") if f and os.path.isfile(os.path.join(root, f))]
     found = []
@@ -268,14 +272,15 @@ def run_readme(file, commands, tree):
     logs = os.path.join(tree, "..", "logs-" + file.replace("/", "-"))
     home = os.path.join(tree, "..", "home")
     os.makedirs(logs), os.makedirs(home, exist_ok=True)
-    environment = dict(os.environ, PORT=str(port), STATUS_PORT=str(status_port), LOGS=logs, HOME=home,
-                       LIGHTLOOM_SERVER=f"127.0.0.1:{port}", PATH=os.path.join(tree, "build/release/bin") + ":" + os.environ["PATH"])
+    path = os.path.join(tree, "build/release/bin") + ":" + os.environ["PATH"]
+    environment = dict(os.environ, PORT=str(port), STATUS_PORT=str(status_port), LOGS=logs, HOME=home, PATH=path,
+                       LIGHTLOOM_SERVER=f"127.0.0.1:{port}")
     environment.pop("XDG_CACHE_HOME", None)
     out_path = os.path.join(logs, "out")
     with open(out_path, "wb") as out:
         # A session of its own, so that nothing that a README started outlives it.
-        shell = subprocess.Popen(["bash", "-c", worker_fix(script_of(commands))], cwd=tree, env=environment, stdin=subprocess.DEVNULL,
-                                 stdout=out, stderr=subprocess.STDOUT, start_new_session=True)
+        shell = subprocess.Popen(["bash", "-c", worker_fix(script_of(commands))], cwd=tree, env=environment,
+                                 stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, start_new_session=True)
         try:
             shell.wait(TIMEOUT)
             timed_out = False
