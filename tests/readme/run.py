@@ -195,15 +195,17 @@ def check_text(root, file, lines, files):
     for number, line in enumerate(lines, 1):
         if found := MACHINE_PATH.search(line):
             faults.append(f"{file}:{number}: {found.group(0)} is a path of one machine")
-        for target in LINK.findall(line):
-            path, _, anchor = target.partition("#")
-            if re.match(r"^[a-z]+:", target):
-                continue
-            place = os.path.normpath(os.path.join(os.path.dirname(file), path)) if path else file
-            if place not in known and place not in folders:
-                faults.append(f"{file}:{number}: the link {target} leads nowhere")
-            elif anchor and place.endswith(".md") and anchor not in anchors(root, place):
-                faults.append(f"{file}:{number}: {place} has no heading #{anchor}")
+    for link in LINK.finditer(text):
+        target = link.group(1)
+        path, _, anchor = target.partition("#")
+        if re.match(r"^[a-z]+:", target):
+            continue
+        where = f"{file}:{text.count(chr(10), 0, link.start()) + 1}"
+        place = os.path.normpath(os.path.join(os.path.dirname(file), path)) if path else file
+        if place not in known and place not in folders:
+            faults.append(f"{where}: the link {target} leads nowhere")
+        elif anchor and place.endswith(".md") and anchor not in anchors(root, place):
+            faults.append(f"{where}: {place} has no heading #{anchor}")
     return faults
 
 
