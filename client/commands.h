@@ -6,7 +6,7 @@
 
 namespace lightloom::client {
 
-/// Documented in the README and in `lightloom --help`.
+/// Documented in client/README.md and in `lightloom --help`.
 enum ExitCode : int {
     kSuccess = 0,
     kFailure = 1,         ///< The job or the comparison failed.

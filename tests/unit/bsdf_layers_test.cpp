@@ -5,7 +5,7 @@
 // The weight of the second needs the density with which the first would have sampled the same direction inside. pbrt (bxdfs.h,
 // LayeredBxDF::f) takes the density of the outer direction from the inner one instead, smaller by about eta^2: the weights sum
 // to more than one and its f is too bright, while its Sample_f, a plain walk, is not. This test states by how much, because
-// next events and connections, and with them the reference images, carry that factor (README, agreement with references).
+// next events and connections, and with them the reference images, carry that factor (tests/bench/README.md).
 
 #include <gtest/gtest.h>
 
