@@ -10,12 +10,13 @@ namespace lightloom::testing {
 struct RowTechniques {
     bool hit = false, next_event = false, connect = false, lens = false;
     bool connect_to_light = false;  ///< `connect` has points on lights (s = 1) as well.
+    bool next_event_later = false;  ///< `next_event` is not for the camera's first hit alone.
 
     /// Every technique of paths of k edges.
     std::vector<Technique> of_length(int k) const {
         std::vector<Technique> all;
         if (hit) all.push_back(Technique::hit());
-        if (next_event) all.push_back(Technique::next_event());
+        if (k == 2 ? next_event : next_event_later) all.push_back(Technique::next_event());
         for (int s = connect_to_light ? 1 : 2; connect && s < k; ++s) all.push_back(Technique::connect(s));
         if (lens) all.push_back(Technique::lens(k));
         return all;
@@ -24,7 +25,10 @@ struct RowTechniques {
     int bits() const { return int(hit) | int(next_event) << 1 | int(connect) << 2 | int(lens) << 3; }
     /// Whether techniques with these bits make paths of every length from two edges on, where nothing is a Dirac vertex and lights
     /// can be hit: connections of light sub-paths need three.
-    bool suffices(int bits) const { return bits & 0b1011 || (bits & 0b100 && connect_to_light); }
+    bool suffices(int bits) const {
+        if (bits & 0b1001 || (bits & 0b10 && next_event_later)) return true;
+        return bits & 0b100 && (connect_to_light || bits & 0b10);
+    }
 };
 
 inline TechniqueMask mask_of_bits(int bits) {
@@ -60,7 +64,10 @@ inline RowTechniques techniques_of(const AlgorithmInfo& row, const std::shared_p
             if (path.k() < 2 || !(weights->sigma(view, own) > 0)) return;
             switch (own.kind) {
                 case TechniqueKind::kHit: found.hit = true; break;
-                case TechniqueKind::kNextEvent: found.next_event = true; break;
+                case TechniqueKind::kNextEvent:
+                    found.next_event = true;
+                    found.next_event_later |= path.k() > 2;
+                    break;
                 case TechniqueKind::kConnect:
                     found.connect = true;
                     found.connect_to_light |= own.s == 1;

@@ -291,6 +291,7 @@ TEST_F(ImportDocument, ParametersAreAsTheTablesSay) {
         const std::string word = every ? heading[3] : heading[2];
         const Table* kinds = document.find(word);
         ASSERT_TRUE(kinds) << table.heading;
+        const int before = checked;
         for (const Row& of_kind : kinds->rows) {
             if (trimmed(of_kind.second) == "refused") continue;
             for (const std::string& kind : of_kind.names) {
@@ -304,6 +305,7 @@ TEST_F(ImportDocument, ParametersAreAsTheTablesSay) {
                     }
             }
         }
+        EXPECT_GT(checked, before) << "no table has the kind of: " << table.heading;
     }
     EXPECT_GT(checked, 300);
 }
@@ -423,6 +425,28 @@ bool is_name(const std::string& text) {
     const auto may_stand = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '.' || c == '-'; };
     return std::any_of(text.begin(), text.end(), is_letter) && std::all_of(text.begin(), text.end(), may_stand) &&
            std::isalnum(static_cast<unsigned char>(text[0]));
+}
+
+/// A kind is mentioned in several places, and has to be in a table of kinds.
+TEST_F(ImportDocument, HasEveryKindOfTheSourcesInATable) {
+    Words kinds;
+    for (const Words& words : {kBeforeWorld, kInWorld})
+        for (const std::string& word : words) {
+            const Table* table = document.find(word);
+            ASSERT_TRUE(table) << word;
+            for (const Row& row : table->rows) kinds.insert(kinds.end(), row.names.begin(), row.names.end());
+        }
+    int found = 0;
+    for (const char* file : {"shapes", "lights", "materials", "textures", "procedural", "camera", "directives"}) {
+        const std::string source = text_of(kFolder / (std::string(file) + ".cpp"));
+        for (const std::string before : {"kind == \"", "kind != \""})
+            for (size_t at = source.find(before); at != std::string::npos; at = source.find(before, at + 1), ++found) {
+                const size_t begin = at + before.size();
+                const std::string kind = source.substr(begin, source.find('"', begin) - begin);
+                EXPECT_TRUE(contains(kinds, kind)) << file << ".cpp knows the kind " << kind << "; no table has it";
+            }
+    }
+    EXPECT_GT(found, 40);
 }
 
 TEST_F(ImportDocument, HasEveryNameOfTheSources) {
