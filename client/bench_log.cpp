@@ -36,7 +36,7 @@ Json BenchRun::json() const {
     return {{"scene_digest", scene_digest},
             {"reference_digest", reference_digest},
             {"algorithm", algorithm.settings.name()},
-            {"parameters", algorithm.settings.text()},
+            {"parameters", algorithm.settings.named_text()},
             {"width", width},
             {"height", height},
             {"max_depth", max_depth},
@@ -129,7 +129,7 @@ Result<BenchWriter> BenchWriter::open(const std::string& path, bool resume) {
             if (errno == EWOULDBLOCK)
                 return failed_precondition(path + ": another bench is writing to it; wait for that one or give another name");
             if (!has_no_locks(errno)) return cannot_be_written(path, errno);
-            std::fprintf(stderr, "lightloom bench: warning: %s cannot be locked there; let no other bench write to it meanwhile\n",
+            std::fprintf(stderr, "lightloom: warning: %s cannot be locked there; let no other bench write to it meanwhile\n",
                          path.c_str());
         }
         // Who had it may have replaced it between our opening and our locking it.

@@ -146,7 +146,7 @@ int reference(ReferenceOptions& options) {
     const auto check = cross_check(scene, settings, made, checker, options.cross_time, interrupt_token());
     if (!check.ok()) return report_error(check.status());
     json["cross_check"] = {
-        {"algorithm", checker.algorithm.name()}, {"parameters", checker.algorithm.text()}, {"seed", checker.seed}};
+        {"algorithm", checker.algorithm.name()}, {"parameters", checker.algorithm.named_text()}, {"seed", checker.seed}};
     json["cross_check"].update(check->json());
     if (Status s = write_file_atomically(json_path.string(), json.dump(1) + "\n"); !s.ok()) return report_error(s);
     std::printf("cross-check by %s, %llu spp\n%s", checker_choice->label.c_str(),

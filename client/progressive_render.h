@@ -18,7 +18,7 @@
 
 namespace lightloom::client {
 
-/// An algorithm with all of its parameters, from one word of a command line: "bdpt:heuristic=1:rr-start=6".
+/// An algorithm with all of its parameters, from one word of a command line: "bdpt:heuristic=power:rr-start=6".
 struct AlgorithmChoice {
     AlgorithmSettings settings;
     std::string label;  ///< The word.

@@ -147,7 +147,7 @@ int render_pyramid(JobOptions options, const PyramidOptions& pyramid_options, ui
                      .width = frame.crop.width(),
                      .height = frame.crop.height(),
                      .max_depth = job->spec.max_depth};
-    for (const auto& [key, value] : job->spec.algorithm.chosen_text()) page.parameters.emplace_back(key, value);
+    for (const auto& [key, value] : job->spec.algorithm.chosen_named_text()) page.parameters.emplace_back(key, value);
     const Status written = write_pyramid(pyramid_options.directory, pyramid, frame, image.develop(), std::move(page));
     if (!written.ok()) return report_error(written);
     if (!options.quiet)

@@ -47,7 +47,7 @@ Json fields_json(const JobSpec& spec, const Chosen& chosen) {
         if (!chosen(Roles)) return;
         if constexpr (std::is_same_v<T, AlgorithmSettings>) {
             json[std::string(field.name)] = (spec.*field.member).name();
-            json["parameters"] = (spec.*field.member).text();
+            json["parameters"] = (spec.*field.member).named_text();
         } else {
             json[std::string(field.name)] = value_json(spec.*field.member);
         }
@@ -116,7 +116,7 @@ std::string replay_command(const JobSpec& spec, const std::string& scene, const 
     const int width = spec.frame.crop.width();
     const int x = spec.frame.crop.x0 + int(sample.pixel) % width, y = spec.frame.crop.y0 + int(sample.pixel) / width;
     std::string command = "lightloom replay " + shell_word(scene) + " --algorithm " + shell_word(spec.algorithm.name());
-    for (const auto& [key, value] : spec.algorithm.text()) command += " --set " + shell_word(key + "=" + value);
+    for (const auto& [key, value] : spec.algorithm.named_text()) command += " --set " + shell_word(key + "=" + value);
     for (size_t i = 0; i < without.size(); ++i) command += (i == 0 ? " --without " : ",") + without[i];
     command += " --seed " + std::to_string(spec.seed) + " --max-depth " + std::to_string(spec.max_depth);
     if (spec.width > 0) command += " --resolution " + std::to_string(spec.width) + "x" + std::to_string(spec.height);
@@ -181,7 +181,7 @@ std::string to_json(const Manifest& m) {
 }
 
 Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers) {
-    std::string parameters;
+    std::string parameters;  // with numbers for choices, as in the images of earlier versions: an image's bytes stay what they are
     for (const auto& [key, value] : spec.algorithm.text()) parameters += (parameters.empty() ? "" : " ") + key + "=" + value;
     ExrImage image;
     image.frame = spec.frame;

@@ -29,8 +29,14 @@ struct ParameterInfo {
     double min_value, max_value;
     bool integer;
     std::string_view help;  ///< What it does, unit, source.
-    /// Names of the values 0, 1, ... where a name says more than a number; both are understood.
+    /// Names of the values 0, 1, ... where a name says more than a number. People are shown names alone; digests, the wire and the
+    /// header of an EXR have the number, which is therefore understood as well.
     std::span<const std::string_view> choices = {};
+
+    /// A value in its range as people write it: the name of a choice, or the number.
+    std::string text_of(double value) const;
+    /// What values there are: "balance, power or maximum", "an integer from 1 to 64", "a number from 0.01 to 1".
+    std::string range() const;
 };
 
 /// What the units of an algorithm cover.
@@ -77,7 +83,7 @@ struct AlgorithmInfo {
 
 /// The rows, those of add_to_catalog() included, in the order in which users see them.
 std::span<const AlgorithmInfo* const> catalog();
-/// kNotFound, listing the known names, for an unknown algorithm.
+/// kNotFound, suggesting a near name and listing the known ones, for an unknown algorithm.
 Result<const AlgorithmInfo*> find_algorithm(std::string_view name);
 /// Adds a row of the calling program, before it uses the catalog; the row must live as long as the program. Tests use
 /// this to show that a new algorithm takes one file and one row.

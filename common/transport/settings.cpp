@@ -2,9 +2,9 @@
 
 #include <charconv>
 #include <cmath>
-#include <sstream>
 
 #include "common/core/check.h"
+#include "common/core/nearest.h"
 #include "common/path/path_view.h"
 
 namespace lightloom {
@@ -15,17 +15,20 @@ Result<double> parse_value(const AlgorithmInfo& algorithm, const ParameterInfo& 
     double v = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), v);
     bool number = error == std::errc() && end == text.data() + text.size() && std::isfinite(v);
-    std::string names;
     for (size_t c = 0; c < p.choices.size(); ++c) {
-        names += (c ? ", " : " (") + std::string(p.choices[c]);
         if (p.choices[c] == text) v = double(c), number = true;
     }
     if (number && v >= p.min_value && v <= p.max_value && !(p.integer && v != std::floor(v))) return v;
-    std::ostringstream message;
-    message << "parameter " << p.name << "=" << text << " of '" << algorithm.name << "' must be "
-            << (p.integer ? "an integer" : "a number") << " from " << p.min_value << " to " << p.max_value << names
-            << (names.empty() ? "" : ")");
-    return invalid_argument(message.str());
+    return invalid_argument("parameter " + std::string(p.name) + "=" + text + " of '" + std::string(algorithm.name) + "' must be " +
+                            p.range() + did_you_mean(text, p.choices));
+}
+
+Status unknown_parameter(const AlgorithmInfo& algorithm, const std::string& name) {
+    std::vector<std::string_view> known;
+    for (const ParameterInfo& p : algorithm.parameters) known.push_back(p.name);
+    const std::string owner(algorithm.name);
+    return invalid_argument("algorithm '" + owner + "' has no parameter '" + name + "'" + did_you_mean(name, known) +
+                            "; `lightloom algorithms " + owner + "` lists them");
 }
 
 }  // namespace
@@ -42,9 +45,7 @@ Result<AlgorithmSettings> AlgorithmSettings::parse(std::string_view name, const 
     AlgorithmSettings settings(**info);
     for (const auto& [key, text] : set) {
         const size_t i = settings.index(key);
-        if (i == settings.values_.size())
-            return invalid_argument("algorithm '" + settings.name() + "' has no parameter '" + key +
-                                    "'; `lightloom algorithms` lists them");
+        if (i == settings.values_.size()) return unknown_parameter(**info, key);
         const auto value = parse_value(**info, (*info)->parameters[i], text);
         if (!value.ok()) return value.status();
         settings.values_[i] = *value;
@@ -85,10 +86,20 @@ AlgorithmSettings AlgorithmSettings::with(std::string_view parameter, double val
 
 std::map<std::string, std::string> AlgorithmSettings::text() const { return completed().chosen_text(); }
 
-std::map<std::string, std::string> AlgorithmSettings::chosen_text() const {
+std::map<std::string, std::string> AlgorithmSettings::named_text() const { return completed().chosen_named_text(); }
+
+std::map<std::string, std::string> AlgorithmSettings::chosen_text() const { return chosen_text(false); }
+
+std::map<std::string, std::string> AlgorithmSettings::chosen_named_text() const { return chosen_text(true); }
+
+std::map<std::string, std::string> AlgorithmSettings::chosen_text(bool named) const {
     std::map<std::string, std::string> out;
     for (size_t i = 0; i < values_.size(); ++i) {
         if (!chosen_[i]) continue;
+        if (named) {
+            out[std::string(info_->parameters[i].name)] = info_->parameters[i].text_of(values_[i]);
+            continue;
+        }
         char text[64];
         const auto end = std::to_chars(text, text + sizeof text, values_[i]).ptr;
         out[std::string(info_->parameters[i].name)] = std::string(text, end);

@@ -33,9 +33,13 @@ class AlgorithmSettings {
     /// The same settings with one parameter chosen, at a value in its range.
     AlgorithmSettings with(std::string_view parameter, double value) const;
     /// All parameters with their values as canonical text, so that an image says what was rendered even where defaults applied.
+    /// Choices are numbers there, as they are in digests, on the wire and in the header of an EXR.
     std::map<std::string, std::string> text() const;
     /// The same for the chosen parameters alone; parse() makes these settings from it again.
     std::map<std::string, std::string> chosen_text() const;
+    /// text() and chosen_text() with the names of choices, as people read and write them; parse() understands these, too.
+    std::map<std::string, std::string> named_text() const;
+    std::map<std::string, std::string> chosen_named_text() const;
 
     /// N1: light paths per pixel and iteration; 0 for an algorithm that traces none.
     double light_paths_per_pixel() const { return info_->light_paths_per_pixel ? info_->light_paths_per_pixel(*this) : 0; }
@@ -48,6 +52,7 @@ class AlgorithmSettings {
 
   private:
     explicit AlgorithmSettings(const AlgorithmInfo& info);
+    std::map<std::string, std::string> chosen_text(bool named) const;
     size_t index(std::string_view parameter) const;
 
     const AlgorithmInfo* info_;

@@ -73,7 +73,7 @@ TEST_F(Bench, ACrossCheckIsStoredBesideTheReference) {
     EXPECT_EQ(check["algorithm"], "path");
     EXPECT_GE(check["rows"].size(), 12u);
     EXPECT_NE(output().find("length 2"), std::string::npos) << output();
-    same.insert(same.end(), {"--cross-check", "bdpt:heuristic=1"});
+    same.insert(same.end(), {"--cross-check", "bdpt:heuristic=power"});
     EXPECT_EQ(run(same), 2) << output();
 }
 
@@ -81,7 +81,7 @@ TEST_F(Bench, RunsAreLoggedAndResumed) {
     make_reference();
     const std::vector<std::string> arguments{"bench",        kScene,
                                              "--reference",  path("ref.exr"),
-                                             "--algorithms", "path,bdpt:heuristic=1",
+                                             "--algorithms", "path,bdpt:heuristic=power",
                                              "--seeds",      "2",
                                              "--time",       "0.15",
                                              "--slice",      "0.05",
@@ -89,7 +89,7 @@ TEST_F(Bench, RunsAreLoggedAndResumed) {
                                              "--threshold",  "20",
                                              "--out",        path("runs.jsonl")};
     ASSERT_EQ(run(arguments), 0) << output();
-    EXPECT_NE(output().find("bdpt:heuristic=1"), std::string::npos) << output();
+    EXPECT_NE(output().find("bdpt:heuristic=power"), std::string::npos) << output();
     EXPECT_NE(output().find("warning"), std::string::npos) << "the reference is bdpt's: " << output();
     const std::vector<Json> first = lines("runs.jsonl");
     std::map<std::string, std::vector<Json>> runs;
@@ -169,7 +169,7 @@ TEST_F(Bench, MistakesAreRefusedBeforeAnythingIsRendered) {
     };
     EXPECT_EQ(bench({"--algorithms", "path"}), 2) << "neither --time nor --spp";
     EXPECT_EQ(bench({"--algorithms", "no-such", "--spp", "1"}), 2);
-    EXPECT_EQ(bench({"--algorithms", "path,path:heuristic=0", "--spp", "1"}), 2);
+    EXPECT_EQ(bench({"--algorithms", "path,path:heuristic=balance", "--spp", "1"}), 2);
     EXPECT_EQ(bench({"--algorithms", "path", "--spp", "1", "--resolution", "16x16"}), 2);
     EXPECT_EQ(bench({"--algorithms", "path", "--spp", "1", "--max-depth", "1"}), 2);
     EXPECT_NE(output().find("--max-depth 8"), std::string::npos) << output();

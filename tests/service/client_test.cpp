@@ -234,8 +234,9 @@ TEST(Results, ReplayCommandsAreOneShellCommand) {
     std::string output(1000, '\0');
     output.resize(std::fread(output.data(), 1, output.size(), shell));
     EXPECT_EQ(::pclose(shell), 0);
-    EXPECT_TRUE(output.starts_with("lightloom|replay|" + scene +
-                                   "|--algorithm|path|--set|heuristic=0|--set|next-event=1|--set|rr-min=0.5|--set|rr-start=6|"))
+    EXPECT_TRUE(
+        output.starts_with("lightloom|replay|" + scene +
+                           "|--algorithm|path|--set|heuristic=balance|--set|next-event=1|--set|rr-min=0.5|--set|rr-start=6|"))
         << output;
 }
 

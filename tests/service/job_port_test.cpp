@@ -50,10 +50,10 @@ TEST(Submission, OfAnAlgorithmOrParameterThatDoesNotExistIsRefusedClearly) {
     refuses([](v1::JobSpec& s) { s.set_algorithm("no-such"); }, "no algorithm named 'no-such'; choose one of: path, ");
     refuses([](v1::JobSpec& s) { s.set_algorithm(""); }, "no algorithm named ''");
     refuses([](v1::JobSpec& s) { (*s.mutable_parameters())["light-subspaces"] = "40"; },
-            "algorithm 'bdpt' has no parameter 'light-subspaces'; `lightloom algorithms` lists them");
+            "algorithm 'bdpt' has no parameter 'light-subspaces'; `lightloom algorithms bdpt` lists them");
     refuses([](v1::JobSpec& s) { (*s.mutable_parameters())["rr-min"] = "nan"; },
             "parameter rr-min=nan of 'bdpt' must be a number from 0.01 to 1");
-    refuses([](v1::JobSpec& s) { (*s.mutable_parameters())["heuristic"] = "1.5"; }, "(balance, power, maximum)");
+    refuses([](v1::JobSpec& s) { (*s.mutable_parameters())["heuristic"] = "1.5"; }, "must be balance, power or maximum");
     EXPECT_TRUE(service.coordinator->list_jobs().empty());
     EXPECT_TRUE(submit([](v1::JobSpec& s) { (*s.mutable_parameters())["heuristic"] = "power"; }).ok()) << "a name of a choice";
     ASSERT_EQ(service.coordinator->list_jobs().size(), 1u);

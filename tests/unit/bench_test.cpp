@@ -99,15 +99,16 @@ TEST(ErrorCurve, CheckpointsGrowGeometrically) {
 }
 
 TEST(AlgorithmChoice, ParsesSettingsAndNamesMistakes) {
-    const auto choice = parse_algorithm("bdpt:rr-start=6:heuristic=1");
+    const auto choice = parse_algorithm("bdpt:rr-start=6:heuristic=power");
     ASSERT_TRUE(choice.ok()) << choice.status().message();
     EXPECT_EQ(choice->settings.name(), "bdpt");
-    EXPECT_EQ(choice->settings.text(),
-              (std::map<std::string, std::string>{{"heuristic", "1"}, {"next-event", "1"}, {"rr-min", "0.5"}, {"rr-start", "6"}}));
-    EXPECT_EQ(choice->label, "bdpt:rr-start=6:heuristic=1");
+    EXPECT_EQ(
+        choice->settings.named_text(),
+        (std::map<std::string, std::string>{{"heuristic", "power"}, {"next-event", "1"}, {"rr-min", "0.5"}, {"rr-start", "6"}}));
+    EXPECT_EQ(choice->label, "bdpt:rr-start=6:heuristic=power");
     EXPECT_TRUE(parse_algorithm("path").ok());
-    for (const char* wrong : {"", "no-such", "bdpt:", "bdpt:=1", "bdpt:heuristic", "bdpt:heuristic=9", "bdpt:no-such=1",
-                              "bdpt:heuristic=1:heuristic=2"}) {
+    for (const char* wrong : {"", "no-such", "bdpt:", "bdpt:=1", "bdpt:heuristic", "bdpt:heuristic=9", "bdpt:heuristic=powr",
+                              "bdpt:no-such=1", "bdpt:heuristic=power:heuristic=maximum"}) {
         const auto refused = parse_algorithm(wrong);
         ASSERT_FALSE(refused.ok()) << wrong;
         EXPECT_EQ(refused.status().code(), StatusCode::kInvalidArgument) << wrong;
@@ -117,7 +118,7 @@ TEST(AlgorithmChoice, ParsesSettingsAndNamesMistakes) {
 
 BenchRun some_run() {
     BenchRun run;
-    run.scene_digest = "s", run.reference_digest = "r", run.algorithm = *parse_algorithm("bdpt:heuristic=1"),
+    run.scene_digest = "s", run.reference_digest = "r", run.algorithm = *parse_algorithm("bdpt:heuristic=power"),
     run.algorithm.label = "", run.build = "b";
     run.width = 160, run.height = 90, run.max_depth = 10, run.time_limit = 60;
     return run;
@@ -127,7 +128,7 @@ TEST(BenchRun, EveryFieldEntersTheKey) {
     std::vector<BenchRun> runs(15, some_run());
     runs[1].scene_digest = "t";
     runs[2].reference_digest = "t";
-    runs[3].algorithm.settings = parse_algorithm("path:heuristic=1")->settings;
+    runs[3].algorithm.settings = parse_algorithm("path:heuristic=power")->settings;
     runs[4].algorithm.settings = runs[4].algorithm.settings.with("heuristic", 2);
     runs[5].width = 161;
     runs[6].height = 91;

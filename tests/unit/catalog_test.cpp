@@ -123,6 +123,40 @@ TEST(Settings, BadValuesAreRefusedByNameAndRange) {
     }
 }
 
+/// People are shown names; what digests and the wire read has numbers, and parse() takes both back.
+TEST(Settings, ChoicesHaveNamesForPeopleAndNumbersForDigests) {
+    const auto settings = AlgorithmSettings::parse("spcbpt", {{"heuristic", "power"}, {"trainer", "1"}, {"ris-aware", "on"}});
+    ASSERT_TRUE(settings.ok()) << settings.status().message();
+    const std::map<std::string, std::string> named{{"heuristic", "power"}, {"trainer", "adam"}, {"ris-aware", "on"}};
+    const std::map<std::string, std::string> numbers{{"heuristic", "1"}, {"trainer", "1"}, {"ris-aware", "1"}};
+    EXPECT_EQ(settings->chosen_named_text(), named);
+    EXPECT_EQ(settings->chosen_text(), numbers);
+    EXPECT_EQ(settings->named_text().at("correlation-aware"), "on");
+    EXPECT_EQ(settings->named_text().at("training-paths"), "500000");
+    EXPECT_EQ(settings->named_text().at("mix"), "0.1");
+    for (const AlgorithmInfo* row : catalog()) {
+        AlgorithmSettings all = small_settings(*row).algorithm;
+        for (const ParameterInfo& p : row->parameters) all = all.with(p.name, p.max_value);
+        const auto again = AlgorithmSettings::parse(row->name, all.named_text());
+        ASSERT_TRUE(again.ok()) << again.status().message();
+        EXPECT_EQ(*again, all.completed()) << row->name;
+    }
+}
+
+TEST(Settings, RefusalsSuggestWhatIsNear) {
+    const auto refusal = [](std::string_view name, const Parameters& parameters) {
+        return AlgorithmSettings::parse(name, parameters).status().message();
+    };
+    EXPECT_TRUE(refusal("bpdt", {}).starts_with("no algorithm named 'bpdt' (did you mean 'bdpt'?); choose one of: path, "));
+    EXPECT_EQ(refusal("bdpt", {{"heuristics", "power"}}),
+              "algorithm 'bdpt' has no parameter 'heuristics' (did you mean 'heuristic'?); `lightloom algorithms bdpt` lists them");
+    EXPECT_EQ(refusal("bdpt", {{"heuristic", "powr"}}),
+              "parameter heuristic=powr of 'bdpt' must be balance, power or maximum (did you mean 'power'?)");
+    EXPECT_EQ(refusal("bdpt", {{"heuristic", "3"}}), "parameter heuristic=3 of 'bdpt' must be balance, power or maximum");
+    EXPECT_EQ(refusal("spcbpt", {{"ris-aware", "yes"}}), "parameter ris-aware=yes of 'spcbpt' must be off or on");
+    EXPECT_EQ(refusal("bdpt", {{"rr-start", "1"}}), "parameter rr-start=1 of 'bdpt' must be an integer from 2 to 256");
+}
+
 TEST(Settings, DepthsOutOfRangeAreRefused) {
     const auto scene = testing::diffuse_box();
     for (const AlgorithmInfo* row : catalog()) {

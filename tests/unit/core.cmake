@@ -1,2 +1,3 @@
 lightloom_test(core_test LINK lt_core)
 lightloom_test(check_test LINK lt_core)
+lightloom_test(nearest_test LINK lt_core)

@@ -144,17 +144,17 @@ TEST(JobFields, TextsAreThoseOfEarlierVersions) {
     EXPECT_EQ(table_key(kIdentity, spec).hex(), key);
     EXPECT_EQ(
         manifest_spec(spec),
-        R"({"algorithm":"lvcbpt","parameters":{"cache":"500","connections":"3","heuristic":"0","light-paths":"0.3",)"
+        R"({"algorithm":"lvcbpt","parameters":{"cache":"500","connections":"3","heuristic":"balance","light-paths":"0.3",)"
         R"("next-event":"1","rr-min":"0.25","rr-start":"4","training-paths":"20000"},"seed":18446744073709551615,"max_depth":9,)"
         R"("requested_samples_per_pixel":7,"time_limit_seconds":1.5,"layers":true,"scene":"room.pbrt",)"
         R"("scene_root":"4f48f7207cebf92638debb5694e4a8677350cf88a9e98e73c6c466b6b1d43890",)"
         R"("frame":{"width":64,"height":48,"crop":[1,2,33,44]}})");
     EXPECT_EQ(
         settings_json(spec).dump(),
-        R"({"algorithm":"lvcbpt","parameters":{"cache":"500","connections":"3","heuristic":"0","light-paths":"0.3",)"
+        R"({"algorithm":"lvcbpt","parameters":{"cache":"500","connections":"3","heuristic":"balance","light-paths":"0.3",)"
         R"("next-event":"1","rr-min":"0.25","rr-start":"4","training-paths":"20000"},"seed":18446744073709551615,"max_depth":9})");
     EXPECT_EQ(replay(spec),
-              "lightloom replay room.pbrt --algorithm lvcbpt --set cache=500 --set connections=3 --set heuristic=0 "
+              "lightloom replay room.pbrt --algorithm lvcbpt --set cache=500 --set connections=3 --set heuristic=balance "
               "--set light-paths=0.3 --set next-event=1 --set rr-min=0.25 --set rr-start=4 --set training-paths=20000 --seed "
               "18446744073709551615 "
               "--max-depth 9 --resolution 64x48 --spp 7 --unit 3,1");
