@@ -140,6 +140,10 @@ int bench(BenchOptions& options) {
     if (options.scene.resolution.empty()) {
         options.scene.resolution = std::to_string(reference->frame.width) + "x" + std::to_string(reference->frame.height);
     }
+    if (const Rect& c = reference->frame.crop; c != Rect{0, 0, reference->frame.width, reference->frame.height}) {
+        options.scene.crop =
+            std::to_string(c.x0) + "," + std::to_string(c.x1) + "," + std::to_string(c.y0) + "," + std::to_string(c.y1);
+    }
     options.scene.algorithm = choices->front().settings.name();  // Runs name their own: the scene is not asked for one.
     const auto built = build_job(options.scene, options.threads, [&](const LocalScene& local) {
         std::vector<std::filesystem::path> inputs = files_of(local);

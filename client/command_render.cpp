@@ -75,7 +75,7 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, c
     const auto build_scene = [&]() -> Result<std::shared_ptr<const Scene>> {
         const std::lock_guard only_one(build_mutex);
         if (!built_scene) {
-            auto built = Scene::build(std::move(scene.imported.description), {.width = spec.width, .height = spec.height});
+            auto built = Scene::build(std::move(scene.imported.description), scene_options(spec));
             if (built.ok()) {
                 built_scene = std::shared_ptr<const Scene>(std::move(built).value());
             } else {

@@ -22,12 +22,15 @@ double seconds_since(Clock::time_point begin) { return std::chrono::duration<dou
 }  // namespace
 
 void add_scene_options(CLI::App& command, SceneOptions& options) {
-    command.add_option("--root", options.root,
-                       "Directory that holds the scene file and everything that it refers to (default: one up to three levels "
-                       "above the scene file's, or the current one if the scene file lies farther below it)");
+    command
+        .add_option("--root", options.root,
+                    "Directory that holds the scene file and everything that it refers to (default: one up to three levels "
+                    "above the scene file's, or the current one if the scene file lies farther below it)")
+        ->type_name("DIR");
     command
         .add_option("--without", options.without,
                     "Leave out what is not supported: names of " + scene_feature_names() + ", with commas between them")
+        ->type_name("NAME")
         ->delimiter(',')
         ->take_all()
         ->allow_extra_args(false)
@@ -62,7 +65,13 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
         ->allow_extra_args(false);
     command.add_option("--max-depth", options.max_depth, "Bounces; paths have up to this + 1 edges (default: the scene's)")
         ->check(whole_number_between(0, kMaxEdges - 1));
-    command.add_option("--resolution", options.resolution, "WIDTHxHEIGHT in pixels (default: the scene's)");
+    command.add_option("--resolution", options.resolution, "Pixels of the whole frame, for example 640x360 (default: the scene's)")
+        ->type_name("WxH");
+    command
+        .add_option("--crop", options.crop,
+                    "Window of the frame that is rendered, in pixels from the top left, X1 and Y1 not included "
+                    "(default: the scene's)")
+        ->type_name("X0,X1,Y0,Y1");
     command.add_option("--seed", options.seed, "Another seed makes another, independent image")
         ->capture_default_str()
         ->check(whole_number());
@@ -161,7 +170,16 @@ Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
         if (!parsed || size_t(used) != options.resolution.size() || spec.width < 1 || spec.height < 1)
             return invalid_argument("--resolution takes WIDTHxHEIGHT, for example 640x360, not \"" + options.resolution + "\"");
     }
-    const auto frame = frame_layout(scene.imported.description.film, {.width = spec.width, .height = spec.height});
+    const FilmDescription& film = scene.imported.description.film;
+    if (!options.crop.empty()) {
+        int used = 0;
+        Rect& c = spec.crop;
+        const bool parsed = std::sscanf(options.crop.c_str(), "%6d,%6d,%6d,%6d%n", &c.x0, &c.x1, &c.y0, &c.y1, &used) == 4;
+        if (!parsed || size_t(used) != options.crop.size())
+            return invalid_argument("--crop takes X0,X1,Y0,Y1 in pixels, for example 100,200,50,120, not \"" + options.crop + "\"");
+        LL_RETURN_IF_ERROR(check_crop(c, spec.width > 0 ? spec.width : film.width, spec.height > 0 ? spec.height : film.height));
+    }
+    const auto frame = frame_layout(film, scene_options(spec));
     if (!frame.ok()) return frame.status();
     spec.scene_root = scene.manifest.root();
     return spec;

@@ -32,13 +32,14 @@ struct JobOptions {
     double time_seconds = 0;
     int max_depth = -1;
     std::string resolution;  ///< "WxH" or empty.
+    std::string crop;        ///< "X0,X1,Y0,Y1" or empty.
     uint64_t seed = 0;
     std::vector<std::string> settings;  ///< "key=value"
     std::string json;
     bool quiet = false, strict = false, layers = false, half = false;
 };
 
-/// Scene, algorithm, depth, resolution, seed and parameters.
+/// Scene, algorithm, depth, resolution, crop window, seed and parameters.
 void add_render_settings(CLI::App& command, JobOptions& options);
 /// --half, --png and --exposure, for every command that writes an image.
 void add_image_settings(CLI::App& command, JobOptions& options);

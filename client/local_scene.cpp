@@ -21,7 +21,7 @@ Result<BuiltJob> build_job(const JobOptions& options, uint32_t threads, const Sc
     BuiltJob built{.spec = std::move(job->spec), .response = description.film.response};
     if (built.spec.max_depth < 0) built.spec.max_depth = description.max_depth;
     built.thread_limit = std::make_unique<const tbb::global_control>(tbb::global_control::max_allowed_parallelism, threads);
-    auto scene = Scene::build(std::move(description), {.width = built.spec.width, .height = built.spec.height});
+    auto scene = Scene::build(std::move(description), scene_options(built.spec));
     if (!scene.ok()) return scene.status();
     built.scene = std::move(scene).value();
     built.spec.frame = built.scene->frame();

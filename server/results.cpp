@@ -34,9 +34,10 @@ Json value_json(const T& value) {
 
 Json value_json(const Digest& digest) { return digest.hex(); }
 
+Json value_json(const Rect& window) { return {window.x0, window.y0, window.x1, window.y1}; }
+
 Json value_json(const FrameLayout& frame) {
-    const Rect& crop = frame.crop;
-    return {{"width", frame.width}, {"height", frame.height}, {"crop", {crop.x0, crop.y0, crop.x1, crop.y1}}};
+    return {{"width", frame.width}, {"height", frame.height}, {"crop", value_json(frame.crop)}};
 }
 
 /// The fields of a spec whose roles are among the chosen ones.
@@ -120,6 +121,10 @@ std::string replay_command(const JobSpec& spec, const std::string& scene, const 
     for (size_t i = 0; i < without.size(); ++i) command += (i == 0 ? " --without " : ",") + without[i];
     command += " --seed " + std::to_string(spec.seed) + " --max-depth " + std::to_string(spec.max_depth);
     if (spec.width > 0) command += " --resolution " + std::to_string(spec.width) + "x" + std::to_string(spec.height);
+    if (const Rect& c = spec.crop; c != Rect{}) {
+        command += " --crop " + std::to_string(c.x0) + "," + std::to_string(c.x1) + "," + std::to_string(c.y0) + "," +
+                   std::to_string(c.y1);
+    }
     if (spec.samples_per_pixel > 0) command += " --spp " + std::to_string(spec.samples_per_pixel);
     if (sample.splat) return command + " --unit " + std::to_string(dropped.unit.group) + "," + std::to_string(dropped.unit.tile);
     return command + " --iteration " + std::to_string(sample.iteration) + " --pixel " + std::to_string(x) + "," + std::to_string(y);

@@ -57,11 +57,11 @@ Result<ImportedScene> read_scene(const AssetStore& assets, const Digest& root, c
 }  // namespace
 
 Result<SceneFacts> scene_facts(const SceneDescription& description, const JobSpec& spec) {
-    const auto frame = frame_layout(description.film, {.width = spec.width, .height = spec.height});
+    const auto frame = frame_layout(description.film, scene_options(spec));
     if (!frame.ok()) return frame.status();
     SceneFacts facts{*frame, description.film.response, description.max_depth, {}, {}};
     if (spec.first_hit_layers) {
-        const auto scene = Scene::build(description, {.width = spec.width, .height = spec.height});
+        const auto scene = Scene::build(description, scene_options(spec));
         if (!scene.ok()) return scene.status();
         facts.layers = first_hit_layers(**scene, spec.seed);
     }
@@ -81,11 +81,11 @@ SceneReader make_scene_reader(std::filesystem::path scratch) {
         if (!spec.algorithm.info().learning) return facts;
         // The scene is read a second time when it is needed, while workers trace, so that no waiting job holds a scene.
         // This read does not wait for a turn, because workers wait for this job.
-        facts->build_scene = [&assets, scratch, root = spec.scene_root, width = spec.width,
-                              height = spec.height]() -> Result<std::shared_ptr<const Scene>> {
+        facts->build_scene = [&assets, scratch, root = spec.scene_root,
+                              options = scene_options(spec)]() -> Result<std::shared_ptr<const Scene>> {
             auto again = read_scene(assets, root, scratch);
             if (!again.ok()) return again.status();
-            auto built = Scene::build(std::move(again->description), {.width = width, .height = height});
+            auto built = Scene::build(std::move(again->description), options);
             if (!built.ok()) return built.status();
             return std::shared_ptr<const Scene>(std::move(built).value());
         };

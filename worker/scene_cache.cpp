@@ -106,7 +106,7 @@ Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, st
     std::error_code ignored;
     std::filesystem::remove_all(directory, ignored);
     if (!imported.ok()) return imported.status();
-    auto scene = Scene::build(std::move(imported->description), {.width = spec.width, .height = spec.height});
+    auto scene = Scene::build(std::move(imported->description), scene_options(spec));
     if (!scene.ok()) return scene.status();
     spdlog::info("scene {} built", root.hex().substr(0, 12));
     return std::shared_ptr<const Scene>(std::move(scene).value());
@@ -154,7 +154,8 @@ TableSource direct_tables(WorkerPort& port) {
 Result<std::shared_ptr<const Scene>> RendererCache::scene(const JobSpec& spec, std::stop_token stop) {
     std::shared_ptr<const Scene> scene;
     for (auto item = scene_entries_.begin(); item != scene_entries_.end(); ++item) {
-        if (item->root != spec.scene_root || item->width != spec.width || item->height != spec.height) continue;
+        if (item->root != spec.scene_root || item->width != spec.width || item->height != spec.height || item->crop != spec.crop)
+            continue;
         scene_entries_.splice(scene_entries_.begin(), scene_entries_, item);
         scene = item->scene;
         break;
@@ -163,7 +164,7 @@ Result<std::shared_ptr<const Scene>> RendererCache::scene(const JobSpec& spec, s
         auto built = scenes_(spec, stop);
         if (!built.ok()) return built.status();
         scene = *std::move(built);
-        scene_entries_.push_front({spec.scene_root, spec.width, spec.height, scene});
+        scene_entries_.push_front({spec.scene_root, spec.width, spec.height, spec.crop, scene});
         if (scene_entries_.size() > kMaxScenes) scene_entries_.pop_back();
     }
     if (scene->frame() != spec.frame)

@@ -1,6 +1,6 @@
 #pragma once
 // Where a worker's scenes and tables come from: fetched by digest into a directory that outlives the process, verified
-// whenever they are read from there, built once per scene and resolution, and kept while recent jobs need them.
+// whenever they are read from there, built once per scene, resolution and crop window, and kept while recent jobs need them.
 
 #include <filesystem>
 #include <list>
@@ -63,6 +63,7 @@ class RendererCache {
     struct SceneEntry {
         Digest root;
         int width = 0, height = 0;
+        Rect crop;
         std::shared_ptr<const Scene> scene;
     };
     struct RendererEntry {

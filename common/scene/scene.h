@@ -19,7 +19,11 @@ namespace lightloom {
 
 struct SceneOptions {
     int width = 0, height = 0;  ///< Override of the film's resolution; 0 keeps the scene's. A crop window is scaled along.
+    Rect crop = {};             ///< Window in pixels of that resolution, in place of the film's; all zeros keep the film's.
 };
+
+/// kInvalidArgument, naming the size, unless the window holds a pixel and lies in a frame of so many pixels.
+Status check_crop(const Rect& crop, int width, int height);
 
 /// The frame that a film makes with these options; kInvalidArgument if it is empty or too large.
 Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions& options);

@@ -198,6 +198,15 @@ Status Scene::find_contacts(std::vector<Emitter>* emitters, float largest) {
     return accel_->keep_apart(description_, lights, &Scene::opacity, this);
 }
 
+Status check_crop(const Rect& crop, int width, int height) {
+    if (!crop.empty() && crop.x0 >= 0 && crop.y0 >= 0 && crop.x1 <= width && crop.y1 <= height) return {};
+    const std::string window =
+        std::to_string(crop.x0) + "," + std::to_string(crop.x1) + "," + std::to_string(crop.y0) + "," + std::to_string(crop.y1);
+    const std::string w = std::to_string(width), h = std::to_string(height);
+    return invalid_argument("the crop window " + window + " (X0,X1,Y0,Y1) does not fit: the frame has " + w + " x " + h +
+                            " pixels, so 0 <= X0 < X1 <= " + w + " and 0 <= Y0 < Y1 <= " + h);
+}
+
 Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions& options) {
     if (options.width < 0 || options.height < 0 || (options.width == 0) != (options.height == 0))
         return invalid_argument("a resolution needs a positive width and height");
@@ -207,7 +216,10 @@ Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions
     if (frame.width <= 0 || frame.height <= 0 || frame.width > kMaxFrameSide || frame.height > kMaxFrameSide)
         return invalid_argument("the image resolution must lie between 1 and " + std::to_string(kMaxFrameSide) + " pixels");
     frame.crop = {0, 0, frame.width, frame.height};
-    if (film.crop[0] >= 0) {
+    if (options.crop != Rect{}) {
+        LL_RETURN_IF_ERROR(check_crop(options.crop, frame.width, frame.height));
+        frame.crop = options.crop;
+    } else if (film.crop[0] >= 0) {
         // The crop scales with an overridden resolution, rounded outwards.
         const auto scaled = [](int v, int from, int to, bool up) { return int((int64_t(v) * to + (up ? from - 1 : 0)) / from); };
         frame.crop = {scaled(film.crop[0], film.width, frame.width, false), scaled(film.crop[2], film.height, frame.height, false),

@@ -1,5 +1,6 @@
 #include "common/work/job.h"
 
+#include "common/scene/scene.h"
 #include "common/work/job_fields.h"
 
 namespace lightloom {
@@ -14,6 +15,8 @@ void append_text(std::string& out, std::string_view name, std::string_view value
 }
 
 Digest JobSpec::spec_digest() const { return sha256("lightloom-image 1\n" + fields_text<job_role::kImage>(*this)); }
+
+SceneOptions scene_options(const JobSpec& spec) { return {.width = spec.width, .height = spec.height, .crop = spec.crop}; }
 
 bool same_request(const JobSpec& a, const JobSpec& b) {
     bool same = true;

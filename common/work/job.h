@@ -16,6 +16,8 @@
 
 namespace lightloom {
 
+struct SceneOptions;
+
 /// A new field must be entered in common/work/job_fields.h, which says what it decides; it does not compile otherwise.
 struct JobSpec {
     static constexpr uint32_t kMaxSamplesPerPixel = 1u << 24;
@@ -26,6 +28,7 @@ struct JobSpec {
     double time_limit_seconds = 0;   ///< 0 when bounded by samples. Exactly one of the two is set.
     int32_t max_depth = -1;          ///< Bounces; -1: the scene's.
     int32_t width = 0, height = 0;   ///< 0: the scene's.
+    Rect crop;                       ///< Window of the frame, in its pixels; all zeros: the scene's.
     Digest scene_root;               ///< Digest of the scene's file list (asset manifest).
     FrameLayout frame;               ///< Filled from the scene when the job is accepted.
     bool first_hit_layers = false;   ///< Also write albedo, normal and depth of the first hit.
@@ -42,6 +45,9 @@ bool same_request(const JobSpec& a, const JobSpec& b);
 inline RenderSettings render_settings(const JobSpec& spec) {
     return {.algorithm = spec.algorithm, .seed = spec.seed, .max_depth = spec.max_depth};
 }
+
+/// What the scene of a job is built with.
+SceneOptions scene_options(const JobSpec& spec);
 
 enum class UnitKind : uint8_t {
     kRender,    ///< A partial of the image.

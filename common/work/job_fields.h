@@ -47,10 +47,11 @@ inline constexpr auto kJobFields = [] {
         // A replay needs no time limit: a job that it ended has a number of samples.
         job_field<kBound | kReplay>("requested_samples_per_pixel", &JobSpec::samples_per_pixel),
         job_field<kBound>("time_limit_seconds", &JobSpec::time_limit_seconds),
-        // The frame results from these two and the scene.
+        // The frame results from these three and the scene.
         job_field<kRequest | kReplay>("width", &JobSpec::width),
         job_field<kRequest | kReplay>("height", &JobSpec::height),
-        // A replay reads the scene from a path and derives the frame from the scene and the resolution.
+        job_field<kRequest | kReplay>("crop", &JobSpec::crop),
+        // A replay reads the scene from a path and derives the frame from the scene, the resolution and the crop window.
         job_field<kImage | kTables | kRequest | kManifest>("scene_root", &JobSpec::scene_root),
         job_field<kImage | kTables | kManifest>("frame", &JobSpec::frame),
         job_field<kImage | kRequest | kManifest>("layers", &JobSpec::first_hit_layers, "first-hit", "none"),

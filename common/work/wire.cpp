@@ -148,6 +148,7 @@ void put(const JobSpec& in, v1::JobSpec* out) {
     out->set_max_depth(in.max_depth);
     out->set_width(in.width);
     out->set_height(in.height);
+    if (in.crop != Rect{}) put_rect(in.crop, out->mutable_crop());
     put(in.scene_root, out->mutable_scene_root());
     out->mutable_frame()->set_width(in.frame.width);
     out->mutable_frame()->set_height(in.frame.height);
@@ -167,6 +168,7 @@ Result<JobSpec> get_rest(const v1::JobSpec& in) {
     spec.max_depth = in.max_depth();
     spec.width = in.width();
     spec.height = in.height();
+    spec.crop = get_rect(in.crop());
     auto root = get(in.scene_root());
     if (!root.ok()) return root.status();
     spec.scene_root = *root;

@@ -33,6 +33,7 @@ JobSpec full_spec() {
     spec.max_depth = 9;
     spec.width = 64;
     spec.height = 48;
+    spec.crop = {1, 2, 33, 44};
     spec.scene_root = sha256("scene");
     spec.frame = {64, 48, {1, 2, 33, 44}};
     spec.first_hit_layers = true;
@@ -60,6 +61,11 @@ std::array<bool, 1> others(bool value) { return {!value}; }
 std::vector<Digest> others(Digest value) {
     value.bytes[31] ^= 1;
     return {value};
+}
+std::vector<Rect> others(const Rect& value) {
+    std::vector<Rect> windows(4, value);
+    ++windows[0].x0, ++windows[1].y0, ++windows[2].x1, ++windows[3].y1;
+    return windows;
 }
 std::vector<FrameLayout> others(const FrameLayout& value) {
     std::vector<FrameLayout> frames(6, value);
@@ -157,7 +163,7 @@ TEST(JobFields, TextsAreThoseOfEarlierVersions) {
               "lightloom replay room.pbrt --algorithm lvcbpt --set cache=500 --set connections=3 --set heuristic=balance "
               "--set light-paths=0.3 --set next-event=1 --set rr-min=0.25 --set rr-start=4 --set training-paths=20000 --seed "
               "18446744073709551615 "
-              "--max-depth 9 --resolution 64x48 --spp 7 --unit 3,1");
+              "--max-depth 9 --resolution 64x48 --crop 1,33,2,44 --spp 7 --unit 3,1");
     spec.first_hit_layers = false;
     EXPECT_EQ(spec.spec_digest().hex(), "ffc9b264aeb53e6c5b84b30e7a77030498bfc97d718e5e40a95311a1a7743127");
     EXPECT_EQ(table_key(kIdentity, spec).hex(), key) << "tables know nothing of layers";
