@@ -23,9 +23,9 @@ namespace lightloom::client {
 namespace {
 
 constexpr const char* kFooter = R"(Examples:
-  lightloom bench room.pbrt --reference room-ref.exr --algorithms path,bdpt --time 60 --out room.jsonl
-  lightloom bench room.pbrt --reference room-ref.exr --algorithms bdpt,bdpt:heuristic=1 --time 900 --threshold 12 \
-      --stop-at-threshold 10 --threads 2 --out room.jsonl --resume
+  lightloom bench room.pbrt --reference room-ref.exr --algorithms path,bdpt --time 60 -o room.jsonl
+  lightloom bench room.pbrt --reference room-ref.exr --algorithms bdpt,bdpt:heuristic=power --time 900 --threshold 12 \
+      --stop-at-threshold 10 -t 2 -o room.jsonl --resume
 
 FILE gets one JSON line per checkpoint (iterations 1, 2, 3, 4, 5, 7, 9, 12, ... at the ends of groups) with MAPE, relMSE,
 seconds and rays, and a last line per run with "done": true: where the MAPE fell to the threshold for good (a straight
@@ -158,7 +158,7 @@ int bench(BenchOptions& options) {
     const auto warnings =
         check_reference(options.reference, *reference, {frame, max_depth, scene_digest, *choices, options.threshold});
     if (!warnings.ok()) return report_error(warnings.status());
-    for (const std::string& warning : *warnings) std::fprintf(stderr, "lightloom bench: warning: %s\n", warning.c_str());
+    for (const std::string& warning : *warnings) std::fprintf(stderr, "lightloom: warning: %s\n", warning.c_str());
 
     std::vector<BenchRun> runs;
     std::set<std::string> keys;
@@ -190,7 +190,7 @@ int bench(BenchOptions& options) {
         const auto preparation = prepare(*scene, settings, interrupt_token());
         if (!preparation.ok()) return report_error(preparation.status());
         if (!preparation->note.empty())
-            std::fprintf(stderr, "lightloom bench: warning: %s: %s\n", run.algorithm.label.c_str(), preparation->note.c_str());
+            std::fprintf(stderr, "lightloom: warning: %s: %s\n", run.algorithm.label.c_str(), preparation->note.c_str());
         auto render = ProgressiveRender::start(scene, settings, *preparation);
         if (!render.ok()) return report_error(render.status());
         Json line{{"run", run.key()},
@@ -218,42 +218,55 @@ void add_bench_command(CLI::App& app, int* exit_code) {
     auto options = std::make_shared<BenchOptions>();
     CLI::App* command = app.add_subcommand("bench", "Measure how soon algorithms come near a reference image");
     command->footer(kFooter);
-    command->add_option("SCENE", options->scene.scene, "pbrt-v4 scene file")->required();
+    command->add_option("SCENE", options->scene.scene, "pbrt-v4 scene file")->type_name("FILE")->required();
     add_scene_options(*command, options->scene.reading);
-    command->add_option("--reference", options->reference, "EXR that the runs are compared with")->required();
+    command->add_option("--reference", options->reference, "EXR that the runs are compared with; they render its crop window")
+        ->type_name("FILE")
+        ->required();
     command
         ->add_option("--algorithms", options->algorithms,
-                     "NAME[:KEY=VALUE]..., comma separated; the first is what the others' ratios refer to")
+                     "What is measured, with commas between them; the first is what the others' ratios refer to")
+        ->type_name("NAME[:KEY=VALUE]...")
         ->delimiter(',')
         ->required();
-    command->add_option("--out", options->out, "JSON lines to write")->required()->type_name("FILE");
+    command->add_option("-o,--output,--out", options->out, "JSON lines to write")->required()->type_name("FILE");
     command->add_flag("--resume", options->resume, "Skip the runs that FILE holds to the end; start the others again");
-    auto* time =
-        command->add_option("--time", options->time, "Seconds that a run may take")->check(number_between(0.001, 30 * 86400.0));
-    auto* spp = command->add_option("--spp", options->spp, "Iterations (samples per pixel) that a run may take")
+    auto* time = command->add_option("--time", options->time, "Seconds that a run may take; --time or --spp is needed")
+                     ->type_name("SECONDS")
+                     ->check(number_between(0.001, 30 * 86400.0));
+    auto* spp = command->add_option("--spp", options->spp, "Samples per pixel (iterations) that a run may take")
+                    ->type_name("N")
                     ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
-    command->add_option("--seeds", options->seeds, "Runs of each algorithm")
+    command->add_option("--seeds", options->seeds, "Runs of each algorithm, with as many seeds")
+        ->type_name("N")
         ->capture_default_str()
         ->check(whole_number_between(1, 1000));
-    command->add_option("--seed", options->scene.seed, "The first run's; the others follow it")
+    command->add_option("--seed", options->scene.seed, "Seed of the first run; the others have the next ones")
+        ->type_name("N")
         ->capture_default_str()
         ->check(whole_number());
     command->add_option("--threshold", options->threshold, "MAPE in percent at which time is taken")
+        ->type_name("PERCENT")
         ->capture_default_str()
         ->check(number_between(1e-6, 1e6));
     command
         ->add_option("--stop-at-threshold", options->stop_after,
-                     "End a run at the first checkpoint at or below the threshold after SECONDS")
+                     "End a run at the first checkpoint at or below the threshold after SECONDS (default: runs use their time up)")
         ->type_name("SECONDS")
         ->check(number_between(0, 30 * 86400.0));
-    command->add_option("--resolution", options->scene.resolution, "WIDTHxHEIGHT in pixels (default: the reference's)");
-    command->add_option("--max-depth", options->scene.max_depth, "Bounces (default: the scene's)")
+    command
+        ->add_option("--resolution", options->scene.resolution,
+                     "Pixels of the whole frame, for example 640x360 (default: the reference's)")
+        ->type_name("WxH");
+    command->add_option("--max-depth", options->scene.max_depth, "Bounces; paths have up to this + 1 edges (default: the scene's)")
+        ->type_name("N")
         ->check(whole_number_between(0, kMaxEdges - 1));
     add_threads_option(*command, options->threads);
     command->add_option("--slice", options->slice, "Seconds that a run gets before the next one's turn")
+        ->type_name("SECONDS")
         ->capture_default_str()
         ->check(number_between(0.001, 86400.0));
-    command->add_flag("-q,--quiet", options->scene.quiet, "The table and errors only");
+    command->add_flag("-q,--quiet", options->scene.quiet, "Print the table and errors only");
     command->callback([options, time, spp, exit_code] {
         if (time->count() + spp->count() == 0) throw CLI::RequiredError("--time or --spp");
         *exit_code = bench(*options);

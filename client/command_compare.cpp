@@ -18,6 +18,13 @@ namespace lightloom::client {
 
 namespace {
 
+constexpr const char* kFooter = R"(Examples:
+  lightloom compare room.exr room-ref.exr
+  lightloom compare room.exr room-ref.exr -o error.png --regions 3x3
+  lightloom compare room.exr room-ref.exr --json              the metrics as JSON, and nothing else
+
+Exit code 0 if the images could be compared, 2 if a file cannot be read or the frames differ.)";
+
 struct CompareOptions {
     std::string image, reference, json, heat, regions;
     bool json_wanted = false;
@@ -31,7 +38,7 @@ struct Comparison {
 };
 
 int refuse(const Status& status) {
-    std::fprintf(stderr, "lightloom compare: %s\n", status.message().c_str());
+    std::fprintf(stderr, "lightloom: %s\n", status.message().c_str());
     return kUsage;
 }
 
@@ -139,7 +146,7 @@ int run(const CompareOptions& options) {
         if (!written.ok()) return refuse(written);
     }
     if (!comparison->warning.empty()) {
-        std::fprintf(stderr, "lightloom compare: warning: %s\n", comparison->warning.c_str());
+        std::fprintf(stderr, "lightloom: warning: %s\n", comparison->warning.c_str());
     }
     const bool json_to_stdout = options.json_wanted && options.json.empty();
     if (options.json_wanted) {
@@ -159,8 +166,8 @@ int run(const CompareOptions& options) {
 void add_compare_command(CLI::App& app, int* exit_code) {
     auto options = std::make_shared<CompareOptions>();
     CLI::App* command = app.add_subcommand("compare", "Measure how far an EXR image is from a reference of the same frame");
-    command->add_option("image", options->image, "Image to judge (EXR)")->required();
-    command->add_option("reference", options->reference, "Reference (EXR)")->required();
+    command->add_option("IMAGE", options->image, "EXR to judge")->type_name("FILE")->required();
+    command->add_option("REFERENCE", options->reference, "EXR to measure it by, of the same frame")->type_name("FILE")->required();
     CLI::Option* json = command
                             ->add_option("--json", options->json,
                                          "Write the metrics as JSON to FILE, or to standard output instead of the table if no FILE "
@@ -168,18 +175,20 @@ void add_compare_command(CLI::App& app, int* exit_code) {
                             ->type_name("[FILE]")
                             ->expected(0, 1);
     command
-        ->add_option("--heat", options->heat,
-                     "Write the signed relative error as PNG: blue where the image is darker, red where it is brighter")
-        ->type_name("PNG");
+        ->add_option("-o,--output,--heat", options->heat,
+                     "Also write the signed relative error as a PNG: blue where the image is darker, red where it is brighter")
+        ->type_name("FILE");
     command->add_option("--heat-range", options->heat_range, "Relative error that gets the full colour")
+        ->type_name("X")
         ->capture_default_str()
         ->check(number_between(1e-6, 1e6));
-    command->add_option("--trim", options->trim_percent, "Percentage of the largest terms that the trimmed relMSE drops")
+    command->add_option("--trim", options->trim_percent, "Share of the largest terms that the trimmed relMSE leaves out")
+        ->type_name("PERCENT")
         ->capture_default_str()
         ->check(number_between(0.0, 99.9));
     command->add_option("--regions", options->regions, "Also print the mean ratio of every cell of a grid, for example 3x3")
         ->type_name("CxR");
-    command->footer("Exit code 0 if the images could be compared, 2 if a file cannot be read or the frames differ.");
+    command->footer(kFooter);
     command->callback([options, json, exit_code] {
         options->json_wanted = json->count() > 0;
         *exit_code = run(*options);

@@ -22,6 +22,13 @@
 namespace lightloom::client {
 namespace {
 
+constexpr const char* kFooter = R"(Examples:
+  lightloom inspect room.pbrt
+  lightloom inspect room.pbrt --why           everything that stops the file, if something does
+  lightloom inspect room.pbrt -q -o room.json
+
+Exit code 0 if the scene can be rendered, 2 if it cannot, or if --strict is given and something is ignored.)";
+
 struct Options {
     std::string scene, json, tables, draw;
     SceneOptions reading;
@@ -159,7 +166,7 @@ int run(const Options& options) {
     const auto begin = std::chrono::steady_clock::now();
     Result<ImportedScene> imported = import_pbrt(options.scene, import_options);
     if (!imported.ok()) {
-        std::fprintf(stderr, "%s\n", imported.status().message().c_str());
+        (void)report_error(imported.status());
         return kUsage;
     }
     std::vector<std::filesystem::path> inputs{options.tables};
@@ -172,7 +179,7 @@ int run(const Options& options) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     const Result<std::unique_ptr<Scene>> scene = Scene::build(std::move(imported->description));
     if (!scene.ok()) {
-        std::fprintf(stderr, "%s\n", scene.status().message().c_str());
+        (void)report_error(scene.status());
         return kUsage;
     }
     const SceneDescription& description = (*scene)->description();
@@ -202,21 +209,25 @@ void add_inspect_command(CLI::App& app, int* exit_code) {
     CLI::App* command = app.add_subcommand("inspect",
                                            "Show what a scene holds: geometry, lights with their power, materials, textures, "
                                            "memory, and everything in the file that is ignored");
-    command->add_option("scene", options->scene, "The .pbrt file")->required();
+    command->add_option("SCENE", options->scene, "pbrt-v4 scene file")->type_name("FILE")->required();
     command->add_flag("--why", options->why,
                       "List everything that stops the file, not only the first fault, and exit with 2 if anything does");
     add_scene_options(*command, options->reading);
-    command->add_option("--json", options->json, "Write the same as JSON to this file");
-    auto* tables = command->add_option("--tables", options->tables,
-                                       "Also show the learned tables in this file: KEY.tables of a table cache, KEY being "
-                                       "tables.cache_key of a manifest");
+    command->add_option("-o,--output,--json", options->json, "Write the same as JSON to FILE")->type_name("FILE");
+    auto* tables = command
+                       ->add_option("--tables", options->tables,
+                                    "Also show the learned tables in this file: KEY.tables of a table cache, KEY being "
+                                    "tables.cache_key of a manifest")
+                       ->type_name("FILE");
     command
         ->add_option("--draw", options->draw,
                      "Write PREFIX-kappa-eye.png, -kappa-light.png, -gamma.png and -q.png: subspaces of what the camera sees, "
                      "connection matrix, energies")
+        ->type_name("PREFIX")
         ->needs(tables);
-    command->add_flag("--strict", options->strict, "Treat every ignored thing as an error");
-    command->add_flag("--quiet", options->quiet, "Print nothing on success");
+    command->add_flag("--strict", options->strict, "Take everything that is ignored for an error");
+    command->add_flag("-q,--quiet", options->quiet, "Print nothing on success");
+    command->footer(kFooter);
     command->callback([options, exit_code] { *exit_code = run(*options); });
 }
 

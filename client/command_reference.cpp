@@ -108,7 +108,7 @@ int reference(ReferenceOptions& options) {
     const RenderSettings settings = render_settings(spec);
     const auto preparation = prepare(*scene, settings, interrupt_token());
     if (!preparation.ok()) return report_error(preparation.status());
-    if (!preparation->note.empty()) std::fprintf(stderr, "lightloom reference: warning: %s\n", preparation->note.c_str());
+    if (!preparation->note.empty()) std::fprintf(stderr, "lightloom: warning: %s\n", preparation->note.c_str());
     auto progressive = ProgressiveRender::start(scene, settings, *preparation);
     if (!progressive.ok()) return report_error(progressive.status());
     const auto means = render(*progressive, spec, options.job.quiet);
@@ -132,7 +132,7 @@ int reference(ReferenceOptions& options) {
         std::fflush(stdout);
     }
     if (progressive->dropped() > 0) {
-        std::fprintf(stderr, "lightloom reference: warning: %llu non-finite sample(s) were dropped\n",
+        std::fprintf(stderr, "lightloom: warning: %llu non-finite sample(s) were dropped\n",
                      static_cast<unsigned long long>(progressive->dropped()));
     }
     if (!checker_choice) return kSuccess;
@@ -153,8 +153,8 @@ int reference(ReferenceOptions& options) {
                 static_cast<unsigned long long>(check->iterations), check->table().c_str());
     if (check->verdict() != Verdict::kDiffer) return kSuccess;
     std::fflush(stdout);
-    std::fprintf(stderr, "lightloom reference: %s and %s differ; one of them is biased or misses paths\n",
-                 spec.algorithm.name().c_str(), checker_choice->settings.name().c_str());
+    std::fprintf(stderr, "lightloom: %s and %s differ; one of them is biased or misses paths\n", spec.algorithm.name().c_str(),
+                 checker_choice->settings.name().c_str());
     return kFailure;
 }
 
@@ -165,19 +165,25 @@ void add_reference_command(CLI::App& app, int* exit_code) {
     CLI::App* command = app.add_subcommand("reference", "Render an image that others are measured by, and check it");
     command->footer(kFooter);
     add_render_settings(*command, options->job);
-    command->add_option("-o,--output", options->job.output, "EXR to write; its description goes beside it as .json")->required();
-    auto* spp = command->add_option("--spp", options->job.samples_per_pixel, "Samples per pixel")
+    command->add_option("-o,--output", options->job.output, "EXR to write; its description goes beside it as .json")
+        ->type_name("FILE")
+        ->required();
+    auto* spp = command->add_option("--spp", options->job.samples_per_pixel, "Samples per pixel; --spp or --time is needed")
+                    ->type_name("N")
                     ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
-    auto* time = command->add_option("--time", options->job.time_seconds, "Render for this many seconds")
+    auto* time = command->add_option("--time", options->job.time_seconds, "Stop after so many seconds of rendering")
+                     ->type_name("SECONDS")
                      ->check(number_between(0.001, 30 * 86400.0))
                      ->excludes(spp);
-    command->add_option("--cross-check", options->cross_check, "Another algorithm, NAME[:KEY=VALUE]..., that must agree");
+    command->add_option("--cross-check", options->cross_check, "Another algorithm that must agree")
+        ->type_name("NAME[:KEY=VALUE]...");
     command
         ->add_option("--cross-time", options->cross_time, "Seconds for its image, and as many again for the path lengths of both")
+        ->type_name("SECONDS")
         ->capture_default_str()
         ->check(number_between(0.001, 30 * 86400.0));
     add_threads_option(*command, options->threads);
-    command->add_flag("-q,--quiet", options->job.quiet, "No progress; errors and the cross-check only");
+    command->add_flag("-q,--quiet", options->job.quiet, "Print errors and the cross-check only");
     command->callback([options, spp, time, exit_code] {
         if (spp->count() + time->count() == 0) throw CLI::RequiredError("--time or --spp");
         *exit_code = reference(*options);

@@ -30,7 +30,7 @@ constexpr const char* kFooter = R"(Examples:
   lightloom render room.pbrt -o out.exr --png out.png --algorithm bdpt --spp 64
   lightloom render room.pbrt --time 60                        stop after a minute of rendering
   lightloom render room.pbrt --spp 4 --resolution 320x180     a quick look
-  lightloom render room.pbrt --pyramid room-techniques --resolution 320x180   which technique gives what
+  lightloom render room.pbrt --pyramid -o room-techniques --resolution 320x180   which technique gives what
 
 The same job submitted to a service (`lightloom submit`) gives a file with the same SHA-256.)";
 
@@ -134,18 +134,25 @@ void add_render_command(CLI::App& app, int* exit_code) {
     command->footer(kFooter);
     add_render_settings(*command, options->job);
     add_output_settings(*command, options->job);
-    command->add_option("--threads", options->threads, "Threads of each worker (default: all processors, shared out)")
+    command->add_option("-t,--threads", options->threads, "Threads of each worker (default: all processors, shared out)")
+        ->type_name("N")
         ->check(whole_number_between(1, 1024));
-    command->add_option("--workers", options->workers, "Embedded workers; the bytes do not depend on it")
+    command->add_option("--workers", options->workers, "Workers in this process; the image's bytes do not depend on it")
+        ->type_name("N")
         ->check(whole_number_between(1, 256))
         ->capture_default_str();
     add_table_cache_options(*command, options->cache);
     add_pyramid_options(*command, options->pyramid);
-    command->callback([options, exit_code] {
+    command->callback([options, exit_code, pyramid = command->get_option("--pyramid")] {
+        options->pyramid.wanted = pyramid->count() > 0;
+        if (const Status s = settle_pyramid_options(options->job, options->pyramid); !s.ok()) {
+            *exit_code = report_error(s);
+            return;
+        }
         uint32_t threads = options->threads;
         if (threads == 0) threads = std::max(1u, processor_count() / options->workers);
-        *exit_code = !options->pyramid.directory.empty() ? render_pyramid(options->job, options->pyramid, threads, options->cache)
-                                                         : render(options->job, threads, options->workers, options->cache);
+        *exit_code = options->pyramid.wanted ? render_pyramid(options->job, options->pyramid, threads, options->cache)
+                                             : render(options->job, threads, options->workers, options->cache);
     });
 }
 

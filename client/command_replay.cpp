@@ -1,16 +1,20 @@
 // lightloom replay: one camera sample of one iteration, or one whole unit, rendered again exactly as a job rendered it.
 
 #include <algorithm>
+#include <array>
+#include <cstdarg>
 #include <cstdio>
 #include <memory>
 #include <vector>
 
 #include "client/commands.h"
 #include "client/local_scene.h"
+#include "client/output_files.h"
 #include "client/path_report.h"
 #include "client/run_job.h"
 #include "client/table_options.h"
 #include "common/cli/numbers.h"
+#include "common/core/atomic_file.h"
 #include "common/transport/renderer.h"
 #include "common/work/job.h"
 
@@ -22,8 +26,8 @@ constexpr const char* kFooter = R"(Examples:
   lightloom replay room.pbrt --algorithm bdpt --unit 3,0
   lightloom replay room.pbrt --algorithm bdpt --iteration 17 --pixel 120,64 --paths
 
-A manifest lists these commands for the samples that were dropped. --algorithm, --set, --seed, --max-depth and --resolution
-must be those of the job. The printed value is the sample's camera part, at the film's exposure, as in the EXR; what its light
+A manifest lists these commands for the samples that were dropped. --algorithm, --set, --seed, --max-depth, --resolution
+and --crop must be those of the job. The printed value is the sample's camera part, at the film's exposure, as in the EXR; what its light
 path splats elsewhere is listed behind it. Tables come from the cache that `lightloom render` keeps, or are made and put there.
 
 --paths shows every contribution to the sample: technique, vertices, densities, labels, throughput, value and weight.
@@ -73,6 +77,16 @@ Result<WorkUnit> find_unit(const ReplayOptions& options, const Plan& plan, uint6
     }
 }
 
+/// A line, or several, as std::printf() would print them.
+[[gnu::format(printf, 1, 2)]] std::string line(const char* format, ...) {
+    char text[256];
+    std::va_list values;
+    va_start(values, format);
+    std::vsnprintf(text, sizeof text, format, values);
+    va_end(values);
+    return text;
+}
+
 /// What the film makes of the camera part of a unit.
 FilmResponse::Triple camera_sum(const Partial& partial, const FilmResponse& response) {
     FilmResponse::Triple sum{};
@@ -81,6 +95,13 @@ FilmResponse::Triple camera_sum(const Partial& partial, const FilmResponse& resp
         for (size_t c = 0; c < 3; ++c) sum[c] += value[c];
     }
     return sum;
+}
+
+/// To standard output, or to the file that the options name.
+Status write_text(const ReplayOptions& options, const std::string& text) {
+    if (!options.job.output.empty()) return write_file_atomically(options.job.output, text);
+    std::fputs(text.c_str(), stdout);
+    return {};
 }
 
 /// Prints what the sample is made of: `work`, of which `renderer` shows every contribution.
@@ -114,13 +135,15 @@ int show_paths(const ReplayOptions& options, const BuiltJob& job, const Renderer
     if (!shown && !black)
         return report_error(invalid_argument("algorithm '" + report.algorithm +
                                              "' does its own loops and shows no single contributions; leave out --paths"));
-    std::fputs((options.json ? to_json(report) : to_text(report)).c_str(), stdout);
+    if (Status s = write_text(options, options.json ? to_json(report) : to_text(report)); !s.ok()) return report_error(s);
     return partial->dropped_count > 0 && options.job.strict ? kDroppedSamples : kSuccess;
 }
 
 int replay(const ReplayOptions& options) {
     (void)interrupt_token();
-    const auto built = build_job(options.job, options.threads);
+    const auto built = build_job(options.job, options.threads, [&](const LocalScene& local) {
+        return check_output_files(files_of(local), std::array{options.job.output});
+    });
     if (!built.ok()) return report_error(built.status());
     const JobSpec& spec = built->spec;
     const std::shared_ptr<const Scene>& scene = built->scene;
@@ -156,22 +179,23 @@ int replay(const ReplayOptions& options) {
     const auto partial = (*renderer)->render(work, interrupt_token());
     if (!partial.ok()) return report_error(partial.status());
     const FilmResponse::Triple sum = camera_sum(*partial, response);
-    std::printf("unit %u,%u  camera %.9g %.9g %.9g\n", unit->key.group, unit->key.tile, sum[0], sum[1], sum[2]);
+    std::string text = line("unit %u,%u  camera %.9g %.9g %.9g\n", unit->key.group, unit->key.tile, sum[0], sum[1], sum[2]);
     const int width = scene->frame().crop.width();
     // With a cache, the splats are the unit's, not this sample's.
     if (options.unit.empty() && !shares_light_paths) {
         for (const SplatSum& splat : partial->splats) {
             const FilmResponse::Triple value = response(splat.rgb);
-            std::printf("splat at %d,%d  %.9g %.9g %.9g\n", scene->frame().crop.x0 + int(splat.pixel) % width,
-                        scene->frame().crop.y0 + int(splat.pixel) / width, value[0], value[1], value[2]);
+            text += line("splat at %d,%d  %.9g %.9g %.9g\n", scene->frame().crop.x0 + int(splat.pixel) % width,
+                         scene->frame().crop.y0 + int(splat.pixel) / width, value[0], value[1], value[2]);
         }
     }
-    std::printf("dropped %llu\n", static_cast<unsigned long long>(partial->dropped_count));
+    text += line("dropped %llu\n", static_cast<unsigned long long>(partial->dropped_count));
     for (const DroppedSample& d : partial->dropped) {
-        std::printf("  %s of iteration %llu %s pixel %d,%d\n", d.splat ? "splat" : "camera sample",
-                    static_cast<unsigned long long>(d.iteration), d.splat ? "onto" : "of",
-                    scene->frame().crop.x0 + int(d.pixel) % width, scene->frame().crop.y0 + int(d.pixel) / width);
+        text += line("  %s of iteration %llu %s pixel %d,%d\n", d.splat ? "splat" : "camera sample",
+                     static_cast<unsigned long long>(d.iteration), d.splat ? "onto" : "of",
+                     scene->frame().crop.x0 + int(d.pixel) % width, scene->frame().crop.y0 + int(d.pixel) / width);
     }
+    if (Status s = write_text(options, text); !s.ok()) return report_error(s);
     return partial->dropped_count > 0 && options.job.strict ? kDroppedSamples : kSuccess;
 }
 
@@ -182,17 +206,23 @@ void add_replay_command(CLI::App& app, int* exit_code) {
     CLI::App* command = app.add_subcommand("replay", "Render one sample or one unit of a job again and print it");
     command->footer(std::string(kFooter) + kPathSchema);
     add_render_settings(*command, options->job);
-    auto* iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, from 0")
+    command->add_option("-o,--output", options->job.output, "Write what is printed to FILE instead")->type_name("FILE");
+    auto* iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, counted from 0")
+                          ->type_name("N")
+                          ->capture_default_str()
                           ->check(whole_number_between(0, JobSpec::kMaxSamplesPerPixel - 1));
-    auto* pixel = command->add_option("--pixel", options->pixel, "X,Y in full-frame pixels, 0,0 at the top left")
+    auto* pixel = command->add_option("--pixel", options->pixel, "The sample's pixel of the whole frame; 0,0 is at the top left")
+                      ->type_name("X,Y")
                       ->expected(2)
                       ->delimiter(',')
                       ->check(whole_number_between(0, 65535));
-    auto* unit = command->add_option("--unit", options->unit, "GROUP,TILE: the whole unit instead of one sample")
+    auto* unit = command->add_option("--unit", options->unit, "The whole unit instead of one sample, as a manifest lists units")
+                     ->type_name("GROUP,TILE")
                      ->expected(2)
                      ->delimiter(',')
                      ->check(whole_number_between(0, UINT32_MAX));
-    command->add_option("--spp", options->spp, "Samples per pixel of the job, if it was bounded by them")
+    command->add_option("--spp", options->spp, "Samples per pixel of the job, if it was bounded by them (default: it was not)")
+        ->type_name("N")
         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     iteration->needs(pixel);
     pixel->excludes(unit);
@@ -205,7 +235,7 @@ void add_replay_command(CLI::App& app, int* exit_code) {
         ->needs(paths);
     add_threads_option(*command, options->threads);
     add_table_cache_options(*command, options->cache);
-    command->add_flag("--strict", options->job.strict, "Exit with 3 if samples were dropped");
+    command->add_flag("--strict", options->job.strict, "Exit with 3 if the sample, or one of the unit, is not finite");
     command->callback([options, exit_code] {
         if (options->pixel.empty() && options->unit.empty()) throw CLI::RequiredError("--pixel or --unit");
         *exit_code = replay(*options);

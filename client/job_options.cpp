@@ -54,16 +54,23 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
     command
         .add_option("SCENE", options.scene,
                     "pbrt-v4 scene file; everything that it refers to lies beside or below it, or see --root")
+        ->type_name("FILE")
         ->required();
     add_scene_options(command, options.reading);
     command
         .add_option("-a,--algorithm", options.algorithm,
                     "Name from `lightloom algorithms` (default: what the scene's Integrator asks for)")
+        ->type_name("NAME")
         ->check([](const std::string& name) { return name.empty() ? "an empty name" : std::string(); });
-    command.add_option("--set", options.settings, "Parameter of the algorithm, KEY=VALUE; may be repeated")
+    command
+        .add_option(
+            "--set", options.settings,
+            "Parameter of the algorithm, for example heuristic=power; may be repeated; `lightloom algorithms NAME` lists them")
+        ->type_name("KEY=VALUE")
         ->take_all()
         ->allow_extra_args(false);
     command.add_option("--max-depth", options.max_depth, "Bounces; paths have up to this + 1 edges (default: the scene's)")
+        ->type_name("N")
         ->check(whole_number_between(0, kMaxEdges - 1));
     command.add_option("--resolution", options.resolution, "Pixels of the whole frame, for example 640x360 (default: the scene's)")
         ->type_name("WxH");
@@ -73,6 +80,7 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
                     "(default: the scene's)")
         ->type_name("X0,X1,Y0,Y1");
     command.add_option("--seed", options.seed, "Another seed makes another, independent image")
+        ->type_name("N")
         ->capture_default_str()
         ->check(whole_number());
 }
@@ -80,25 +88,34 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
 void add_image_settings(CLI::App& command, JobOptions& options) {
     command.add_flag("--half", options.half,
                      "Write colour as half floats; refused where a value is beyond their range, and nothing is lost");
-    auto* png = command.add_option("--png", options.png, "Also write an 8-bit sRGB picture");
+    auto* png = command.add_option("--png", options.png, "Also write an 8-bit sRGB picture")->type_name("FILE");
     command.add_option("--exposure", options.exposure, "Stops by which the picture is brightened (the EXR never is)")
+        ->type_name("STOPS")
+        ->capture_default_str()
         ->check(number_between(-30.0, 30.0))
         ->needs(png);
 }
 
 void add_output_settings(CLI::App& command, JobOptions& options) {
-    command.add_option("-o,--output", options.output, "EXR to write; the manifest goes beside it (default: SCENE's name.exr)");
+    command
+        .add_option("-o,--output", options.output,
+                    "EXR to write; its manifest goes beside it (default: the scene's name with .exr, in the "
+                    "current directory)")
+        ->type_name("FILE");
     add_image_settings(command, options);
     command.add_flag("--layers", options.layers, "Also store albedo, normal and depth of what the camera sees first");
-    auto* spp = command.add_option("--spp", options.samples_per_pixel, "Samples per pixel (default: the scene's)")
-                    ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
+    auto* spp =
+        command.add_option("--spp", options.samples_per_pixel, "Samples per pixel (default: the scene's, unless --time is given)")
+            ->type_name("N")
+            ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     command
         .add_option("--time", options.time_seconds,
-                    "Stop after this many seconds of rendering, at a boundary that --spp can reproduce")
+                    "Stop after so many seconds of rendering, at a number of samples that --spp can reproduce")
+        ->type_name("SECONDS")
         ->check(number_between(0.001, 30 * 86400.0))
         ->excludes(spp);
-    command.add_option("--json", options.json, "Write statistics to this file");
-    command.add_flag("-q,--quiet", options.quiet, "No progress; errors only");
+    command.add_option("--json", options.json, "Also write statistics: seconds of every phase, samples, rays")->type_name("FILE");
+    command.add_flag("-q,--quiet", options.quiet, "Print errors only");
     command.add_flag("--strict", options.strict,
                      "Warnings about the scene are errors, and dropped (non-finite) samples make the exit code 3");
 }

@@ -30,7 +30,9 @@ Result<BuiltJob> build_job(const JobOptions& options, uint32_t threads, const Sc
 
 void add_threads_option(CLI::App& command, uint32_t& threads) {
     threads = processor_count();
-    command.add_option("--threads", threads, "Threads (default: all processors)")->check(whole_number_between(1, 1024));
+    command.add_option("-t,--threads", threads, "Threads to render with (default: all processors)")
+        ->type_name("N")
+        ->check(whole_number_between(1, 1024));
 }
 
 }  // namespace lightloom::client

@@ -31,7 +31,7 @@ struct BuiltJob {
 };
 Result<BuiltJob> build_job(const JobOptions& options, uint32_t threads, const SceneCheck& check = {});
 
-/// --threads of such a command; all processors by default.
+/// -t, --threads of such a command; all processors by default.
 void add_threads_option(CLI::App& command, uint32_t& threads);
 
 }  // namespace lightloom::client

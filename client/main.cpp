@@ -5,8 +5,10 @@
 #include <cstdio>
 #include <cstring>
 #include <iostream>
+#include <memory>
 
 #include "client/commands.h"
+#include "common/cli/help.h"
 #include "common/cli/log.h"
 #include "common/cli/start.h"
 #include "common/work/identity.h"
@@ -15,7 +17,7 @@ namespace {
 
 constexpr const char* kFooter = R"(First steps:
   lightloom render scene.pbrt --spp 16 --png quick.png        on this machine, no set-up
-  lightloom algorithms                                        what --algorithm and --set know
+  lightloom algorithms                                        what --algorithm and --set take
   lightloom submit scene.pbrt --server HOST:PORT -o out.exr   on a service
   lightloom COMMAND --help                                    options and examples
 
@@ -27,14 +29,11 @@ samples were dropped; 4 the service could not be reached; 130 interrupted, or th
 int main(int argc, char** argv) {
     using namespace lightloom::client;
     CLI::App app{"Lightloom: renders scenes whose light is hard to find, on one machine or many.", "lightloom"};
-    app.footer(kFooter);
-    app.set_version_flag("--version", lightloom::kBuildId);
+    app.formatter(std::make_shared<lightloom::HelpFormatter>());
+    lightloom::add_version_option(app, lightloom::kBuildId);
     app.require_subcommand(1);
     std::string level = "warn";
-    lightloom::add_log_option(app, level);
-    app.parse_complete_callback([&] {
-        if (!lightloom::set_up_logging("lightloom", level)) throw CLI::ValidationError("--log", "unknown level " + level);
-    });
+    app.parse_complete_callback([&] { lightloom::set_up_logging("lightloom", level); });
     int exit_code = kSuccess;
     add_render_command(app, &exit_code);
     add_service_commands(app, &exit_code);
@@ -44,10 +43,14 @@ int main(int argc, char** argv) {
     add_replay_command(app, &exit_code);
     add_bench_command(app, &exit_code);
     add_reference_command(app, &exit_code);
+    app.footer(kFooter);  // now, so that commands without one of their own do not show it
+    // Before the command and behind it.
+    lightloom::add_log_option(app, level);
+    for (CLI::App* command : app.get_subcommands({})) lightloom::add_log_option(*command, level);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        exit_code = app.exit(error) == 0 ? kSuccess : kUsage;
+        exit_code = lightloom::end_of_parse(app, error);
     }
     // What was printed may be all that a command makes.
     std::fflush(stdout);

@@ -116,7 +116,7 @@ Status Pyramid::find(const PyramidKey& key, Picture** picture) {
     if (bytes > max_bytes_)
         return {StatusCode::kResourceExhausted, "the pictures of " + std::to_string(pictures_.size()) +
                                                     " techniques need more than " + std::to_string(max_bytes_ >> 20) +
-                                                    " MB; choose a smaller --resolution or --pyramid-depth"};
+                                                    " MiB; choose a smaller --resolution or --pyramid-depth"};
     entry->second = {std::vector<double>(kSums * pixels), std::vector<double>(pixels), std::vector<double>(pixels)};
     return {};
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <optional>
+#include <utility>
 
 #include "client/commands.h"
 #include "client/local_scene.h"
@@ -109,18 +110,30 @@ Status watch_units(const BuiltJob& job, const Renderer& renderer, uint32_t threa
 void add_pyramid_options(CLI::App& command, PyramidOptions& options) {
     auto* pyramid = command
                         .add_option("--pyramid", options.directory,
-                                    "Instead of an image: a directory with a weighted and an unweighted picture of every "
-                                    "technique, and index.html that shows them (default --spp: at most " +
-                                        std::to_string(kPyramidSamples) + ")")
-                        ->check([](const std::string& name) { return name.empty() ? "an empty name" : std::string(); });
+                                    "Instead of an image: a folder with a weighted and an unweighted picture of every "
+                                    "technique, and index.html that shows them; DIR may be given by -o instead (then no word "
+                                    "but an option follows --pyramid). At most " +
+                                        std::to_string(kPyramidSamples) + " samples per pixel unless --spp is given")
+                        ->type_name("[DIR]")
+                        ->expected(0, 1);
     command
         .add_option("--pyramid-depth", options.depth,
                     "Edges of the longest paths with pictures of their own; longer ones share some")
+        ->type_name("N")
         ->check(whole_number_between(1, 64))
         ->capture_default_str()
         ->needs(pyramid);
-    for (const char* other : {"--output", "--half", "--png", "--layers", "--time", "--json", "--workers"})
+    for (const char* other : {"--half", "--png", "--layers", "--time", "--json", "--workers"})
         pyramid->excludes(command.get_option(other));
+}
+
+Status settle_pyramid_options(JobOptions& job, PyramidOptions& pyramid) {
+    if (!pyramid.wanted) return {};
+    if (!pyramid.directory.empty() && !job.output.empty())
+        return invalid_argument("--pyramid " + pyramid.directory + " and -o " + job.output + " name two folders; give one");
+    if (pyramid.directory.empty()) pyramid.directory = std::exchange(job.output, {});
+    if (pyramid.directory.empty()) return invalid_argument("--pyramid: name the folder, --pyramid DIR or -o DIR");
+    return {};
 }
 
 int render_pyramid(JobOptions options, const PyramidOptions& pyramid_options, uint32_t threads, const TableCacheOptions& cache) {

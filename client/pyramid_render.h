@@ -6,7 +6,8 @@
 namespace lightloom::client {
 
 struct PyramidOptions {
-    std::string directory;  ///< Empty: no pyramid is asked for.
+    bool wanted = false;
+    std::string directory;  ///< After settle_pyramid_options() not empty where one is wanted.
     int depth = 8;          ///< Longest paths with pictures of their own.
 };
 
@@ -15,6 +16,8 @@ inline constexpr uint32_t kPyramidSamples = 16;
 
 /// --pyramid and --pyramid-depth, which take the place of the other outputs.
 void add_pyramid_options(CLI::App& command, PyramidOptions& options);
+/// Takes the folder from -o where --pyramid names none. kInvalidArgument where both name one, or neither.
+Status settle_pyramid_options(JobOptions& job, PyramidOptions& pyramid);
 /// Renders and writes the directory. The exit code.
 int render_pyramid(JobOptions options, const PyramidOptions& pyramid, uint32_t threads, const TableCacheOptions& cache);
 

@@ -21,9 +21,11 @@ void add_table_cache_options(CLI::App& command, TableCacheOptions& options) {
         .add_option("--table-cache", options.directory,
                     "Directory in which learned tables are kept for the next render, or off; it holds nothing else, no "
                     "scene files and no images")
+        ->type_name("DIR")
         ->envname("LIGHTLOOM_TABLE_CACHE")
         ->capture_default_str();
-    command.add_option("--table-cache-size", options.megabytes, "MB that it may hold; the tables used least recently go first")
+    command.add_option("--table-cache-size", options.megabytes, "MiB that it may hold; the tables used least recently go first")
+        ->type_name("MIB")
         ->check(whole_number_between(1, uint64_t(1) << 30))
         ->capture_default_str();
 }

@@ -6,10 +6,12 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
-#include <iostream>
+#include <memory>
 #include <optional>
 #include <thread>
 
+#include "common/cli/help.h"
+#include "common/cli/log.h"
 #include "common/cli/numbers.h"
 #include "common/cli/start.h"
 #include "common/core/atomic_file.h"
@@ -64,51 +66,63 @@ int main(int argc, char** argv) {
     using namespace lightloom;
     CLI::App app{"The coordinator of Lightloom: accepts jobs, leases their units to workers and merges the results.",
                  "lightloom-server"};
+    app.formatter(std::make_shared<HelpFormatter>());
     app.footer(kFooter);
     std::string listen = "127.0.0.1:50051", data = "lightloom-data", status = "127.0.0.1:9464", level = "info", port_file;
     double lease = 10;
     uint32_t threads = 0;
-    uint64_t table_cache_mb = 4096;
+    uint64_t table_cache_mib = 4096;
     bool plaintext = false;
     std::optional<uint64_t> shuffle;
-    app.add_option("--listen", listen, "HOST:PORT for clients and workers; port 0 picks a free one")->capture_default_str();
+    app.add_option("--listen", listen, "Where clients and workers connect; port 0 picks a free one; unix:PATH is a socket file")
+        ->type_name("HOST:PORT")
+        ->capture_default_str();
     app.add_option("--data", data,
                    "Directory for scene files, images, the tables that running jobs read (assets/, removed with the last "
                    "such job) and the table cache (tables/)")
+        ->type_name("DIR")
         ->capture_default_str();
-    app.add_option("--status", status, "HOST:PORT of the status page (/healthz, /api/v1/status), or off")->capture_default_str();
+    app.add_option("--status", status, "Where the status page is (/healthz, /api/v1/status), or off")
+        ->type_name("HOST:PORT")
+        ->capture_default_str();
     app.add_option("--lease", lease, "Seconds without a heartbeat after which a unit goes to another worker")
+        ->type_name("SECONDS")
         ->check(number_between(0.2, 3600))
         ->capture_default_str();
-    app.add_option("--threads", threads, "Threads with which the coordinator itself traces and renders; 0 leaves that to workers")
+    app.add_option("-t,--threads", threads,
+                   "Threads with which the coordinator itself traces and renders; 0 leaves that to workers")
+        ->type_name("N")
         ->check(whole_number_between(0, 1024))
         ->capture_default_str();
-    app.add_option("--table-cache-size", table_cache_mb,
-                   "MB of the table cache: learned tables that later jobs find again, also after a restart; those used "
+    app.add_option("--table-cache-size", table_cache_mib,
+                   "MiB of the table cache: learned tables that later jobs find again, also after a restart; those used "
                    "least recently go first; 0 keeps none")
+        ->type_name("MIB")
         ->check(whole_number_between(0, uint64_t(1) << 30))
         ->capture_default_str();
     app.add_option("--port-file", port_file,
-                   "File for \"GRPC_PORT STATUS_PORT\", written once both listen (a unix: socket has port 0)");
-    app.add_flag("--allow-plaintext", plaintext, "Listen on other than loopback addresses");
+                   "File for \"GRPC_PORT STATUS_PORT\", written once both listen (a unix: socket has port 0)")
+        ->type_name("FILE");
+    app.add_flag("--allow-plaintext", plaintext, "Let --listen and --status name other than loopback addresses");
     add_log_option(app, level);
+    add_version_option(app, kBuildId);
     app.add_option("--shuffle-leases", shuffle, "")->group("")->check(whole_number());  // tests: lease units in a random order
     if (const auto ended = parse_and_log(app, argc, argv, level)) return *ended;
     for (const auto& [option, address] : {std::pair{"--listen", &listen}, {"--status", &status}}) {
         if ((address == &status && status == "off") || (address == &listen && listen.starts_with("unix:"))) continue;
         const auto parsed = parse_host_port(*address, option);
         if (!parsed.ok()) {
-            std::cerr << parsed.status().message() << '\n';
+            print_error(parsed.status().message());
             return kBadCommandLine;
         }
         if (!plaintext && !is_loopback(*parsed)) {
-            std::cerr << "refusing to listen beyond loopback without --allow-plaintext: connections have no protection\n";
+            print_error("refusing to listen beyond loopback without --allow-plaintext: connections have no protection");
             return kBadCommandLine;
         }
     }
     const StopSignals signals;
     const auto identity = build_identity();
-    if (!identity.ok()) return log_failure(identity.status(), kNoIdentity);
+    if (!identity.ok()) return report_failure(identity.status(), kNoIdentity);
     CoordinatorOptions options;
     options.directory = data;
     options.identity = *identity;
@@ -116,21 +130,21 @@ int main(int argc, char** argv) {
     options.lease_seconds = lease;
     options.heartbeat_seconds = std::min(1.0, lease / 4);
     options.shuffle_seed = shuffle;
-    if (table_cache_mb > 0) options.table_cache = std::filesystem::path(data) / "tables";
-    options.table_cache_bytes = table_cache_mb << 20;
+    if (table_cache_mib > 0) options.table_cache = std::filesystem::path(data) / "tables";
+    options.table_cache_bytes = table_cache_mib << 20;
     std::error_code error;
     std::filesystem::create_directories(data, error);
-    if (error) return log_failure(internal_error(error.message()), data + ": ");
+    if (error) return report_failure(internal_error(error.message()), data + ": ");
     const auto lock = DataLock::take(data);
-    if (!lock.ok()) return log_failure(lock.status());
+    if (!lock.ok()) return report_failure(lock.status());
     Coordinator coordinator(std::move(options));
     auto server = GrpcServer::start(coordinator, listen);
-    if (!server.ok()) return log_failure(server.status());
+    if (!server.ok()) return report_failure(server.status());
     std::unique_ptr<StatusHttp> http;
     if (status != "off") {
         auto started = StatusHttp::start(coordinator, status);
         if (!started.ok()) {
-            const int failed = log_failure(started.status());
+            const int failed = report_failure(started.status());
             return started.status().code() == StatusCode::kInvalidArgument ? kBadCommandLine : failed;
         }
         http = std::move(started).value();
@@ -143,7 +157,7 @@ int main(int argc, char** argv) {
     if (!port_file.empty()) {
         const std::string ports =
             std::to_string(tcp ? (*server)->port() : 0) + " " + std::to_string(http ? http->port() : 0) + "\n";
-        if (const Status written = write_file_atomically(port_file, ports); !written.ok()) return log_failure(written);
+        if (const Status written = write_file_atomically(port_file, ports); !written.ok()) return report_failure(written);
     }
     signals.wait();
     spdlog::info("stopping");

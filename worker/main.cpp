@@ -7,8 +7,11 @@
 #include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
 #include <stop_token>
 
+#include "common/cli/help.h"
+#include "common/cli/log.h"
 #include "common/cli/numbers.h"
 #include "common/cli/start.h"
 #include "common/work/channel.h"
@@ -45,15 +48,21 @@ Exit codes: 0 stopped as asked, 1 refused by the coordinator or failed, 2 bad co
 int main(int argc, char** argv) {
     using namespace lightloom;
     CLI::App app{"Renders work units for a Lightloom coordinator.", "lightloom-worker"};
+    app.formatter(std::make_shared<HelpFormatter>());
     app.footer(kFooter);
     std::string server = "127.0.0.1:50051", level = "info", golden_override;
     std::string cache = default_cache().string();
     uint32_t threads = processor_count();
-    app.add_option("--server", server, "HOST:PORT of the coordinator")->capture_default_str();
-    app.add_option("--threads", threads, "Threads to render with")->check(whole_number_between(1, 1024))->capture_default_str();
-    app.add_option("--cache", cache, "Directory for scene files, and for tables up to 1 GB; may be shared by the workers of a host")
-        ->capture_default_str();
+    app.add_option("--server", server, "The coordinator")->type_name("HOST:PORT")->capture_default_str();
+    app.add_option("-t,--threads", threads, "Threads to render with (default: all processors)")
+        ->type_name("N")
+        ->check(whole_number_between(1, 1024));
+    app.add_option("--cache", cache,
+                   "Directory for scene files, and for tables up to 1 GiB; may be shared by the workers of a host "
+                   "(default: lightloom in $XDG_CACHE_HOME or ~/.cache)")
+        ->type_name("DIR");
     add_log_option(app, level);
+    add_version_option(app, kBuildId);
     app.add_option("--pretend-golden-digest", golden_override, "")->group("");  // for tests of the refusal
     if (const auto ended = parse_and_log(app, argc, argv, level)) return *ended;
     std::stop_source stop;
@@ -65,16 +74,19 @@ int main(int argc, char** argv) {
 
     const tbb::global_control parallelism(tbb::global_control::max_allowed_parallelism, threads);
     auto identity = build_identity();
-    if (!identity.ok()) return log_failure(identity.status(), kNoIdentity);
+    if (!identity.ok()) return report_failure(identity.status(), kNoIdentity);
     if (!golden_override.empty()) {
         const auto digest = Digest::from_hex(golden_override);
-        if (!digest.ok()) return kBadCommandLine;
+        if (!digest.ok()) {
+            print_error("--pretend-golden-digest: " + digest.status().message());
+            return kBadCommandLine;
+        }
         identity->golden_digest = *digest;
     }
     GrpcWorkerPort port(open_channel(server));
     FetchingWorker worker(
         port, cache, {.identity = *identity, .thread_count = threads, .host = host_name(), .process_id = uint64_t(::getpid())});
-    if (const Status usable = worker.check_directory(); !usable.ok()) return log_failure(usable, "--cache ");
+    if (const Status usable = worker.check_directory(); !usable.ok()) return report_failure(usable, "--cache ");
     const Status status = worker.run(stop.get_token());
-    return status.ok() ? kStopped : log_failure(status);
+    return status.ok() ? kStopped : report_failure(status);
 }

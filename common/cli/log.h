@@ -2,10 +2,16 @@
 // Logging set-up. Logs go to standard error so that standard output stays for results; use spdlog's own macros/functions.
 
 #include <string>
+#include <string_view>
 
 namespace lightloom {
 
-/// `level`: trace, debug, info, warn, error or off. Returns false for an unknown level.
-bool set_up_logging(const std::string& program, const std::string& level);
+inline constexpr std::string_view kLogLevels[] = {"trace", "debug", "info", "warn", "error", "off"};
+
+/// `level` is one of kLogLevels.
+void set_up_logging(const std::string& program, const std::string& level);
+
+/// "PROGRAM: message" on standard error, whatever the level. set_up_logging() has been told the program's name.
+void print_error(const std::string& message);
 
 }  // namespace lightloom

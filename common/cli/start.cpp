@@ -1,33 +1,52 @@
 #include "common/cli/start.h"
 
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <iostream>
+#include <cstdio>
 #include <thread>
 
 #include "common/cli/log.h"
+#include "common/cli/mistakes.h"
+#include "common/core/nearest.h"
 
 namespace lightloom {
 
 void add_log_option(CLI::App& app, std::string& level) {
-    app.add_option("--log", level, "trace, debug, info, warn, error or off")->capture_default_str();
+    std::string known;
+    for (const std::string_view name : kLogLevels)
+        known += (known.empty() ? "" : name == kLogLevels[std::size(kLogLevels) - 1] ? " or " : ", ") + std::string(name);
+    app.add_option("--log", level, "Least severe messages that are logged: " + known)
+        ->type_name("LEVEL")
+        ->capture_default_str()
+        ->check([known](const std::string& text) {
+            if (std::find(std::begin(kLogLevels), std::end(kLogLevels), text) != std::end(kLogLevels)) return std::string();
+            return "\"" + text + "\" is not " + known + did_you_mean(text, kLogLevels);
+        });
+}
+
+void add_version_option(CLI::App& app, const std::string& build) {
+    app.set_version_flag("--version", app.get_name() + " " + build, "Print the program's name and build id, and exit");
+}
+
+int end_of_parse(const CLI::App& app, const CLI::ParseError& error) {
+    if (!is_mistake(app, error)) return app.exit(error) == 0 ? kStopped : kBadCommandLine;
+    std::fprintf(stderr, "%s: %s\n", app.get_name().c_str(), mistake_text(app, error).c_str());
+    return kBadCommandLine;
 }
 
 std::optional<int> parse_and_log(CLI::App& app, int argc, char** argv, const std::string& level) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? kStopped : kBadCommandLine;
+        return end_of_parse(app, error);
     }
-    if (set_up_logging(app.get_name(), level)) return std::nullopt;
-    std::cerr << "unknown log level \"" << level << "\"\n";
-    return kBadCommandLine;
+    set_up_logging(app.get_name(), level);
+    return std::nullopt;
 }
 
-int log_failure(const Status& status, const std::string& prefix) {
-    spdlog::error("{}{}", prefix, status.message());
+int report_failure(const Status& status, const std::string& prefix) {
+    print_error(prefix + status.message());
     return kFailedToRun;
 }
 

@@ -18,7 +18,7 @@
 namespace lightloom::testing {
 
 /// As in the programs, the log is set up before there are threads.
-inline const bool kLogging = set_up_logging("test", "info");
+inline const bool kLogging = (set_up_logging("test", "info"), true);
 
 class TempDirectory {
   public:

@@ -8,6 +8,7 @@
 #include <future>
 
 #include "common/core/atomic_file.h"
+#include "common/import/import.h"
 #include "server/local_ports.h"
 #include "tests/service/fake.h"
 #include "worker/scene_cache.h"
@@ -62,6 +63,32 @@ TEST(SceneFetcher, AFileListThatAnotherProcessDidNotFinishIsStoredAfterAll) {
     spec.scene_root = sha256("another list");
     ASSERT_TRUE(assets.put(spec.scene_root, "another list").ok());
     EXPECT_EQ(fetcher.scene(spec, stop.get_token()).status().code(), StatusCode::kCancelled);
+}
+
+/// Jobs on one scene that differ in --crop alone.
+TEST(RendererCache, BuildsASceneForEachCropWindow) {
+    const FakeService service;
+    LocalWorkerPort port(*service.coordinator);
+    int built = 0;
+    const auto build = [&](const JobSpec& spec, std::stop_token) -> Result<std::shared_ptr<const Scene>> {
+        ++built;
+        auto imported = import_pbrt(std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/furnace-sphere.pbrt");
+        if (!imported.ok()) return imported.status();
+        auto scene = Scene::build(std::move(imported->description), scene_options(spec));
+        if (!scene.ok()) return scene.status();
+        return std::shared_ptr<const Scene>(std::move(scene).value());
+    };
+    RendererCache cache(build, direct_tables(port));
+    const Rect whole{0, 0, 64, 64}, window{8, 4, 24, 12};
+    for (const bool cropped : {false, true, true, false}) {
+        UnitLease lease;
+        lease.spec.max_depth = 3;
+        if (cropped) lease.spec.crop = window;
+        lease.spec.frame = {64, 64, cropped ? window : whole};
+        const auto renderer = cache.renderer(lease, {});
+        EXPECT_TRUE(renderer.ok()) << renderer.status().message();
+    }
+    EXPECT_EQ(built, 2);
 }
 
 /// The tables of the coordinator, and what a fetcher of at most 2500 bytes keeps of them.

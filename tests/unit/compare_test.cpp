@@ -97,7 +97,7 @@ TEST_F(Compare, RefusesWithOneLineAndUsageCode) {
     for (const auto& arguments : bad) {
         const Outcome o = run(arguments);
         EXPECT_EQ(o.exit_code, kUsage) << arguments.back();
-        const std::string last = o.err.substr(o.err.rfind("lightloom compare: "));
+        const std::string last = o.err.substr(o.err.rfind("lightloom: "));
         EXPECT_EQ(std::count(last.begin(), last.end(), '\n'), 1) << o.err;
         EXPECT_EQ(o.out, "");
     }

@@ -86,6 +86,27 @@ TEST(LargeScenes, ShapesWhoseAreaOverflowsAreNamed) {
     EXPECT_EQ(scene->summary().triangle_count, 2u);
 }
 
+TEST(Frame, ACropWindowTakesThePlaceOfTheFilms) {
+    FilmDescription film;
+    film.width = 200, film.height = 100;
+    film.crop[0] = 50, film.crop[1] = 100, film.crop[2] = 20, film.crop[3] = 40;  // x0, x1, y0, y1
+    EXPECT_EQ(frame_layout(film, {})->crop, (Rect{50, 20, 100, 40}));
+    EXPECT_EQ(frame_layout(film, {.width = 100, .height = 50})->crop, (Rect{25, 10, 50, 20})) << "the film's is scaled along";
+    const Rect window{1, 2, 3, 4};
+    EXPECT_EQ(*frame_layout(film, {.crop = window}), (FrameLayout{200, 100, window}));
+    EXPECT_EQ(*frame_layout(film, {.width = 100, .height = 50, .crop = window}), (FrameLayout{100, 50, window})) << "not so ours";
+    for (const Rect& bad : {Rect{0, 0, 201, 1}, Rect{0, 0, 1, 101}, Rect{-1, 0, 1, 1}, Rect{0, -1, 1, 1}, Rect{5, 0, 5, 1}}) {
+        const Status refused = frame_layout(film, {.crop = bad}).status();
+        EXPECT_EQ(refused.code(), StatusCode::kInvalidArgument);
+        EXPECT_NE(refused.message().find("the frame has 200 x 100 pixels"), std::string::npos) << refused.message();
+    }
+    // A small window of a frame that is too large as a whole.
+    film.crop[0] = -1;
+    film.width = film.height = kMaxFrameSide;
+    EXPECT_FALSE(frame_layout(film, {}).ok());
+    EXPECT_TRUE(frame_layout(film, {.crop = window}).ok());
+}
+
 TEST(Summary, LightsSayWhereTheyAre) {
     SceneBuilder b;
     b.quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, b.diffuse(Rgb(0.5f)));
