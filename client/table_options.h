@@ -23,7 +23,7 @@ struct TableCacheOptions {
 /// --table-cache and --table-cache-size.
 void add_table_cache_options(CLI::App& command, TableCacheOptions& options);
 
-/// The same for a command that measures: off, whatever the environment says, until a directory is given.
+/// Adds the same options for a command that measures: the cache is off, whatever the environment says, until a directory is given.
 void add_measured_table_cache_options(CLI::App& command, TableCacheOptions& options);
 
 /// The tables that a job on `scene` renders with, those that a coordinator would learn for it: from the cache, which is where its
@@ -31,7 +31,7 @@ void add_measured_table_cache_options(CLI::App& command, TableCacheOptions& opti
 /// Empty for an algorithm without tables. `spec` has the frame and the depth.
 Result<Preparation> cached_preparation(const Scene& scene, const JobSpec& spec, const TableCacheOptions& options, bool quiet,
                                        std::stop_token stop);
-/// The tables alone.
+/// Gives the tables alone.
 Result<Tables> cached_tables(const Scene& scene, const JobSpec& spec, const TableCacheOptions& options, bool quiet,
                              std::stop_token stop);
 
