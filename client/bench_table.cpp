@@ -13,6 +13,7 @@ namespace {
 struct Finish {
     double iterations = 0, seconds = 0, preparation = 0;
     bool capped = false, lower_bound = false;
+    bool cached = false;                                   ///< The preparation is that of another run, which made the tables.
     double rendered_iterations = 0, rendered_seconds = 0;  ///< Where a capped run ended.
 };
 
@@ -26,6 +27,7 @@ Finish finish_of(const Json& done) {
     f.preparation = number(done, "preparation_seconds");
     f.rendered_iterations = number(done, "iterations");
     f.rendered_seconds = number(done, "seconds");
+    f.cached = done.value("tables", std::string()) == "cached";
     f.capped = !done.contains("reached");
     const Json where = done.value(f.capped ? "extrapolated" : "reached", Json::object());
     f.lower_bound = where.contains("lower_bound");
@@ -60,7 +62,7 @@ std::string bench_table(const std::vector<std::string>& algorithms, const std::v
     table += format("%-*s %5s %6s %12s %10s %10s %10s %11s %11s\n", int(width), "algorithm", "runs", "capped", "iterations",
                     "render s", "prepare s", "together s", "iterations", "together");
     double first_iterations = 0, first_seconds = 0;
-    bool any_capped = false;
+    bool any_capped = false, any_cached = false;
     for (const std::string& name : algorithms) {
         std::vector<Finish> runs;
         for (const Json& line : done) {
@@ -80,11 +82,13 @@ std::string bench_table(const std::vector<std::string>& algorithms, const std::v
         const double together = median(runs, [](const Finish& f) { return f.seconds + f.preparation; });
         if (name == algorithms.front()) first_iterations = iterations, first_seconds = together;
         const bool bound = std::any_of(runs.begin(), runs.end(), [](const Finish& f) { return f.lower_bound; });
+        const bool cached = std::any_of(runs.begin(), runs.end(), [](const Finish& f) { return f.cached; });
+        any_cached |= cached;
         const char* mark = !estimate ? "" : bound ? ">~" : "~";
-        table +=
-            format("%-*s %5zu %6zu %12s %10s %10.2f %10s %11.2f %11.2f\n", int(width), name.c_str(), runs.size(), size_t(capped),
-                   format("%s%.1f", mark, iterations).c_str(), format("%s%.2f", mark, seconds).c_str(), preparation,
-                   format("%s%.2f", mark, together).c_str(), first_iterations / iterations, first_seconds / together);
+        table += format("%-*s %5zu %6zu %12s %10s %10s %10s %11.2f %11.2f\n", int(width), name.c_str(), runs.size(), size_t(capped),
+                        format("%s%.1f", mark, iterations).c_str(), format("%s%.2f", mark, seconds).c_str(),
+                        format("%s%.2f", cached ? "*" : "", preparation).c_str(), format("%s%.2f", mark, together).c_str(),
+                        first_iterations / iterations, first_seconds / together);
         if (estimate) {
             table += format("%-*s not reached: > %.0f iterations, > %.2f s\n", int(width), "",
                             median(runs, [](const Finish& f) { return f.rendered_iterations; }),
@@ -95,6 +99,7 @@ std::string bench_table(const std::vector<std::string>& algorithms, const std::v
         table +=
             "~ extrapolated by error ~ n^-1/2 from runs that ended above the threshold; a bias breaks that law\n"
             ">~ the same where the error does not fall like that yet: at least so much\n";
+    if (any_cached) table += "* as recorded when the tables were made: some runs found theirs in the cache\n";
     return table;
 }
 

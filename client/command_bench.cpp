@@ -13,6 +13,7 @@
 #include "client/local_scene.h"
 #include "client/output_files.h"
 #include "client/run_job.h"
+#include "client/table_options.h"
 #include "common/cli/numbers.h"
 #include "common/core/atomic_file.h"
 #include "common/film/exr_io.h"
@@ -31,7 +32,9 @@ FILE gets one JSON line per checkpoint (iterations 1, 2, 3, 4, 5, 7, 9, 12, ... 
 seconds and rays, and a last line per run with "done": true: where the MAPE fell to the threshold for good (a straight
 line between checkpoints in log-log coordinates), or, for a run that ended above it, an extrapolation. The table at the end
 shows medians over the seeds. `seconds` is light transport alone, `preparation_seconds` what an algorithm computes before its
-first sample; both count towards --time.
+first sample; both count towards --time. Learned tables are made anew for every run, on its threads, and "tables" is "made".
+With --table-cache DIR a run may find its tables there: then "tables" is "cached", and preparation_seconds has the seconds that
+were recorded when they were made, perhaps by other threads or by several workers. The table marks such rows with *.
 
 A reference that one of the tested algorithms made hides that algorithm's bias: `lightloom reference` stores who made it.)";
 
@@ -43,6 +46,7 @@ struct BenchOptions {
     double time = 0, threshold = 12, slice = 2, stop_after = -1;
     uint64_t spp = 0;
     bool resume = false;
+    TableCacheOptions cache;
 };
 
 /// A run that is being rendered.
@@ -187,7 +191,11 @@ int bench(BenchOptions& options) {
             continue;
         }
         const RenderSettings settings{run.algorithm.settings, run.seed, max_depth};
-        const auto preparation = prepare(*scene, settings, interrupt_token());
+        JobSpec job = built->spec;
+        job.algorithm = run.algorithm.settings;
+        job.seed = run.seed;
+        const bool silent = options.scene.quiet || options.cache.path().empty();
+        const auto preparation = cached_preparation(*scene, job, options.cache, silent, interrupt_token());
         if (!preparation.ok()) return report_error(preparation.status());
         if (!preparation->note.empty())
             std::fprintf(stderr, "lightloom: warning: %s: %s\n", run.algorithm.label.c_str(), preparation->note.c_str());
@@ -199,6 +207,7 @@ int bench(BenchOptions& options) {
                   {"reference", options.reference},
                   {"reference_algorithm", reference->attribute(exr_attribute::kAlgorithm)}};
         line.update(run.json());
+        if (run.algorithm.settings.info().learning) line["tables"] = preparation->cached ? "cached" : "made";
         alive.push_back(
             std::make_unique<LiveRun>(LiveRun{run.algorithm.label, std::move(line), run, std::move(render).value(), {}, {}, 1}));
     }
@@ -262,6 +271,7 @@ void add_bench_command(CLI::App& app, int* exit_code) {
         ->type_name("N")
         ->check(whole_number_between(0, kMaxEdges - 1));
     add_threads_option(*command, options->threads);
+    add_measured_table_cache_options(*command, options->cache);
     command->add_option("--slice", options->slice, "Seconds that a run gets before the next one's turn")
         ->type_name("SECONDS")
         ->capture_default_str()

@@ -11,6 +11,7 @@
 #include "client/local_scene.h"
 #include "client/progress.h"
 #include "client/run_job.h"
+#include "client/table_options.h"
 #include "common/cli/numbers.h"
 #include "common/core/atomic_file.h"
 #include "common/work/identity.h"
@@ -34,6 +35,7 @@ struct ReferenceOptions {
     std::string cross_check;
     double cross_time = 60;
     uint32_t threads = 0;
+    TableCacheOptions cache;
 };
 
 /// Renders until the options' bound, collecting the means of groups.
@@ -106,7 +108,14 @@ int reference(ReferenceOptions& options) {
                                              std::to_string(kLeastGroups) + " groups of iterations, to know the error"));
 
     const RenderSettings settings = render_settings(spec);
-    const auto preparation = prepare(*scene, settings, interrupt_token());
+    const PreparationSource tables = [&](const RenderSettings& of) {
+        JobSpec job = spec;
+        job.algorithm = of.algorithm.completed();
+        job.seed = of.seed;
+        job.max_depth = of.max_depth;
+        return cached_preparation(*scene, job, options.cache, options.job.quiet, interrupt_token());
+    };
+    const auto preparation = tables(settings);
     if (!preparation.ok()) return report_error(preparation.status());
     if (!preparation->note.empty()) std::fprintf(stderr, "lightloom: warning: %s\n", preparation->note.c_str());
     auto progressive = ProgressiveRender::start(scene, settings, *preparation);
@@ -121,6 +130,7 @@ int reference(ReferenceOptions& options) {
     std::filesystem::path json_path = output;
     json_path.replace_extension(".json");
     nlohmann::ordered_json json = describe(options, spec, *progressive, made.front(), *exr);
+    if (spec.algorithm.info().learning) json["tables"] = preparation->cached ? "cached" : "made";
     // Both files before the cross-check: what took hours is safe whatever comes.
     Status status = write_file_atomically(output.string(), *exr);
     if (status.ok()) status = write_file_atomically(json_path.string(), json.dump(1) + "\n");
@@ -143,7 +153,7 @@ int reference(ReferenceOptions& options) {
     }
 
     const RenderSettings checker{checker_choice->settings, spec.seed + 1, spec.max_depth};
-    const auto check = cross_check(scene, settings, made, checker, options.cross_time, interrupt_token());
+    const auto check = cross_check(scene, settings, made, checker, options.cross_time, tables, interrupt_token());
     if (!check.ok()) return report_error(check.status());
     json["cross_check"] = {
         {"algorithm", checker.algorithm.name()}, {"parameters", checker.algorithm.named_text()}, {"seed", checker.seed}};
@@ -183,6 +193,7 @@ void add_reference_command(CLI::App& app, int* exit_code) {
         ->capture_default_str()
         ->check(number_between(0.001, 30 * 86400.0));
     add_threads_option(*command, options->threads);
+    add_table_cache_options(*command, options->cache);
     command->add_flag("-q,--quiet", options->job.quiet, "Print errors and the cross-check only");
     command->callback([options, spp, time, exit_code] {
         if (spp->count() + time->count() == 0) throw CLI::RequiredError("--time or --spp");

@@ -1,16 +1,18 @@
-// lightloom submit, watch, fetch, cancel, list: the commands that talk to a service.
+// The commands that talk to a service: submit, watch, fetch and cancel; list, workers and preview have files of their own.
 
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "client/commands.h"
-#include "client/grpc_job_port.h"
+#include "client/job_label.h"
 #include "client/local_scene.h"
-#include "client/progress.h"
 #include "client/run_job.h"
-#include "common/work/channel.h"
+#include "client/service_options.h"
+#include "common/cli/numbers.h"
+#include "server/status_json.h"
 
 namespace lightloom::client {
 namespace {
@@ -21,30 +23,6 @@ constexpr const char* kSubmitFooter = R"(Examples:
   lightloom fetch JOB --server render1:50051 -o out.exr               later
 
 Files that the service has already are not sent again. Ctrl-C cancels the job.)";
-
-struct ServiceOptions {
-    std::string server = "127.0.0.1:50051";
-    JobOptions job;
-    std::string job_id;
-    bool detach = false;
-};
-
-void add_server_option(CLI::App& command, ServiceOptions& options) {
-    command.add_option("--server", options.server, "HOST:PORT of the coordinator")
-        ->envname("LIGHTLOOM_SERVER")
-        ->capture_default_str();
-}
-
-GrpcJobPort connect(const ServiceOptions& options) {
-    (void)interrupt_token();  // before gRPC makes threads
-    return GrpcJobPort(open_channel(options.server), {.stop = interrupt_token()});
-}
-
-int service_error(const ServiceOptions& options, const Status& status) {
-    if (status.code() != StatusCode::kUnavailable && status.code() != StatusCode::kDeadlineExceeded) return report_error(status);
-    return report_error(
-        {status.code(), "no answer from " + options.server + " (" + status.message() + "); is lightloom-server running there?"});
-}
 
 int submit_job(const ServiceOptions& options) {
     GrpcJobPort port = connect(options);
@@ -59,7 +37,7 @@ int submit_job(const ServiceOptions& options) {
     if (Status s = upload_scene(port, local->scene); !s.ok()) return service_error(options, s);
     times.upload_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     begin = std::chrono::steady_clock::now();
-    const auto job = submit(port, local->spec);
+    const auto job = submit(port, local->spec, make_label(options.name, options.job.scene));
     if (!job.ok()) return service_error(options, job.status());
     if (options.detach) {
         std::printf("%s\n", job->job_id.c_str());
@@ -67,38 +45,25 @@ int submit_job(const ServiceOptions& options) {
     }
     const auto ended = watch(port, job->job_id, options.job.quiet, true);
     times.wait_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    if (!ended.ok()) return service_error(options, ended.status());
+    if (!ended.ok()) return job_error(options, ended.status());
     return fetch(port, *ended, options.job, times, AfterFetch::kImageStays);
-}
-
-int list_jobs(const ServiceOptions& options) {
-    GrpcJobPort port = connect(options);
-    const auto jobs = port.list_jobs();
-    if (!jobs.ok()) return service_error(options, jobs.status());
-    std::printf("%-18s %-10s %-8s %14s %8s  %s\n", "JOB", "STATE", "ALGO", "UNITS", "SPP", "ETA OR MESSAGE");
-    for (const JobInfo& job : *jobs) {
-        const std::string total = job.unit_total > 0 ? std::to_string(job.unit_total) : "-";
-        const std::string units = std::to_string(job.unit_done) + "/" + total;
-        std::string note = job.message;
-        if (job.state == JobState::kPreparing) note = phase_text(job) + " ";
-        if (job.message.empty() && !is_terminal(job.state) && job.eta_seconds >= 0) note += duration_text(job.eta_seconds);
-        std::printf("%-18s %-10s %-8s %14s %8llu  %s\n", job.job_id.c_str(), std::string(to_string(job.state)).c_str(),
-                    job.algorithm.c_str(), units.c_str(), static_cast<unsigned long long>(job.samples_per_pixel_done),
-                    note.c_str());
-    }
-    return kSuccess;
 }
 
 int watch_job(const ServiceOptions& options) {
     GrpcJobPort port = connect(options);
-    const auto ended = watch(port, options.job_id, options.job.quiet, false);
-    return ended.ok() ? kSuccess : service_error(options, ended.status());
+    const auto print = [](const JobInfo& job) {
+        std::printf("%s\n", status_text(status_json(job)).c_str());
+        std::fflush(stdout);  // who reads a pipe wants it now
+    };
+    const auto ended = watch(port, options.job_id, options.job.quiet || options.json, false,
+                             options.json ? print : std::function<void(const JobInfo&)>());
+    return ended.ok() ? kSuccess : job_error(options, ended.status());
 }
 
 int fetch_job(const ServiceOptions& options) {
     GrpcJobPort port = connect(options);
     const auto job = port.get_job(options.job_id);
-    if (!job.ok()) return service_error(options, job.status());
+    if (!job.ok()) return job_error(options, job.status());
     JobOptions output = options.job;
     if (output.output.empty()) output.output = options.job_id + ".exr";
     if (job->state != JobState::kSucceeded) {
@@ -115,10 +80,26 @@ int fetch_job(const ServiceOptions& options) {
 int cancel_job(const ServiceOptions& options) {
     GrpcJobPort port = connect(options);
     const auto job = port.cancel_job(options.job_id);
-    if (!job.ok()) return service_error(options, job.status());
+    if (!job.ok()) return job_error(options, job.status());
     std::printf("%s is %s\n", job->job_id.c_str(), std::string(to_string(job->state)).c_str());
     return kSuccess;
 }
+
+constexpr const char* kWatchFooter =
+    R"(--json prints the present state first and the final one last, ten a second at most. Null stands for what is not known (yet).
+Exit codes: 0 the job succeeded, 1 it failed or the service does not know it, 130 it was cancelled.)";
+
+constexpr const char* kListFooter =
+    "OWNER is USER@HOST as the submitter claimed, which nobody has checked. AGE counts from the submission.";
+
+constexpr const char* kWorkersFooter =
+    R"(States: busy (it holds a unit), idle (it waits for one), resting (it failed several in a row and gets none for a while), gone
+(it left, or was not heard of for longer than a lease), refused (it was not let in; NOTE says why).
+SAMPLES are camera samples per second in its latest units, or light paths of an algorithm that only splats.)";
+
+constexpr const char* kPreviewFooter =
+    R"(The image has the samples that are merged: whole groups of iterations, never parts of one. An EXR has the bytes that
+`lightloom render --spp N` writes for as many samples without --layers. Exit code 1 before the first group is complete.)";
 
 }  // namespace
 
@@ -135,6 +116,12 @@ void add_service_commands(CLI::App& app, int* exit_code) {
         command->footer(kSubmitFooter);
         add_render_settings(*command, options->job);
         add_output_settings(*command, options->job);
+        command
+            ->add_option("--name", options->name,
+                         "What `list` calls the job, up to 128 bytes (default: the scene file's name without .pbrt)")
+            ->check([](const std::string& name) {
+                return check_label({name, {}}).message();
+            });
         auto* detach = command->add_flag("--detach", options->detach,
                                          "Print the job's id and return at once; `fetch --strict` tells of dropped samples");
         for (const char* later : {"--output", "--half", "--png", "--json"})  // `fetch` has its own
@@ -142,12 +129,14 @@ void add_service_commands(CLI::App& app, int* exit_code) {
     }
     {
         const auto [command, options] = add("watch", "Show a job's progress until it ends", watch_job);
-        command->add_option("JOB", options->job_id, "Id from `submit --detach` or `list`")->required();
+        add_job_argument(*command, *options);
+        command->footer(kWatchFooter);
         command->add_flag("-q,--quiet", options->job.quiet, "Wait without a word");
+        command->add_flag("--json", options->json, "One JSON object per change and line instead, as of /api/v1/status");
     }
     {
         const auto [command, options] = add("fetch", "Write the image and manifest of a finished job", fetch_job);
-        command->add_option("JOB", options->job_id, "Id from `submit --detach` or `list`")->required();
+        add_job_argument(*command, *options);
         command->add_option("-o,--output", options->job.output, "EXR to write (default: JOB.exr)");
         add_image_settings(*command, options->job);
         command->add_option("--json", options->job.json, "Write statistics to this file");
@@ -156,9 +145,29 @@ void add_service_commands(CLI::App& app, int* exit_code) {
     }
     {
         const auto [command, options] = add("cancel", "Cancel a job", cancel_job);
-        command->add_option("JOB", options->job_id, "Id from `submit --detach` or `list`")->required();
+        add_job_argument(*command, *options);
     }
-    add("list", "List the jobs of a service", list_jobs);
+    {
+        const auto [command, options] = add("list", "List the jobs of a service", list_jobs);
+        command->footer(kListFooter);
+        command->add_flag("--json", options->json, "One JSON object per job and line, as of /api/v1/status");
+    }
+    {
+        const auto [command, options] = add("workers", "List the workers of a service", list_workers);
+        command->footer(kWorkersFooter);
+        command->add_flag("--all", options->all, "Also those that have been gone for more than an hour");
+        command->add_flag("--json", options->json, "One JSON object per worker and line, as of /api/v1/status");
+    }
+    {
+        const auto [command, options] = add("preview", "Write the image of a running job as it is now", preview_job);
+        command->footer(kPreviewFooter);
+        add_job_argument(*command, *options);
+        command->add_option("-o,--output", options->job.output,
+                            "FILE.png, or FILE.exr with the colours and the variance (default: JOB-preview.png)");
+        command->add_option("--exposure", options->job.exposure, "Stops by which a PNG is brightened")
+            ->check(number_between(-30.0, 30.0));
+        command->add_flag("-q,--quiet", options->job.quiet, "Errors only");
+    }
 }
 
 }  // namespace lightloom::client

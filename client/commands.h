@@ -9,7 +9,7 @@ namespace lightloom::client {
 /// Documented in client/README.md and in `lightloom --help`.
 enum ExitCode : int {
     kSuccess = 0,
-    kFailure = 1,         ///< The job or the comparison failed.
+    kFailure = 1,         ///< The job or the comparison failed, or the service does not know the job.
     kUsage = 2,           ///< Bad command line or bad input file.
     kDroppedSamples = 3,  ///< --strict, and non-finite samples were dropped.
     kUnavailable = 4,     ///< The service could not be reached.
@@ -17,7 +17,7 @@ enum ExitCode : int {
 };
 
 void add_render_command(CLI::App& app, int* exit_code);    // render, embedded
-void add_service_commands(CLI::App& app, int* exit_code);  // submit, watch, fetch, cancel, list
+void add_service_commands(CLI::App& app, int* exit_code);  // submit, watch, fetch, cancel, list, workers, preview
 void add_inspect_command(CLI::App& app, int* exit_code);
 void add_compare_command(CLI::App& app, int* exit_code);
 void add_algorithms_command(CLI::App& app, int* exit_code);

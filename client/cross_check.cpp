@@ -103,8 +103,8 @@ Estimate LengthMeans::estimate(size_t first, size_t last) const {
 }
 
 Result<LengthMeans> measure_lengths(const std::shared_ptr<const Scene>& scene, const RenderSettings& settings, double seconds,
-                                    std::stop_token stop) {
-    const auto preparation = prepare(*scene, settings, stop);
+                                    const PreparationSource& tables, std::stop_token stop) {
+    const auto preparation = tables(settings);
     if (!preparation.ok()) return preparation.status();
     std::vector<ProgressiveRender> renders;
     for (int depth = 0; depth <= settings.max_depth; ++depth) {
@@ -136,8 +136,8 @@ Result<LengthMeans> measure_lengths(const std::shared_ptr<const Scene>& scene, c
 
 Result<CrossCheck> cross_check(const std::shared_ptr<const Scene>& scene, const RenderSettings& producer,
                                const std::vector<Estimate>& made, const RenderSettings& checker, double seconds,
-                               std::stop_token stop) {
-    const auto preparation = prepare(*scene, checker, stop);
+                               const PreparationSource& tables, std::stop_token stop) {
+    const auto preparation = tables(checker);
     if (!preparation.ok()) return preparation.status();
     auto render = ProgressiveRender::start(scene, checker, *preparation);
     if (!render.ok()) return render.status();
@@ -148,9 +148,9 @@ Result<CrossCheck> cross_check(const std::shared_ptr<const Scene>& scene, const 
         if (!image.ok()) return image.status();
         checked.add(*image, render->last_group_iterations());
     }
-    const auto produced_lengths = measure_lengths(scene, producer, seconds / 2, stop);
+    const auto produced_lengths = measure_lengths(scene, producer, seconds / 2, tables, stop);
     if (!produced_lengths.ok()) return produced_lengths.status();
-    const auto checked_lengths = measure_lengths(scene, checker, seconds / 2, stop);
+    const auto checked_lengths = measure_lengths(scene, checker, seconds / 2, tables, stop);
     if (!checked_lengths.ok()) return checked_lengths.status();
 
     std::vector<std::string> what = image_rows();

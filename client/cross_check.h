@@ -2,6 +2,7 @@
 // Whether two algorithms agree on a scene: ratios of mean luminance for the whole image, its regions, and each path length,
 // with simultaneous confidence intervals. A bias of a few percent in one kind of path shows here and not in a picture.
 
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <stop_token>
@@ -47,9 +48,11 @@ struct LengthMeans {
     /// Of lengths `first` to `last` together.
     Estimate estimate(size_t first, size_t last) const;
 };
+/// The tables of a rendering on the scene: made by prepare(), or found.
+using PreparationSource = std::function<Result<Preparation>(const RenderSettings& settings)>;
 /// Renders whole groups for at least `seconds`, and at least kLeastGroups of them.
 Result<LengthMeans> measure_lengths(const std::shared_ptr<const Scene>& scene, const RenderSettings& settings, double seconds,
-                                    std::stop_token stop);
+                                    const PreparationSource& tables, std::stop_token stop);
 
 /// Grid of regions, and the groups that a variance needs at least.
 inline constexpr int kCheckColumns = 3, kCheckRows = 3;
@@ -59,7 +62,7 @@ inline constexpr uint32_t kLeastGroups = 16;
 /// `seconds` more, half for each, compares the path lengths. The two must not share random numbers: other seeds.
 Result<CrossCheck> cross_check(const std::shared_ptr<const Scene>& scene, const RenderSettings& producer,
                                const std::vector<Estimate>& made, const RenderSettings& checker, double seconds,
-                               std::stop_token stop);
+                               const PreparationSource& tables, std::stop_token stop);
 
 /// The rows of `what`, compared at simultaneous levels. References and checks in the same order.
 CrossCheck compare_estimates(const std::vector<std::string>& what, const std::vector<Estimate>& references,

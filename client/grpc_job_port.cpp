@@ -71,12 +71,14 @@ class SilenceLimit {
 /// For a call after an interruption, such as that for the image of a job that had just ended: only a later one could stop it.
 std::stop_token unless_requested(const std::stop_token& stop) { return stop.stop_requested() ? std::stop_token() : stop; }
 
-/// The bytes that a method streams.
-template <class Request>
+/// The bytes that a method streams in messages, of which chunk_of() gives the chunk, or null for one without bytes. `later`
+/// completes an error: what to do when the bytes do not arrive.
+template <class Request, class Message, class ChunkOf>
 Result<std::string> collect(v1::JobService::Stub& stub,
-                            std::unique_ptr<grpc::ClientReader<v1::Chunk>> (v1::JobService::Stub::*method)(grpc::ClientContext*,
-                                                                                                           const Request&),
-                            const Request& request, const GrpcJobPortOptions& options) {
+                            std::unique_ptr<grpc::ClientReader<Message>> (v1::JobService::Stub::*method)(grpc::ClientContext*,
+                                                                                                         const Request&),
+                            const Request& request, const GrpcJobPortOptions& options, const std::string& later,
+                            const ChunkOf& chunk_of) {
     const double silence_seconds = options.silence_seconds;
     const std::stop_token stop = unless_requested(options.stop);
     grpc::ClientContext context;
@@ -84,26 +86,36 @@ Result<std::string> collect(v1::JobService::Stub& stub,
     const auto reader = (stub.*method)(&context, request);
     SilenceLimit silence(context, silence_seconds);
     std::string bytes;
-    v1::Chunk chunk;
-    while (reader->Read(&chunk)) {
+    Message message;
+    while (reader->Read(&message)) {
         silence.heard();
-        if (chunk.offset_bytes() != bytes.size()) {
+        const v1::Chunk* const chunk = chunk_of(message);
+        if (!chunk) continue;
+        if (chunk->offset_bytes() != bytes.size()) {
             abandon(context, *reader);
             return chunk_out_of_order();
         }
-        bytes += chunk.data();
+        bytes += chunk->data();
     }
     const grpc::Status status = reader->Finish();
     if (status.ok()) return bytes;
-    constexpr const char* kLater = "; nothing is lost, `lightloom fetch` tries again";
-    if (stop.stop_requested()) return Status(StatusCode::kCancelled, std::string("interrupted") + kLater);
+    if (stop.stop_requested()) return Status(StatusCode::kCancelled, "interrupted" + later);
     if (silence.exceeded())
         return Status(StatusCode::kDeadlineExceeded,
-                      "nothing more has come from the coordinator for " + seconds_text(silence_seconds) + kLater);
+                      "nothing more has come from the coordinator for " + seconds_text(silence_seconds) + later);
     if (status.error_code() == grpc::StatusCode::UNAVAILABLE)
-        return Status(StatusCode::kUnavailable,
-                      "the connection to the coordinator broke (" + status.error_message() + ")" + kLater);
+        return Status(StatusCode::kUnavailable, "the connection to the coordinator broke (" + status.error_message() + ")" + later);
     return wire::from_grpc(status);
+}
+
+/// The same for messages that are chunks.
+template <class Request>
+Result<std::string> collect(v1::JobService::Stub& stub,
+                            std::unique_ptr<grpc::ClientReader<v1::Chunk>> (v1::JobService::Stub::*method)(grpc::ClientContext*,
+                                                                                                           const Request&),
+                            const Request& request, const GrpcJobPortOptions& options) {
+    return collect(stub, method, request, options, "; nothing is lost, `lightloom fetch` tries again",
+                   [](const v1::Chunk& chunk) { return &chunk; });
 }
 
 Result<JobInfo> job_info(const Result<v1::Job>& answer) {
@@ -119,10 +131,11 @@ GrpcJobPort::GrpcJobPort(std::shared_ptr<grpc::Channel> channel, GrpcJobPortOpti
       jobs_(v1::JobService::NewStub(channel_)),
       assets_(v1::AssetService::NewStub(channel_)) {}
 
-Result<JobInfo> GrpcJobPort::submit_job(const std::string& request_id, const JobSpec& spec) {
+Result<JobInfo> GrpcJobPort::submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label) {
     v1::SubmitJobRequest request;
     request.set_request_id(request_id);
     wire::put(spec, request.mutable_spec());
+    wire::put(label, request.mutable_label());
     return job_info(call(*jobs_, &v1::JobService::Stub::SubmitJob, request, 30));
 }
 
@@ -136,6 +149,14 @@ Result<std::vector<JobInfo>> GrpcJobPort::list_jobs() {
     const auto response = call(*jobs_, &v1::JobService::Stub::ListJobs, {}, 10);
     if (!response.ok()) return response.status();
     return get_all<JobInfo>(response->jobs());
+}
+
+Result<std::vector<WorkerStatus>> GrpcJobPort::list_workers(double gone_within_seconds) {
+    v1::ListWorkersRequest request;
+    request.set_gone_within_seconds(gone_within_seconds);
+    const auto response = call(*jobs_, &v1::JobService::Stub::ListWorkers, request, 10);
+    if (!response.ok()) return response.status();
+    return get_all<WorkerStatus>(response->workers());
 }
 
 Result<JobInfo> GrpcJobPort::cancel_job(const std::string& job_id) {
@@ -183,6 +204,22 @@ Result<std::string> GrpcJobPort::image(const std::string& job_id, ImageKind kind
     request.set_job_id(job_id);
     request.set_kind(kind == ImageKind::kFinal ? v1::IMAGE_KIND_FINAL : v1::IMAGE_KIND_PREVIEW);
     return collect(*jobs_, &v1::JobService::Stub::GetImage, request, options_);
+}
+
+Result<Preview> GrpcJobPort::preview(const std::string& job_id, PreviewFormat format, double exposure) {
+    v1::GetPreviewRequest request;
+    request.set_job_id(job_id);
+    request.set_format(format == PreviewFormat::kPng ? v1::PREVIEW_FORMAT_PNG : v1::PREVIEW_FORMAT_EXR);
+    request.set_exposure_stops(exposure);
+    Preview preview;
+    auto bytes = collect(*jobs_, &v1::JobService::Stub::GetPreview, request, options_, "; `lightloom preview` tries again",
+                         [&](const v1::GetPreviewResponse& message) -> const v1::Chunk* {
+                             if (message.has_header()) preview.samples_per_pixel = message.header().samples_per_pixel();
+                             return message.has_chunk() ? &message.chunk() : nullptr;
+                         });
+    if (!bytes.ok()) return bytes.status();
+    preview.bytes = *std::move(bytes);
+    return preview;
 }
 
 Result<std::string> GrpcJobPort::manifest(const std::string& job_id) {

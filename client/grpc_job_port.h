@@ -23,13 +23,15 @@ struct GrpcJobPortOptions {
 class GrpcJobPort final : public JobPort {
   public:
     explicit GrpcJobPort(std::shared_ptr<grpc::Channel> channel, GrpcJobPortOptions options = {});
-    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec) override;
+    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label) override;
     Result<JobInfo> get_job(const std::string& job_id) override;
     Result<std::vector<JobInfo>> list_jobs() override;
+    Result<std::vector<WorkerStatus>> list_workers(double gone_within_seconds) override;
     Result<JobInfo> cancel_job(const std::string& job_id) override;
     Status watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
                      std::stop_token stop) override;
     Result<std::string> image(const std::string& job_id, ImageKind kind) override;
+    Result<Preview> preview(const std::string& job_id, PreviewFormat format, double exposure) override;
     Result<std::string> manifest(const std::string& job_id) override;
     Result<std::vector<Digest>> find_missing(const std::vector<Digest>& digests) override;
     Status upload(const Digest& digest, const std::filesystem::path& path) override;

@@ -21,8 +21,8 @@ constexpr const char* kFooter = R"(First steps:
   lightloom submit scene.pbrt --server HOST:PORT -o out.exr   on a service
   lightloom COMMAND --help                                    options and examples
 
-Exit codes: 0 success; 1 the job failed; 2 bad command line or input file; 3 --strict and non-finite
-samples were dropped; 4 the service could not be reached; 130 interrupted, or the job was cancelled.)";
+Exit codes: 0 success; 1 the job failed, or the service does not know it; 2 bad command line or input file; 3 --strict
+and non-finite samples were dropped; 4 the service could not be reached; 130 interrupted, or the job was cancelled.)";
 
 }  // namespace
 

@@ -52,11 +52,9 @@ std::string phase_line(const JobInfo& job) {
 
 int percent_of(const JobInfo& job) {
     if (job.state == JobState::kPreparing && job.phase_total > 0) return int(100 * job.phase_done / job.phase_total);
-    if (job.state == JobState::kSucceeded || job.state == JobState::kFinishing) return 100;
-    double done = 0;
-    if (job.unit_total > 0) done = double(job.unit_done) / double(job.unit_total);
-    if (job.spec.time_limit_seconds > 0) done = job.render_seconds / job.spec.time_limit_seconds;
-    return int(100 * std::min(done, 0.995));
+    const double share = rendered_share(job);
+    // Only an image that is complete is shown as 100 %.
+    return job.state == JobState::kSucceeded || job.state == JobState::kFinishing ? 100 : int(100 * std::min(share, 0.995));
 }
 
 }  // namespace
@@ -71,6 +69,14 @@ std::string duration_text(double seconds) {
     } else {
         std::snprintf(text, sizeof text, "%ld h %02ld min", whole / 3600, whole / 60 % 60);
     }
+    return text;
+}
+
+std::string age_text(double seconds) {
+    const auto hours = static_cast<long>(seconds / 3600);
+    if (hours < 48) return duration_text(seconds);
+    char text[64];
+    std::snprintf(text, sizeof text, "%ld d %02ld h", hours / 24, hours % 24);
     return text;
 }
 

@@ -42,5 +42,7 @@ class Progress {
 std::string tables_line(const TablesInfo& tables);
 /// "48 s", "3 min 05 s", "2 h 10 min".
 std::string duration_text(double seconds);
+/// The same, and from two days on "3 d 04 h".
+std::string age_text(double seconds);
 
 }  // namespace lightloom::client

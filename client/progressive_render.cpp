@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <chrono>
 
-#include "common/transport/training.h"
-
 namespace lightloom::client {
 namespace {
 
@@ -41,13 +39,14 @@ Result<AlgorithmChoice> parse_algorithm(const std::string& text) {
     return AlgorithmChoice{settings->completed(), text};
 }
 
-Result<Preparation> prepare(const Scene& scene, const RenderSettings& settings, std::stop_token stop) {
+Result<Preparation> prepare(const Scene& scene, const RenderSettings& settings, std::stop_token stop, TrainingReport* report) {
     if (!settings.algorithm.info().learning) return Preparation{};
     const auto begin = Clock::now();
-    TrainingReport report;
-    auto tables = make_tables(scene, settings, std::move(stop), &report);
+    TrainingReport own;
+    if (!report) report = &own;
+    auto tables = make_tables(scene, settings, std::move(stop), report);
     if (!tables.ok()) return tables.status();
-    return Preparation{*std::move(tables), seconds_since(begin), report.note};
+    return Preparation{*std::move(tables), seconds_since(begin), report->note};
 }
 
 Result<ProgressiveRender> ProgressiveRender::start(std::shared_ptr<const Scene> scene, const RenderSettings& settings,

@@ -14,6 +14,7 @@
 
 #include "common/film/grouped_sum.h"
 #include "common/transport/renderer.h"
+#include "common/transport/training.h"
 #include "common/work/job.h"
 
 namespace lightloom::client {
@@ -32,10 +33,13 @@ struct Preparation {
     Tables tables;  ///< Empty for algorithms that need none.
     double seconds = 0;
     std::string note;  ///< One line where the tables are simpler than asked; empty otherwise.
+    /// They were made before, by whatever threads and processes there were: the seconds are those that were recorded then.
+    bool cached = false;
 };
 
 /// Trains the tables of an algorithm that needs some, on the threads of the calling arena. kCancelled after a stop request.
-Result<Preparation> prepare(const Scene& scene, const RenderSettings& settings, std::stop_token stop);
+Result<Preparation> prepare(const Scene& scene, const RenderSettings& settings, std::stop_token stop,
+                            TrainingReport* report = nullptr);
 
 class ProgressiveRender {
   public:

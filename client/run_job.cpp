@@ -176,11 +176,11 @@ Status upload_scene(JobPort& port, const LocalScene& scene) {
     return {};
 }
 
-Result<JobInfo> submit(JobPort& port, const JobSpec& spec) {
+Result<JobInfo> submit(JobPort& port, const JobSpec& spec, const JobLabel& label) {
     // One id for all attempts: a submission whose answer was lost is not made twice.
     const std::string request_id = random_id();
     for (int attempt = 0;; ++attempt) {
-        auto job = port.submit_job(request_id, spec);
+        auto job = port.submit_job(request_id, spec, label);
         const StatusCode code = job.status().code();
         const bool lost = code == StatusCode::kUnavailable || code == StatusCode::kDeadlineExceeded;
         if (job.ok() || !lost || attempt == 3) return job;
@@ -188,10 +188,21 @@ Result<JobInfo> submit(JobPort& port, const JobSpec& spec) {
     }
 }
 
-Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool cancel_on_interrupt) {
+int report_job_error(const Status& status) {
+    const int code = report_error(status);
+    return status.code() == StatusCode::kNotFound ? kFailure : code;
+}
+
+Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool cancel_on_interrupt,
+                      const std::function<void(const JobInfo&)>& on_change) {
     Progress progress(quiet);
     const Status status = port.watch_job(
-        job_id, [&](const JobInfo& job) { progress.show(job); }, interrupt_token());
+        job_id,
+        [&](const JobInfo& job) {
+            progress.show(job);
+            if (on_change) on_change(job);
+        },
+        interrupt_token());
     progress.finish();
     if (status.code() == StatusCode::kCancelled) {
         if (cancel_on_interrupt) {
@@ -213,11 +224,11 @@ Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool
 int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTimes times, AfterFetch after) {
     const auto begin = Clock::now();
     auto image = port.image(job.job_id, ImageKind::kFinal);
-    if (!image.ok()) return report_error(image.status());
+    if (!image.ok()) return report_job_error(image.status());
     if (sha256(*image) != job.image_digest)
         return report_error(data_loss("the image that arrived differs from the one that was written; fetch it again"));
     auto manifest = port.manifest(job.job_id);
-    if (!manifest.ok()) return report_error(manifest.status());
+    if (!manifest.ok()) return report_job_error(manifest.status());
     ImageFiles files{*std::move(image), *std::move(manifest), job.image_digest};
     std::filesystem::path output = output_path(options);
     Status half_refused;

@@ -27,9 +27,14 @@ Status check_outputs(const JobOptions& options, const std::vector<const char*>& 
 /// Sends what the coordinator lacks of the scene's files.
 Status upload_scene(JobPort& port, const LocalScene& scene);
 /// Submits under a fresh request id.
-Result<JobInfo> submit(JobPort& port, const JobSpec& spec);
-/// Watches until the end; on an interrupt, cancels the job if `cancel_on_interrupt` is set.
-Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool cancel_on_interrupt);
+Result<JobInfo> submit(JobPort& port, const JobSpec& spec, const JobLabel& label = {});
+/// Watches until the end, and calls `on_change` with every state that it sees, the last one included; on an interrupt, cancels the
+/// job if `cancel_on_interrupt` is set.
+Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool cancel_on_interrupt,
+                      const std::function<void(const JobInfo&)>& on_change = {});
+/// Reports the error of a call about a job, as report_error(). A job that the service does not know is a failure (1) and no mistake
+/// in the command line (2), because the service may have known it before.
+int report_job_error(const Status& status);
 /// Fetches image and manifest of a succeeded job and writes them as options ask; reports dropped samples. Where --half is
 /// refused, an image that would be lost is written as float beside OUTPUT. The exit code.
 int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTimes times, AfterFetch after);

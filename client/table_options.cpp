@@ -1,6 +1,5 @@
 #include "client/table_options.h"
 
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 
@@ -10,6 +9,16 @@
 #include "server/table_cache.h"
 
 namespace lightloom::client {
+namespace {
+
+void add_size_option(CLI::App& command, TableCacheOptions& options) {
+    command.add_option("--table-cache-size", options.megabytes, "MiB that it may hold; the tables used least recently go first")
+        ->type_name("MIB")
+        ->check(whole_number_between(1, uint64_t(1) << 30))
+        ->capture_default_str();
+}
+
+}  // namespace
 
 TableCacheOptions::TableCacheOptions() : directory("off") {
     if (const char* home = std::getenv("HOME"); home && *home) directory = std::string(home) + "/.cache/lightloom/tables";
@@ -24,16 +33,22 @@ void add_table_cache_options(CLI::App& command, TableCacheOptions& options) {
         ->type_name("DIR")
         ->envname("LIGHTLOOM_TABLE_CACHE")
         ->capture_default_str();
-    command.add_option("--table-cache-size", options.megabytes, "MiB that it may hold; the tables used least recently go first")
-        ->type_name("MIB")
-        ->check(whole_number_between(1, uint64_t(1) << 30))
-        ->capture_default_str();
+    add_size_option(command, options);
 }
 
-Result<Tables> cached_tables(const Scene& scene, const JobSpec& spec, const TableCacheOptions& options, bool quiet,
-                             std::stop_token stop) {
+void add_measured_table_cache_options(CLI::App& command, TableCacheOptions& options) {
+    options.directory = "off";
+    command
+        .add_option("--table-cache", options.directory,
+                    "Directory of learned tables, as of `lightloom render`, or off: then every run makes its tables anew, and "
+                    "its preparation is measured")
+        ->capture_default_str();
+    add_size_option(command, options);
+}
+Result<Preparation> cached_preparation(const Scene& scene, const JobSpec& spec, const TableCacheOptions& options, bool quiet,
+                                       std::stop_token stop) {
     const LearningInfo* learning = spec.algorithm.info().learning;
-    if (!learning) return Tables();
+    if (!learning) return Preparation();
     const TableCache cache(options.path(), options.bytes());
     Digest key;
     if (!options.path().empty()) {
@@ -42,7 +57,10 @@ Result<Tables> cached_tables(const Scene& scene, const JobSpec& spec, const Tabl
         key = table_key(*identity, spec);
         if (const auto entry = cache.find(key, learning->parts)) {
             auto tables = parse_tables(entry->bytes, learning->parts);
-            if (tables.ok() && tables->validate(scene.emitters()).ok()) return tables;  // otherwise they are made again
+            const TablesInfo& made = entry->info;
+            const double seconds = made.trace_seconds + made.classifier_seconds + made.energy_seconds + made.gamma_seconds;
+            if (tables.ok() && tables->validate(scene.emitters()).ok())  // otherwise they are made again
+                return Preparation{*std::move(tables), seconds, made.note, true};
         }
     }
     const uint64_t samples = learning_plan(spec.algorithm).samples;
@@ -50,17 +68,15 @@ Result<Tables> cached_tables(const Scene& scene, const JobSpec& spec, const Tabl
         std::fprintf(stderr, "lightloom: makes the tables of '%s' from %llu training samples; none of this job are in %s\n",
                      spec.algorithm.name().c_str(), static_cast<unsigned long long>(samples),
                      options.path().empty() ? "a cache (--table-cache off)" : options.directory.c_str());
-    const auto begin = std::chrono::steady_clock::now();
     TrainingReport report;
-    auto tables = make_tables(scene, render_settings(spec), std::move(stop), &report);
-    if (!tables.ok() || options.path().empty()) return tables;
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    auto made = prepare(scene, render_settings(spec), std::move(stop), &report);
+    if (!made.ok() || options.path().empty()) return made;
     const double learned = report.classifier_seconds + report.energy_seconds + report.gamma_seconds;
-    cache.store(key, serialize(*tables),
+    cache.store(key, serialize(made->tables),
                 {.light_subspaces = report.light_subspaces,
                  .eye_subspaces = report.eye_subspaces,
                  .training_samples = samples,
-                 .trace_seconds = seconds - learned,
+                 .trace_seconds = made->seconds - learned,
                  .classifier_seconds = report.classifier_seconds,
                  .energy_seconds = report.energy_seconds,
                  .gamma_seconds = report.gamma_seconds,
@@ -68,7 +84,14 @@ Result<Tables> cached_tables(const Scene& scene, const JobSpec& spec, const Tabl
                  .loss = report.gamma.loss,
                  .prior_strength = report.gamma.prior_strength,
                  .note = report.note});
-    return tables;
+    return made;
+}
+
+Result<Tables> cached_tables(const Scene& scene, const JobSpec& spec, const TableCacheOptions& options, bool quiet,
+                             std::stop_token stop) {
+    auto preparation = cached_preparation(scene, spec, options, quiet, std::move(stop));
+    if (!preparation.ok()) return preparation.status();
+    return std::move(preparation->tables);
 }
 
 }  // namespace lightloom::client

@@ -5,6 +5,7 @@
 #include <stop_token>
 
 #include "client/job_options.h"
+#include "client/progressive_render.h"
 
 namespace lightloom::client {
 
@@ -22,9 +23,15 @@ struct TableCacheOptions {
 /// --table-cache and --table-cache-size.
 void add_table_cache_options(CLI::App& command, TableCacheOptions& options);
 
+/// Adds the same options for a command that measures: the cache is off, whatever the environment says, until a directory is given.
+void add_measured_table_cache_options(CLI::App& command, TableCacheOptions& options);
+
 /// The tables that a job on `scene` renders with, those that a coordinator would learn for it: from the cache, which is where its
-/// `render` put them, or else made here and put there, which a line on standard error says. Empty for an algorithm without tables.
-/// `spec` has the frame and the depth.
+/// `render` put them, or else made here, on the threads of the calling arena, and put there, which a line on standard error says.
+/// Empty for an algorithm without tables. `spec` has the frame and the depth.
+Result<Preparation> cached_preparation(const Scene& scene, const JobSpec& spec, const TableCacheOptions& options, bool quiet,
+                                       std::stop_token stop);
+/// Gives the tables alone.
 Result<Tables> cached_tables(const Scene& scene, const JobSpec& spec, const TableCacheOptions& options, bool quiet,
                              std::stop_token stop);
 

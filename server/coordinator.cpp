@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <random>
 
 #include "common/core/atomic_file.h"
@@ -98,7 +99,7 @@ Result<JobSpec> Coordinator::canonical_spec(const JobSpec& spec) const {
     return out;
 }
 
-Status Coordinator::check_assets(const JobSpec& spec) const {
+Result<std::string> Coordinator::check_assets(const JobSpec& spec) const {
     const Digest& root = spec.scene_root;
     if (!options_.read_scene) return internal_error("this coordinator has no scene reader");
     if (!assets_.contains(root)) return failed_precondition("the scene's file list " + root.hex() + " was not uploaded");
@@ -110,11 +111,12 @@ Status Coordinator::check_assets(const JobSpec& spec) const {
         if (options_.scene_files_needed && !assets_.contains(entry.digest))
             return failed_precondition("\"" + entry.path + "\" of the scene was not uploaded");
     }
-    return {};
+    return manifest->main;
 }
 
-Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const JobSpec& spec) {
+Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label) {
     if (request_id.empty() || request_id.size() > 128) return invalid_argument("a request id has 1 to 128 characters");
+    LL_RETURN_IF_ERROR(check_label(label));
     const auto repeated = [&]() -> std::optional<Result<JobInfo>> {
         const auto known = requests_.find(request_id);
         if (known == requests_.end()) return std::nullopt;
@@ -128,7 +130,8 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     }
     const auto canonical = canonical_spec(spec);
     if (!canonical.ok()) return canonical.status();
-    LL_RETURN_IF_ERROR(check_assets(spec));
+    auto scene = check_assets(spec);
+    if (!scene.ok()) return scene.status();
 
     const std::lock_guard lock(mutex_);
     if (auto answer = repeated()) return *answer;
@@ -141,6 +144,8 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     job.id = new_id("job");
     job.request_id = request_id;
     job.submitted = spec;
+    job.label = label;
+    job.scene = *std::move(scene);
     job.spec = *canonical;
     job.created = options_.clock();
     job.created_at = utc_now();
@@ -189,22 +194,49 @@ Result<JobInfo> Coordinator::wait_job(const std::string& job_id, uint64_t after_
 }
 
 Result<std::string> Coordinator::image(const std::string& job_id, ImageKind kind) const {
-    std::shared_ptr<Reducer> reducer;
+    if (kind == ImageKind::kPreview) {
+        auto made = preview(job_id, PreviewFormat::kPng);
+        if (!made.ok()) return made.status();
+        return std::move(made->bytes);
+    }
     std::filesystem::path directory;
     {
         const std::lock_guard lock(mutex_);
         const auto job = find_job(job_id);
         if (!job) return no_job(job_id);
-        if (kind == ImageKind::kFinal && job->state != JobState::kSucceeded)
+        if (job->state != JobState::kSucceeded)
             return failed_precondition("job " + job_id + " is " + std::string(to_string(job->state)) +
                                        "; its image exists once it has succeeded");
-        if (kind == ImageKind::kPreview && !job->reducer && job->state != JobState::kSucceeded)
-            return failed_precondition("job " + job_id + " has no image to preview");
-        reducer = job->reducer;
         directory = job->directory;
     }
-    if (kind == ImageKind::kFinal) return read_image(directory);
-    return preview_png(directory, reducer.get());
+    return read_image(directory);
+}
+
+Result<Preview> Coordinator::preview(const std::string& job_id, PreviewFormat format, double exposure) const {
+    const std::lock_guard one_at_a_time(preview_mutex_);
+    std::shared_ptr<Reducer> reducer;
+    std::filesystem::path directory;
+    JobSpec spec;
+    {
+        const std::lock_guard lock(mutex_);
+        const auto job = find_job(job_id);
+        if (!job) return no_job(job_id);
+        const std::string what = "job " + job_id + " is " + std::string(to_string(job->state));
+        if (job->state == JobState::kPreparing)
+            return failed_precondition(what + " (" + phase_text(job->info(options_.clock())) + "): there is no image yet");
+        if (!job->reducer && job->state != JobState::kSucceeded)
+            return failed_precondition(what + ": what was rendered of it is gone");
+        reducer = job->reducer;
+        directory = job->directory;
+        spec = job->spec;
+    }
+    try {
+        auto made = make_preview(spec, directory, reducer.get(), format, exposure);
+        if (made.ok()) return made;
+        return Status(made.status().code(), "job " + job_id + ": " + made.status().message());
+    } catch (const std::bad_alloc&) {  // it must not end the coordinator
+        return Status(StatusCode::kResourceExhausted, "the coordinator has too little memory for a preview of job " + job_id);
+    }
 }
 
 Result<std::string> Coordinator::manifest(const std::string& job_id) const {

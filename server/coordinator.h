@@ -57,13 +57,14 @@ class Coordinator {
     AssetStore& assets() { return assets_; }
 
     // Jobs; see JobService for the errors.
-    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec);
+    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label = {});
     Result<JobInfo> get_job(const std::string& job_id) const;
     std::vector<JobInfo> list_jobs() const;
     Result<JobInfo> cancel_job(const std::string& job_id);
     /// The job once its revision is above `after`, or as it is after `timeout_seconds`.
     Result<JobInfo> wait_job(const std::string& job_id, uint64_t after, double timeout_seconds) const;
     Result<std::string> image(const std::string& job_id, ImageKind kind) const;
+    Result<Preview> preview(const std::string& job_id, PreviewFormat format, double exposure = 0) const;
     Result<std::string> manifest(const std::string& job_id) const;
 
     // Workers; see WorkerService for the errors.
@@ -78,16 +79,17 @@ class Coordinator {
     Result<PartialExpectation> expected_partial(const UnitReference& unit) const;
     /// Takes a partial that came over the wire; it is checked against the unit before anything reads it.
     Result<SubmitAck> submit_payload(const std::string& worker_id, const UnitReference& unit, const PartialDescriptor& descriptor,
-                                     std::string_view payload);
-    /// Takes a partial from this process. `digest` is its payload's.
-    Result<SubmitAck> submit_partial(const std::string& worker_id, const UnitReference& unit, const Digest& digest,
-                                     Partial partial);
+                                     std::string_view payload, double render_seconds = 0);
+    /// Takes a partial from this process. `digest` is its payload's; `render_seconds` is the time that it took, or 0 if nobody has
+    /// measured that.
+    Result<SubmitAck> submit_partial(const std::string& worker_id, const UnitReference& unit, const Digest& digest, Partial partial,
+                                     double render_seconds = 0);
     /// Most bytes of the training data of a unit; errors as those of expected_partial().
     Result<uint64_t> expected_training_bytes(const UnitReference& unit) const;
     /// Takes serialized training data, which are checked against digest and unit before they count.
     Result<SubmitAck> submit_training(const std::string& worker_id, const UnitReference& unit, const Digest& digest,
                                       std::string_view payload, double trace_seconds);
-    std::vector<WorkerStatus> workers() const;
+    std::vector<WorkerStatus> workers(double gone_within_seconds = std::numeric_limits<double>::infinity()) const;
 
   private:
     /// The pointer is shared, because a job may be forgotten while a caller works without the mutex.
@@ -95,7 +97,8 @@ class Coordinator {
     TimePoint lease_end() const { return seconds_after(options_.clock(), options_.lease_seconds); }
     void changed(JobRecord& job);
     Result<JobSpec> canonical_spec(const JobSpec& spec) const;
-    Status check_assets(const JobSpec& spec) const;
+    /// Whether the scene's files are here; the path of the scene file among them.
+    Result<std::string> check_assets(const JobSpec& spec) const;
     void fail_job(JobRecord& job, const Status& why);
     void end_job(JobRecord& job, JobState state);
     /// Runs a task on a thread of the job's own. The task's error, too little memory or a missing thread fails this job
@@ -145,6 +148,8 @@ class Coordinator {
     AssetStore assets_;
     const TableCache table_cache_;
     std::mutex repair_mutex_;  ///< Must be locked before mutex_.
+    /// Must be locked before mutex_. One preview is made at a time, because each takes the memory of several images.
+    mutable std::mutex preview_mutex_;
     mutable std::mutex mutex_;
     mutable std::condition_variable work_changed_, job_changed_;
     std::vector<std::shared_ptr<JobRecord>> jobs_;  // oldest first

@@ -28,6 +28,8 @@ Result<WorkerGrant> Coordinator::register_worker(const WorkerHello& hello) {
             "this worker could render other pixels than the coordinator and is refused: worker has " + describe(hello.identity) +
             "; coordinator has " + describe(options_.identity) + "; install the same build on both hosts");
         spdlog::error("worker on {} (process {}): {}", hello.host, hello.process_id, refusal.message());
+        const std::lock_guard lock(mutex_);
+        workers_.refuse(hello, refusal.message(), options_.clock());
         return refusal;
     }
     const std::lock_guard lock(mutex_);
@@ -101,6 +103,7 @@ Result<std::vector<UnitReference>> Coordinator::heartbeat(const std::string& wor
     worker->last_heard = options_.clock();
     std::vector<UnitReference> revoked;
     std::set<UnitReference> held;
+    worker->in_work.reset();
     for (const RunningUnit& item : running) {
         const auto job = find_job(item.unit.job_id);
         UnitTable* const units = job ? job->open_units(item.unit.key) : nullptr;
@@ -109,6 +112,7 @@ Result<std::vector<UnitReference>> Coordinator::heartbeat(const std::string& wor
             continue;
         }
         held.insert(item.unit);
+        if (item.rendering) worker->in_work = item.unit;
         if (item.rendering && item.unit.key.kind == UnitKind::kRender && !job->rendering) {
             job->rendering = true;
             job->first_render = options_.clock();
@@ -168,11 +172,12 @@ Result<PartialExpectation> Coordinator::expected_partial(const UnitReference& re
 }
 
 Result<SubmitAck> Coordinator::submit_payload(const std::string& worker_id, const UnitReference& unit,
-                                              const PartialDescriptor& descriptor, std::string_view payload) {
+                                              const PartialDescriptor& descriptor, std::string_view payload,
+                                              double render_seconds) {
     const auto expected = expected_partial(unit);
     if (!expected.ok()) return unexpected_result(expected.status());
     auto partial = decode_partial(*expected, descriptor, payload);
-    if (partial.ok()) return submit_partial(worker_id, unit, descriptor.payload_digest, *std::move(partial));
+    if (partial.ok()) return submit_partial(worker_id, unit, descriptor.payload_digest, *std::move(partial), render_seconds);
 
     const std::lock_guard lock(mutex_);
     WorkerRecord* worker = workers_.find(worker_id);
@@ -213,7 +218,7 @@ std::optional<SubmitAck> Coordinator::repeated_result(JobRecord& job, UnitTable&
 }
 
 Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, const UnitReference& reference, const Digest& digest,
-                                              Partial partial) {
+                                              Partial partial, double render_seconds) {
     std::shared_ptr<Reducer> reducer;
     std::shared_ptr<JobRecord> job;
     uint32_t index = 0;
@@ -258,6 +263,8 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
         job->splats_per_path = splats_per_path;
         size_window(*job);
     }
+    const uint64_t samples = counters.camera_samples > 0 ? counters.camera_samples : counters.light_paths;
+    workers_.at(index).delivered(job->id, double(samples), render_seconds);
     ++workers_.at(index).merged;
     workers_.unit_succeeded(workers_.at(index));
     job->workers.insert(index);
@@ -276,9 +283,9 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     return SubmitAck{SubmitOutcome::kAccepted, {}};
 }
 
-std::vector<WorkerStatus> Coordinator::workers() const {
+std::vector<WorkerStatus> Coordinator::workers(double gone_within_seconds) const {
     const std::lock_guard lock(mutex_);
-    return workers_.statuses(options_.clock());
+    return workers_.statuses(options_.clock(), gone_within_seconds);
 }
 
 }  // namespace lightloom

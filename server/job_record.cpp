@@ -80,6 +80,9 @@ JobInfo JobRecord::info(TimePoint now) const {
     info.duplicates_different = duplicates_different;
     info.tables = tables;
     info.rare_light = rare_light_report;
+    info.label = label;
+    info.scene = scene;
+    info.age_seconds = seconds_between(created, now);
     tell_rendering(*this, now, &info);
     tell_preparation(*this, now, &info);
     return info;

@@ -22,6 +22,8 @@ struct JobRecord {
     std::string id, request_id;
     JobSpec submitted;  ///< As submitted, to recognise a repeated submission.
     JobSpec spec;       ///< Canonical, completed from the scene.
+    JobLabel label;
+    std::string scene;  ///< Path of the scene file in its file list.
     JobState state = JobState::kPreparing;
     std::string message;
     uint64_t revision = 1;
@@ -85,12 +87,6 @@ struct JobRecord {
 /// The job itself, or the job at the end of the chain of those that it waits for. There is no circle: a job that waits
 /// makes no tables, and only jobs that make tables are waited for.
 const std::shared_ptr<JobRecord>& maker_of_last_resort(const std::shared_ptr<JobRecord>& job);
-
-/// Text after the word "unit" in messages.
-inline std::string unit_name(const UnitKey& key) {
-    return key.kind == UnitKind::kRender ? std::to_string(key.group) + "/" + std::to_string(key.tile)
-                                         : "of training " + std::to_string(key.round) + "/" + std::to_string(key.group);
-}
 
 /// A unit that failed on this many workers fails its job, because the unit is the cause and not the workers.
 inline constexpr int kMaxFailedWorkers = 3;

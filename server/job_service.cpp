@@ -9,15 +9,22 @@ namespace {
 
 constexpr auto kWatchInterval = std::chrono::milliseconds(100);
 
-grpc::Status send(const Result<std::string>& bytes, grpc::ServerWriter<v1::Chunk>* writer) {
-    if (!bytes.ok()) return wire::to_grpc(bytes.status());
-    v1::Chunk chunk;
-    for (size_t offset = 0; offset < bytes->size(); offset += kMaxChunkBytes) {
-        chunk.set_offset_bytes(offset);
-        chunk.set_data(bytes->data() + offset, std::min<size_t>(kMaxChunkBytes, bytes->size() - offset));
-        if (!writer->Write(chunk)) return {grpc::StatusCode::CANCELLED, "the client went away"};
+/// Sends the bytes as chunks, each of which chunk_of(message) points to in its message.
+template <class Message, class ChunkOf>
+grpc::Status send(const std::string& bytes, grpc::ServerWriter<Message>* writer, const ChunkOf& chunk_of) {
+    Message message;
+    for (size_t offset = 0; offset < bytes.size(); offset += kMaxChunkBytes) {
+        v1::Chunk* const chunk = chunk_of(message);
+        chunk->set_offset_bytes(offset);
+        chunk->set_data(bytes.data() + offset, std::min<size_t>(kMaxChunkBytes, bytes.size() - offset));
+        if (!writer->Write(message)) return {grpc::StatusCode::CANCELLED, "the client went away"};
     }
     return grpc::Status::OK;
+}
+
+grpc::Status send(const Result<std::string>& bytes, grpc::ServerWriter<v1::Chunk>* writer) {
+    if (!bytes.ok()) return wire::to_grpc(bytes.status());
+    return send(*bytes, writer, [](v1::Chunk& chunk) { return &chunk; });
 }
 
 }  // namespace
@@ -25,7 +32,7 @@ grpc::Status send(const Result<std::string>& bytes, grpc::ServerWriter<v1::Chunk
 grpc::Status JobServiceImpl::SubmitJob(grpc::ServerContext*, const v1::SubmitJobRequest* request, v1::Job* response) {
     const auto spec = wire::get(request->spec());
     if (!spec.ok()) return wire::to_grpc(spec.status());
-    return answer(coordinator_.submit_job(request->request_id(), *spec), response);
+    return answer(coordinator_.submit_job(request->request_id(), *spec, wire::get(request->label())), response);
 }
 
 grpc::Status JobServiceImpl::GetJob(grpc::ServerContext*, const v1::GetJobRequest* request, v1::Job* response) {
@@ -34,6 +41,15 @@ grpc::Status JobServiceImpl::GetJob(grpc::ServerContext*, const v1::GetJobReques
 
 grpc::Status JobServiceImpl::ListJobs(grpc::ServerContext*, const v1::ListJobsRequest*, v1::ListJobsResponse* response) {
     for (const JobInfo& info : coordinator_.list_jobs()) wire::put(info, response->add_jobs());
+    return grpc::Status::OK;
+}
+
+grpc::Status JobServiceImpl::ListWorkers(grpc::ServerContext*, const v1::ListWorkersRequest* request,
+                                         v1::ListWorkersResponse* response) {
+    const double within = request->gone_within_seconds();
+    if (!(within >= 0)) return invalid("gone_within_seconds is 0 or more");
+    const auto workers = within > 0 ? coordinator_.workers(within) : coordinator_.workers();
+    for (const WorkerStatus& worker : workers) wire::put(worker, response->add_workers());
     return grpc::Status::OK;
 }
 
@@ -68,6 +84,21 @@ grpc::Status JobServiceImpl::GetImage(grpc::ServerContext*, const v1::GetImageRe
         case v1::IMAGE_KIND_PREVIEW: return send(coordinator_.image(request->job_id(), ImageKind::kPreview), writer);
         default: return invalid("an image is FINAL or PREVIEW");
     }
+}
+
+grpc::Status JobServiceImpl::GetPreview(grpc::ServerContext*, const v1::GetPreviewRequest* request,
+                                        grpc::ServerWriter<v1::GetPreviewResponse>* writer) {
+    if (request->format() != v1::PREVIEW_FORMAT_PNG && request->format() != v1::PREVIEW_FORMAT_EXR)
+        return invalid("a preview is a PNG or an EXR");
+    const double exposure = request->exposure_stops();
+    if (!(exposure >= -30 && exposure <= 30)) return invalid("the exposure of a preview lies between -30 and 30 stops");
+    const auto format = request->format() == v1::PREVIEW_FORMAT_PNG ? PreviewFormat::kPng : PreviewFormat::kExr;
+    const auto preview = coordinator_.preview(request->job_id(), format, exposure);
+    if (!preview.ok()) return wire::to_grpc(preview.status());
+    v1::GetPreviewResponse header;
+    header.mutable_header()->set_samples_per_pixel(preview->samples_per_pixel);
+    if (!writer->Write(header)) return {grpc::StatusCode::CANCELLED, "the client went away"};
+    return send(preview->bytes, writer, [](v1::GetPreviewResponse& message) { return message.mutable_chunk(); });
 }
 
 grpc::Status JobServiceImpl::GetManifest(grpc::ServerContext*, const v1::GetManifestRequest* request,

@@ -4,11 +4,14 @@
 
 namespace lightloom {
 
-Result<JobInfo> LocalJobPort::submit_job(const std::string& request_id, const JobSpec& spec) {
-    return coordinator_.submit_job(request_id, spec);
+Result<JobInfo> LocalJobPort::submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label) {
+    return coordinator_.submit_job(request_id, spec, label);
 }
 Result<JobInfo> LocalJobPort::get_job(const std::string& job_id) { return coordinator_.get_job(job_id); }
 Result<std::vector<JobInfo>> LocalJobPort::list_jobs() { return coordinator_.list_jobs(); }
+Result<std::vector<WorkerStatus>> LocalJobPort::list_workers(double gone_within_seconds) {
+    return gone_within_seconds > 0 ? coordinator_.workers(gone_within_seconds) : coordinator_.workers();
+}
 Result<JobInfo> LocalJobPort::cancel_job(const std::string& job_id) { return coordinator_.cancel_job(job_id); }
 
 Status LocalJobPort::watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
@@ -25,6 +28,9 @@ Status LocalJobPort::watch_job(const std::string& job_id, const std::function<vo
 }
 
 Result<std::string> LocalJobPort::image(const std::string& job_id, ImageKind kind) { return coordinator_.image(job_id, kind); }
+Result<Preview> LocalJobPort::preview(const std::string& job_id, PreviewFormat format, double exposure) {
+    return coordinator_.preview(job_id, format, exposure);
+}
 Result<std::string> LocalJobPort::manifest(const std::string& job_id) { return coordinator_.manifest(job_id); }
 
 Result<std::vector<Digest>> LocalJobPort::find_missing(const std::vector<Digest>& digests) {
@@ -54,12 +60,14 @@ Result<std::vector<UnitReference>> LocalWorkerPort::heartbeat(const std::string&
     return coordinator_.heartbeat(worker_id, running);
 }
 
-Result<SubmitAck> LocalWorkerPort::submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial, double) {
+Result<SubmitAck> LocalWorkerPort::submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial,
+                                                 double render_seconds) {
     // The partial is encoded only for its digest, by which duplicates are recognised; decoding it again would only cost
     // time.
     const auto encoded = encode_partial(partial, lease.spec.frame);
     if (!encoded.ok()) return encoded.status();
-    return coordinator_.submit_partial(worker_id, lease.reference(), encoded->descriptor.payload_digest, std::move(partial));
+    return coordinator_.submit_partial(worker_id, lease.reference(), encoded->descriptor.payload_digest, std::move(partial),
+                                       render_seconds);
 }
 
 Result<SubmitAck> LocalWorkerPort::submit_training(const std::string& worker_id, const UnitLease& lease, std::string_view payload,

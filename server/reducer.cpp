@@ -1,10 +1,18 @@
 #include "server/reducer.h"
 
+#include <algorithm>
+#include <chrono>
 #include <new>
 #include <string>
+#include <thread>
 #include <utility>
 
 namespace lightloom {
+namespace {
+
+constexpr int kDevelopAttempts = 4;
+
+}  // namespace
 
 Reducer::Reducer(const FrameLayout& frame, uint32_t tile_count, const FilmResponse& response)
     : frame_(frame),
@@ -96,23 +104,38 @@ std::vector<Reducer::Dropped> Reducer::first_dropped() const {
     return out;
 }
 
-Result<RgbImage> Reducer::image() const {
-    const std::lock_guard lock(mutex_);
-    if (group_count() == 0) return failed_precondition("no group of iterations is complete yet; ask again later");
-    return sums_->complete().develop();
-}
-
-Result<RgbImage> Reducer::variance() const {
-    const std::lock_guard lock(mutex_);
-    return sums_ ? sums_->complete().variance() : RgbImage();
+Result<DevelopedImage> Reducer::developed(bool with_variance, const std::function<void()>& between) const {
+    const size_t pixels = size_t(frame_.crop.area());
+    const auto blank = [&] { return RgbImage{frame_.crop.width(), frame_.crop.height(), std::vector<float>(3 * pixels)}; };
+    for (int attempt = 1;; ++attempt) {
+        const uint32_t groups = folded_groups();
+        if (groups == 0) return failed_precondition("no group of iterations is complete yet; ask again later");
+        DevelopedImage image{blank(), with_variance && groups > 1 ? blank() : RgbImage(), 0, groups};
+        std::unique_lock lock(mutex_);
+        for (size_t first = 0; group_count() == groups;) {
+            const size_t count = std::min(kPixelsAtATime, pixels - first);
+            const Accumulation& complete = sums_->complete();
+            complete.develop(first, count, &image.color.pixels[3 * first]);
+            if (!image.variance.pixels.empty()) complete.variance(first, count, &image.variance.pixels[3 * first]);
+            image.iterations = complete.iterations();
+            first += count;
+            if (first == pixels) return image;
+            if (attempt >= kDevelopAttempts) continue;
+            lock.unlock();
+            if (between) between();
+            // Mutexes are not fair: without a pause, this thread would have it again before those that wait for it.
+            std::this_thread::sleep_for(std::chrono::microseconds(100));
+            lock.lock();
+        }
+    }
 }
 
 RareLightReport Reducer::rare_light_report(const RareLight& light) const {
     if (!light.known()) return {};
-    const auto developed = image();
-    if (!developed.ok()) return {};
+    const auto complete = developed(false);
+    if (!complete.ok()) return {};
     double sum = 0;
-    const std::vector<float>& pixels = developed->pixels;
+    const std::vector<float>& pixels = complete->color.pixels;
     for (size_t i = 0; i + 2 < pixels.size(); i += 3) sum += double(Rgb(pixels[i], pixels[i + 1], pixels[i + 2]).luminance());
     const FilmResponse::Triple grey = response_.of(Rgb(1.0f));
     const double exposure = double(Rgb(float(grey[0]), float(grey[1]), float(grey[2])).luminance());

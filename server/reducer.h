@@ -4,6 +4,7 @@
 // its key). It takes memory (256 bytes per pixel) only from the first partial on, so that waiting jobs take none.
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -14,6 +15,13 @@
 #include "common/work/job.h"
 
 namespace lightloom {
+
+/// The image of the complete groups.
+struct DevelopedImage {
+    RgbImage color, variance;  ///< The latter is empty where it is not known.
+    uint64_t iterations = 0;
+    uint32_t groups = 0;
+};
 
 class Reducer {
   public:
@@ -44,9 +52,11 @@ class Reducer {
     };
     static constexpr size_t kMaxDropped = 64;
     std::vector<Dropped> first_dropped() const;
-    /// Developed complete groups; kFailedPrecondition before the first.
-    Result<RgbImage> image() const;
-    Result<RgbImage> variance() const;
+    /// Develops the complete groups, with their variance if that is asked for; kFailedPrecondition before the first. Results are
+    /// taken in meanwhile: the lock is held for a part of the frame at a time. When a group was completed between two parts, all
+    /// begins again (a few times; then results wait until it is done). `between` is called between two parts (tests).
+    Result<DevelopedImage> developed(bool with_variance, const std::function<void()>& between = {}) const;
+    static constexpr size_t kPixelsAtATime = size_t(1) << 16;
     /// The consequences of `light` for the image of the complete groups.
     RareLightReport rare_light_report(const RareLight& light) const;
 

@@ -206,29 +206,38 @@ Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, 
 }
 
 Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, std::vector<ImageLayer> layers) {
-    auto color = reducer.image();
-    if (!color.ok()) return color.status();
-    auto variance = reducer.variance();
-    if (!variance.ok()) return variance.status();
-    return encode_image(spec, {*std::move(color), *std::move(variance), reducer.iterations(), reducer.folded_groups()},
-                        std::move(layers));
+    auto developed = reducer.developed(true);
+    if (!developed.ok()) return developed.status();
+    return encode_image(spec, *std::move(developed), std::move(layers));
 }
 
 Result<std::string> read_image(const std::filesystem::path& job_directory) {
     return read_file((job_directory / "image.exr").string());
 }
 
-Result<std::string> preview_png(const std::filesystem::path& job_directory, const Reducer* reducer) {
+Result<Preview> make_preview(const JobSpec& spec, const std::filesystem::path& job_directory, const Reducer* reducer,
+                             PreviewFormat format, double exposure) {
+    DevelopedImage developed;
     if (reducer) {
-        const auto image = reducer->image();
+        auto merged = reducer->developed(format == PreviewFormat::kExr);
+        if (!merged.ok()) return merged.status();
+        developed = *std::move(merged);
+    } else {
+        auto bytes = read_image(job_directory);
+        if (!bytes.ok()) return bytes.status();
+        auto image = decode_exr(*bytes, "the finished image");
         if (!image.ok()) return image.status();
-        return encode_png(*image);
+        developed.iterations = std::strtoull(image->attribute(exr_attribute::kSamples).c_str(), nullptr, 10);
+        if (format == PreviewFormat::kExr) return Preview{*std::move(bytes), developed.iterations};
+        developed.color = std::move(image->color);
     }
-    const auto bytes = read_image(job_directory);
+    const uint64_t iterations = developed.iterations;
+    JobSpec shown = spec;
+    shown.first_hit_layers = false;  // the digest in the header is that of an image without them
+    auto bytes =
+        format == PreviewFormat::kPng ? encode_png(developed.color, exposure) : encode_image(shown, std::move(developed), {});
     if (!bytes.ok()) return bytes.status();
-    const auto image = decode_exr(*bytes, "the finished image");
-    if (!image.ok()) return image.status();
-    return encode_png(image->color);
+    return Preview{*std::move(bytes), iterations};
 }
 
 }  // namespace lightloom

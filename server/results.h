@@ -50,20 +50,15 @@ nlohmann::ordered_json to_json(const TablesInfo& tables);
 /// The manifest as JSON text.
 std::string to_json(const Manifest& manifest);
 
-/// Complete groups, developed.
-struct DevelopedImage {
-    RgbImage color, variance;
-    uint64_t iterations = 0;
-    uint32_t groups = 0;
-};
-
 /// The EXR's bytes: colour, its variance where that is known, and `layers`. They do not depend on who rendered it, and
 /// how.
 Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers);
 /// The same for the merged groups of `reducer`.
 Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, std::vector<ImageLayer> layers);
 Result<std::string> read_image(const std::filesystem::path& job_directory);
-/// PNG of the groups merged so far, or of the finished image when there is no reducer any more.
-Result<std::string> preview_png(const std::filesystem::path& job_directory, const Reducer* reducer);
+/// The groups merged so far, or the finished image when there is no reducer any more, as PNG brightened by `exposure` stops or as
+/// EXR without first-hit layers. Needs memory for a few copies of the frame.
+Result<Preview> make_preview(const JobSpec& spec, const std::filesystem::path& job_directory, const Reducer* reducer,
+                             PreviewFormat format, double exposure);
 
 }  // namespace lightloom

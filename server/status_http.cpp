@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "server/host_port.h"
-#include "server/results.h"
+#include "server/status_json.h"
 
 namespace lightloom {
 namespace {
@@ -27,39 +27,10 @@ constexpr auto kPause = std::chrono::milliseconds(100);
 
 std::string status_json(const Coordinator& coordinator) {
     Json jobs = Json::array();
-    for (const JobInfo& j : coordinator.list_jobs()) {
-        jobs.push_back({{"job", j.job_id},
-                        {"state", to_string(j.state)},
-                        {"message", j.message},
-                        {"algorithm", j.spec.algorithm.name()},
-                        {"phase", j.state == JobState::kPreparing ? Json(phase_text(j)) : Json(nullptr)},
-                        {"phase_done", j.phase_done},
-                        {"phase_total", j.phase_total},
-                        {"units_done", j.unit_done},
-                        {"units_total", j.unit_total > 0 ? Json(j.unit_total) : Json(nullptr)},
-                        {"units_leased", j.unit_leased},
-                        {"samples_per_pixel_done", j.samples_per_pixel_done},
-                        {"render_seconds", j.render_seconds},
-                        {"eta_seconds", j.eta_seconds >= 0 ? Json(j.eta_seconds) : Json(nullptr)},
-                        {"dropped_samples", j.dropped_samples},
-                        {"rare_light", to_json(j.rare_light)},
-                        {"workers", j.worker_count},
-                        {"duplicates_different", j.duplicates_different}});
-    }
+    for (const JobInfo& job : coordinator.list_jobs()) jobs.push_back(status_json(job));
     Json workers = Json::array();
-    for (const WorkerStatus& w : coordinator.workers()) {
-        workers.push_back({{"worker", w.worker_id},
-                           {"host", w.host},
-                           {"process_id", w.process_id},
-                           {"threads", w.thread_count},
-                           {"units_merged", w.units_merged},
-                           {"units_held", w.units_held},
-                           {"seconds_since_heard", w.seconds_since_heard},
-                           {"lost", w.lost}});
-    }
-    // Messages may quote bytes that are not UTF-8 (file names, cut texts), for which dump() would throw by default.
-    const Json status{{"jobs", std::move(jobs)}, {"workers", std::move(workers)}};
-    return status.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+    for (const WorkerStatus& worker : coordinator.workers()) workers.push_back(status_json(worker));
+    return status_text({{"jobs", std::move(jobs)}, {"workers", std::move(workers)}}, 1) + "\n";
 }
 
 http::response<http::string_body> respond(const Coordinator& coordinator, const http::request<http::empty_body>& request) {

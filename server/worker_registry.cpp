@@ -4,6 +4,27 @@
 #include <cmath>
 
 namespace lightloom {
+namespace {
+
+constexpr size_t kMaxRefused = 32;
+/// What is left of the weight of a unit in a worker's pace with every later one.
+constexpr double kPaceDecay = 0.8;
+
+}  // namespace
+
+void WorkerRecord::delivered(const std::string& job_id, double samples, double seconds) {
+    if (!(seconds > 0 && std::isfinite(seconds))) return;  // it comes from the worker
+    if (pace.job != job_id) pace = {job_id, 0, 0};         // samples of another algorithm or scene cost something else
+    pace.samples = kPaceDecay * pace.samples + samples;
+    pace.seconds = kPaceDecay * pace.seconds + seconds;
+}
+
+void WorkerRegistry::refuse(const WorkerHello& hello, const std::string& why, TimePoint now) {
+    // Whoever starts a worker again and again sees it once.
+    std::erase_if(refused_, [&](const Refused& r) { return r.hello.host == hello.host && r.why == why; });
+    if (refused_.size() == kMaxRefused) refused_.pop_front();
+    refused_.push_back({hello, why, now});
+}
 
 WorkerRecord& WorkerRegistry::add(const WorkerHello& hello, TimePoint now) {
     auto worker = std::make_unique<WorkerRecord>();
@@ -11,6 +32,7 @@ WorkerRecord& WorkerRegistry::add(const WorkerHello& hello, TimePoint now) {
     worker->id = "worker-" + std::to_string(worker->index + 1) + "-" + hello.host + "-" + std::to_string(hello.process_id);
     worker->hello = hello;
     worker->last_heard = now;
+    std::erase_if(refused_, [&](const Refused& r) { return r.hello.host == hello.host; });
     indices_.emplace(worker->id, worker->index);
     workers_.push_back(std::move(worker));
     return *workers_.back();
@@ -59,11 +81,48 @@ bool WorkerRegistry::fell_silent(uint32_t index, TimePoint now) {
     return true;
 }
 
-std::vector<WorkerStatus> WorkerRegistry::statuses(TimePoint now) const {
+WorkerState WorkerRegistry::state(const WorkerRecord& worker, TimePoint now) const {
+    if (lost(worker, now)) return WorkerState::kGone;
+    if (!worker.held.empty()) return WorkerState::kBusy;
+    return rests(worker, now) ? WorkerState::kResting : WorkerState::kIdle;
+}
+
+std::vector<WorkerStatus> WorkerRegistry::statuses(TimePoint now, double gone_within_seconds) const {
     std::vector<WorkerStatus> out;
-    for (const auto& w : workers_)
-        out.push_back({w->id, w->hello.host, w->hello.process_id, w->hello.thread_count, w->merged, w->held.size(),
-                       seconds_between(w->last_heard, now), lost(*w, now)});
+    for (const auto& w : workers_) {
+        WorkerStatus status{.worker_id = w->id,
+                            .host = w->hello.host,
+                            .process_id = w->hello.process_id,
+                            .thread_count = w->hello.thread_count,
+                            .state = state(*w, now),
+                            .note = {},
+                            .in_work = {},
+                            .units_merged = w->merged,
+                            .units_held = w->held.size(),
+                            .samples_per_second = w->pace.seconds > 0 ? w->pace.samples / w->pace.seconds : 0,
+                            .seconds_since_heard = seconds_between(w->last_heard, now)};
+        if (status.state == WorkerState::kGone) {
+            if (status.seconds_since_heard > gone_within_seconds) continue;
+            status.note = w->left ? "left" : "fell silent";
+        } else if (w->in_work && w->held.contains(*w->in_work)) {
+            status.in_work = w->in_work;
+        }
+        if (status.state == WorkerState::kResting)
+            status.note = "failed " + std::to_string(w->failures_in_a_row) + " units in a row";
+        out.push_back(std::move(status));
+    }
+    for (const Refused& r : refused_) {
+        const double seconds = seconds_between(r.when, now);
+        if (seconds > gone_within_seconds) continue;
+        out.push_back({.worker_id = {},
+                       .host = r.hello.host,
+                       .process_id = r.hello.process_id,
+                       .thread_count = r.hello.thread_count,
+                       .state = WorkerState::kRefused,
+                       .note = r.why,
+                       .in_work = {},
+                       .seconds_since_heard = seconds});
+    }
     return out;
 }
 

@@ -4,6 +4,8 @@
 // index.
 
 #include <cstdint>
+#include <deque>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -15,15 +17,6 @@
 #include "server/time_point.h"
 
 namespace lightloom {
-
-struct WorkerStatus {
-    std::string worker_id, host;
-    uint64_t process_id = 0;
-    uint32_t thread_count = 0;
-    uint64_t units_merged = 0, units_held = 0;
-    double seconds_since_heard = 0;
-    bool lost = false;  ///< Whether it was not heard of for longer than a lease, or said goodbye.
-};
 
 struct WorkerRecord {
     std::string id;
@@ -37,9 +30,17 @@ struct WorkerRecord {
     int failures_in_a_row = 0;
     TimePoint rests_until;  ///< It gets no unit before then while there are workers that do not rest.
     std::set<UnitReference> held;
+    std::optional<UnitReference> in_work;  ///< Of these, the one that it said it renders; it may have been delivered since.
+    /// Of the latest units of `job`; see delivered().
+    struct Pace {
+        std::string job;
+        double samples = 0, seconds = 0;
+    } pace;
 
     /// A worker may hold one unit beside the one that it renders, so that it does not idle between two.
     bool has_room() const { return held.size() < 2; }
+    /// A unit of a job was merged: so many camera samples, or light paths, that took it so many seconds.
+    void delivered(const std::string& job_id, double samples, double seconds);
 };
 
 class WorkerRegistry {
@@ -51,6 +52,9 @@ class WorkerRegistry {
     /// Finds a worker; null if it is unknown or has left.
     WorkerRecord* find(const std::string& id) const;
     WorkerRecord& at(uint32_t index) const { return *workers_.at(index); }
+
+    /// Remembers a worker that was not let in, until one registers from the same host. Only the last few are kept.
+    void refuse(const WorkerHello& hello, const std::string& why, TimePoint now);
 
     /// Number of workers that hold nothing and wait for a unit.
     size_t idle() const;
@@ -71,9 +75,11 @@ class WorkerRegistry {
     /// Whether the unit whose lease this worker let expire is blamed for its silence: one unit is for each silence. A
     /// worker that was heard of within half a lease has lost a lease on the way but is alive.
     bool fell_silent(uint32_t index, TimePoint now);
-    std::vector<WorkerStatus> statuses(TimePoint now) const;
+    /// Without those that are gone, or were refused, for longer than `gone_within_seconds`.
+    std::vector<WorkerStatus> statuses(TimePoint now, double gone_within_seconds = std::numeric_limits<double>::infinity()) const;
 
   private:
+    WorkerState state(const WorkerRecord& worker, TimePoint now) const;
     bool lost(const WorkerRecord& worker, TimePoint now) const {
         return worker.left || seconds_between(worker.last_heard, now) > lease_seconds_;
     }
@@ -81,6 +87,12 @@ class WorkerRegistry {
     double lease_seconds_;
     std::vector<std::unique_ptr<WorkerRecord>> workers_;  // by index
     std::map<std::string, uint32_t> indices_;             // by id
+    struct Refused {
+        WorkerHello hello;
+        std::string why;
+        TimePoint when;
+    };
+    std::deque<Refused> refused_;  // oldest first
 };
 
 inline Status no_worker(const std::string& id) { return not_found("unknown worker " + id + "; register again"); }

@@ -70,7 +70,7 @@ grpc::Status WorkerServiceImpl::SubmitResult(grpc::ServerContext*, grpc::ServerR
         return invalid("the payload of this unit has " + std::to_string(size) + " bytes, but the announced size is " +
                        std::to_string(descriptor->payload_size));
     return take_payload(reader, size, response, [&](std::string_view payload) {
-        return coordinator_.submit_payload(header.worker_id(), unit, *descriptor, payload);
+        return coordinator_.submit_payload(header.worker_id(), unit, *descriptor, payload, header.render_seconds());
     });
 }
 

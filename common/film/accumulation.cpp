@@ -128,22 +128,30 @@ Status Accumulation::fold(const GroupSum& group, uint32_t iterations) {
 
 RgbImage Accumulation::develop() const {
     RgbImage image{frame_.crop.width(), frame_.crop.height(), std::vector<float>(camera_.size())};
-    for (size_t first = 0; first < camera_.size(); first += 3) {
-        FilmResponse::Triple value;
-        for (size_t c = 0; c < 3; ++c)
-            value[c] = pixel_value(camera_.value(first + c), camera_count_[first / 3], splat_.value(first + c), light_paths_);
-        value = response_(value);
-        for (size_t c = 0; c < 3; ++c) image.pixels[first + c] = float(value[c]);
-    }
+    develop(0, camera_count_.size(), image.pixels.data());
     return image;
 }
 
 RgbImage Accumulation::variance() const {
     if (group_count_ < 2) return {};
     RgbImage image{frame_.crop.width(), frame_.crop.height(), std::vector<float>(camera_.size())};
-    const double factor = response_.exposure * response_.exposure / (double(group_count_ - 1) * double(iterations_));
-    for (size_t i = 0; i < moment_.size(); ++i) image.pixels[i] = float(moment_[i] * factor);
+    variance(0, camera_count_.size(), image.pixels.data());
     return image;
+}
+
+void Accumulation::develop(size_t first, size_t count, float* values) const {
+    for (size_t p = first; p < first + count; ++p) {
+        FilmResponse::Triple value;
+        for (size_t c = 0; c < 3; ++c)
+            value[c] = pixel_value(camera_.value(3 * p + c), camera_count_[p], splat_.value(3 * p + c), light_paths_);
+        value = response_(value);
+        for (const double v : value) *values++ = float(v);
+    }
+}
+
+void Accumulation::variance(size_t first, size_t count, float* values) const {
+    const double factor = response_.exposure * response_.exposure / (double(group_count_ - 1) * double(iterations_));
+    for (size_t i = 3 * first; i < 3 * (first + count); ++i) *values++ = float(moment_[i] * factor);
 }
 
 }  // namespace lightloom

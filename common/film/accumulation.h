@@ -61,6 +61,10 @@ class Accumulation {
     /// samples, which share light paths): sum_g n_g (X_g - mean)^2 / ((G - 1) sum n_g). Empty for fewer than two
     /// groups, from which no variance can be estimated.
     RgbImage variance() const;
+    /// Do the same for `count` pixels from `first` on, in row-major order, and write 3 * count values. A variance needs two groups
+    /// at least.
+    void develop(size_t first, size_t count, float* values) const;
+    void variance(size_t first, size_t count, float* values) const;
 
   private:
     FrameLayout frame_;

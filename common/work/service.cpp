@@ -1,5 +1,9 @@
 #include "common/work/service.h"
 
+#include <algorithm>
+
+#include "common/core/utf8.h"
+
 namespace lightloom {
 
 bool is_terminal(JobState state) {
@@ -32,6 +36,40 @@ std::string_view to_string(PreparePhase phase) {
 std::string phase_text(const JobInfo& job) {
     const bool named = job.phase == PreparePhase::kWaitingForTables && !job.waits_for.empty();
     return named ? "waiting for the tables of " + job.waits_for : std::string(to_string(job.phase));
+}
+
+std::string_view to_string(WorkerState state) {
+    switch (state) {
+        case WorkerState::kBusy: return "busy";
+        case WorkerState::kIdle: return "idle";
+        case WorkerState::kResting: return "resting";
+        case WorkerState::kGone: return "gone";
+        case WorkerState::kRefused: return "refused";
+    }
+    return "unknown";
+}
+
+std::string unit_name(const UnitKey& key) {
+    return key.kind == UnitKind::kRender ? std::to_string(key.group) + "/" + std::to_string(key.tile)
+                                         : "of training " + std::to_string(key.round) + "/" + std::to_string(key.group);
+}
+
+Status check_label(const JobLabel& label) {
+    for (const auto& [what, text] : {std::pair{"name", &label.name}, {"owner", &label.owner}}) {
+        if (text->size() > JobLabel::kMaxBytes || !is_one_line(*text))
+            return invalid_argument(std::string("the ") + what +
+                                    " of a job is one line of UTF-8 without control characters, at most " +
+                                    std::to_string(JobLabel::kMaxBytes) + " bytes long");
+    }
+    return {};
+}
+
+double rendered_share(const JobInfo& job) {
+    if (job.state == JobState::kSucceeded || job.state == JobState::kFinishing) return 1;
+    double done = 0;
+    if (job.unit_total > 0) done = double(job.unit_done) / double(job.unit_total);
+    if (job.spec.time_limit_seconds > 0) done = job.render_seconds / job.spec.time_limit_seconds;
+    return std::clamp(done, 0.0, 1.0);
 }
 
 }  // namespace lightloom

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -93,6 +94,14 @@ struct TablesInfo {
 /// The state as a lower-case word.
 std::string_view to_string(JobState state);
 
+/// The name of a job, and who claims to own it, which nobody checks. A label decides nothing of the image.
+struct JobLabel {
+    static constexpr size_t kMaxBytes = 128;  ///< Of each of the two.
+    std::string name, owner;
+};
+/// kInvalidArgument for a text that is too long, or that a terminal does not show as one line.
+Status check_label(const JobLabel& label);
+
 /// A snapshot of a job; see the message Job in proto/lightloom/v1/job_service.proto for units and meaning.
 struct JobInfo {
     std::string job_id;
@@ -117,25 +126,61 @@ struct JobInfo {
     std::string waits_for;                             ///< The job that makes the tables, in kWaitingForTables.
     TablesInfo tables;
     RareLightReport rare_light;  ///< Set for a finished job.
+    JobLabel label;
+    std::string scene;       ///< Path of the scene file in its file list.
+    double age_seconds = 0;  ///< Time since the submission.
 };
+/// Share of the image that is rendered, from 0 to 1: the share of its units, or of its time limit.
+double rendered_share(const JobInfo& job);
 /// Text for people, for example "waiting for the tables of job-0123".
 std::string phase_text(const JobInfo& job);
 
+enum class WorkerState { kBusy, kIdle, kResting, kGone, kRefused };
+/// Lower-case word.
+std::string_view to_string(WorkerState state);
+
+/// A snapshot of a worker; see the message Worker.
+struct WorkerStatus {
+    std::string worker_id, host;
+    uint64_t process_id = 0;
+    uint32_t thread_count = 0;
+    WorkerState state = WorkerState::kIdle;
+    std::string note;
+    std::optional<UnitReference> in_work;
+    uint64_t units_merged = 0, units_held = 0;
+    double samples_per_second = 0;
+    double seconds_since_heard = 0;
+};
+
+/// Behind the word "unit", for people.
+std::string unit_name(const UnitKey& key);
+
 enum class ImageKind { kFinal, kPreview };
+
+enum class PreviewFormat { kPng, kExr };
+/// The image of a job as far as it is merged.
+struct Preview {
+    std::string bytes;
+    uint64_t samples_per_pixel = 0;  ///< Samples that every pixel of it has.
+};
 
 /// A coordinator's interface to clients. Errors are those of JobService and AssetService.
 class JobPort {
   public:
     virtual ~JobPort() = default;
-    virtual Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec) = 0;
+    virtual Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label) = 0;
     virtual Result<JobInfo> get_job(const std::string& job_id) = 0;
     virtual Result<std::vector<JobInfo>> list_jobs() = 0;
+    /// Without those that are gone, or were refused, for longer; all of them for 0.
+    virtual Result<std::vector<WorkerStatus>> list_workers(double gone_within_seconds) = 0;
     virtual Result<JobInfo> cancel_job(const std::string& job_id) = 0;
     /// Calls `on_change` with the present state and then on changes until a terminal state was passed; kCancelled soon after a
     /// stop request.
     virtual Status watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
                              std::stop_token stop) = 0;
     virtual Result<std::string> image(const std::string& job_id, ImageKind kind) = 0;
+    /// `exposure` in stops, of a PNG.
+    virtual Result<Preview> preview(const std::string& job_id, PreviewFormat format, double exposure) = 0;
     virtual Result<std::string> manifest(const std::string& job_id) = 0;
     virtual Result<std::vector<Digest>> find_missing(const std::vector<Digest>& digests) = 0;
     /// Sends the file `path`, resuming where an earlier attempt broke off; does nothing if the asset is already

@@ -24,6 +24,9 @@ static_assert(one_below(PreparePhase::kReadingScene, v1::PREPARE_PHASE_READING_S
               one_below(PreparePhase::kLearning, v1::PREPARE_PHASE_LEARNING) &&
               one_below(PreparePhase::kWaitingForTables, v1::PREPARE_PHASE_WAITING_FOR_TABLES) &&
               one_below(PreparePhase::kWaitingForTables, v1::PreparePhase_MAX));
+static_assert(one_below(WorkerState::kBusy, v1::WORKER_STATE_BUSY) && one_below(WorkerState::kIdle, v1::WORKER_STATE_IDLE) &&
+              one_below(WorkerState::kResting, v1::WORKER_STATE_RESTING) && one_below(WorkerState::kGone, v1::WORKER_STATE_GONE) &&
+              one_below(WorkerState::kRefused, v1::WORKER_STATE_REFUSED) && one_below(WorkerState::kRefused, v1::WorkerState_MAX));
 static_assert(one_below(SubmitOutcome::kAccepted, v1::SUBMIT_OUTCOME_ACCEPTED) &&
               one_below(SubmitOutcome::kDuplicateSame, v1::SUBMIT_OUTCOME_DUPLICATE_SAME) &&
               one_below(SubmitOutcome::kDuplicateDifferent, v1::SUBMIT_OUTCOME_DUPLICATE_DIFFERENT) &&
@@ -222,7 +225,17 @@ void put(const JobInfo& in, v1::Job* out) {
         rare->set_expected_hit_count(in.rare_light.expected_hits);
         rare->set_mean_error(in.rare_light.mean_error);
     }
+    put(in.label, out->mutable_label());
+    out->set_scene(clipped_utf8(in.scene, kMaxMessageBytes));
+    out->set_age_seconds(in.age_seconds);
 }
+
+void put(const JobLabel& in, v1::JobLabel* out) {
+    out->set_name(clipped_utf8(in.name, JobLabel::kMaxBytes));
+    out->set_owner(clipped_utf8(in.owner, JobLabel::kMaxBytes));
+}
+
+JobLabel get(const v1::JobLabel& in) { return {in.name(), in.owner()}; }
 
 Result<JobInfo> get(const v1::Job& in) {
     JobInfo info;
@@ -273,7 +286,47 @@ Result<JobInfo> get(const v1::Job& in) {
         if (!tables.ok()) return tables.status();
         info.tables = *std::move(tables);
     }
+    info.label = get(in.label());
+    info.scene = in.scene();
+    info.age_seconds = in.age_seconds();
     return info;
+}
+
+void put(const WorkerStatus& in, v1::Worker* out) {
+    out->set_worker_id(in.worker_id);
+    out->set_host(in.host);
+    out->set_process_id(in.process_id);
+    out->set_thread_count(in.thread_count);
+    out->set_state(v1::WorkerState(int(in.state) + 1));
+    out->set_note(clipped_utf8(in.note, kMaxMessageBytes));
+    if (in.in_work) {
+        put_key(in.in_work->key, out->mutable_unit());
+        out->set_job_id(in.in_work->job_id);
+    }
+    out->set_unit_held_count(in.units_held);
+    out->set_unit_merged_count(in.units_merged);
+    out->set_samples_per_second(in.samples_per_second);
+    out->set_silent_seconds(in.seconds_since_heard);
+}
+
+Result<WorkerStatus> get(const v1::Worker& in) {
+    WorkerStatus out{.worker_id = in.worker_id(),
+                     .host = in.host(),
+                     .process_id = in.process_id(),
+                     .thread_count = in.thread_count(),
+                     .note = in.note(),
+                     .units_merged = in.unit_merged_count(),
+                     .units_held = in.unit_held_count(),
+                     .samples_per_second = in.samples_per_second(),
+                     .seconds_since_heard = in.silent_seconds()};
+    if (in.state() < v1::WORKER_STATE_BUSY || in.state() > v1::WORKER_STATE_REFUSED)
+        return invalid_argument("worker " + in.worker_id() + " has an unknown state; is the coordinator newer than this client?");
+    out.state = WorkerState(int(in.state()) - 1);
+    if (!in.has_unit()) return out;
+    const auto key = get_key(in.unit());
+    if (!key.ok()) return key.status();
+    out.in_work = UnitReference{in.job_id(), *key};
+    return out;
 }
 
 void put(const WorkUnit& in, v1::WorkUnit* out) {

@@ -19,7 +19,9 @@ Status from_grpc(const grpc::Status& status);
 
 void put(const Digest& in, v1::Digest* out);
 void put(const JobSpec& in, v1::JobSpec* out);
+void put(const JobLabel& in, v1::JobLabel* out);
 void put(const JobInfo& in, v1::Job* out);
+void put(const WorkerStatus& in, v1::Worker* out);
 void put(const WorkUnit& in, v1::WorkUnit* out);
 void put(const UnitReference& in, v1::UnitReference* out);
 void put(const UnitLease& in, v1::UnitLease* out);
@@ -32,7 +34,9 @@ void put(const PartialDescriptor& in, v1::SubmitResultHeader* out);
 // Each fails with kInvalidArgument on what the protocol forbids (a digest of another length, an UNSPECIFIED enum).
 Result<Digest> get(const v1::Digest& in);
 Result<JobSpec> get(const v1::JobSpec& in);
+JobLabel get(const v1::JobLabel& in);
 Result<JobInfo> get(const v1::Job& in);
+Result<WorkerStatus> get(const v1::Worker& in);
 Result<WorkUnit> get(const v1::WorkUnit& in);
 Result<UnitReference> get(const v1::UnitReference& in);
 Result<UnitLease> get(const v1::UnitLease& in);

@@ -137,6 +137,52 @@ TEST_F(Bench, RunsAreLoggedAndResumed) {
     EXPECT_EQ(checkpoints_of_one, 1u) << "lines of the torn run are gone";
 }
 
+TEST_F(Bench, TablesOfTheCacheCostWhatMakingThemTook) {
+    const std::string tables = path("tables");
+    const std::vector<std::string> job{kScene, "--resolution", "24x18", "--max-depth", "4", "--threads", "2", "-q"};
+    const auto reference = [&](const std::string& name) {
+        std::vector<std::string> arguments{"reference", "-o",    path(name + ".exr"),   "--spp",         "2",   "--algorithm",
+                                           "spcbpt",    "--set", "training-paths=2000", "--table-cache", tables};
+        arguments.insert(arguments.end(), job.begin(), job.end());
+        EXPECT_EQ(run(arguments), 0) << output();
+        return Json::parse(*read_file(path(name + ".json")));
+    };
+    const Json first = reference("ref"), second = reference("again");
+    EXPECT_EQ(first["tables"], "made");
+    EXPECT_EQ(second["tables"], "cached");
+    EXPECT_EQ(first["sha256"], second["sha256"]) << "they are the same tables";
+
+    const auto bench = [&](const std::string& name, std::vector<std::string> more) {
+        std::vector<std::string> arguments{
+            "bench",   "--reference", path("ref.exr"), "--algorithms", "path,spcbpt:training-paths=2000", "--spp", "2",
+            "--seeds", "2",           "--out",         path(name)};
+        arguments.insert(arguments.end(), job.begin(), job.end());
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        EXPECT_EQ(run(arguments), 0) << output();
+        std::map<std::string, Json> ends;
+        for (const Json& line : lines(name))
+            if (line.contains("done")) ends[line["algorithm"].get<std::string>() + std::to_string(line["seed"].get<int>())] = line;
+        return ends;
+    };
+    const auto count = [&] { return std::distance(std::filesystem::directory_iterator(tables), {}); };
+    auto measured = bench("measured.jsonl", {});
+    EXPECT_EQ(count(), 1) << "what bench measures it does not keep";
+    EXPECT_EQ(output().find('*'), std::string::npos) << output();
+    auto some = bench("some.jsonl", {"--table-cache", tables});
+    EXPECT_EQ(count(), 2);
+    EXPECT_NE(output().find("* as recorded"), std::string::npos) << output();
+    EXPECT_FALSE(some["path0"].contains("tables"));
+    for (const char* run : {"spcbpt0", "spcbpt1"}) {
+        EXPECT_EQ(measured[run]["tables"], "made");
+        EXPECT_GT(measured[run]["preparation_seconds"].get<double>(), 0);
+        EXPECT_EQ(measured[run]["mape_percent"], some[run]["mape_percent"]);
+    }
+    EXPECT_EQ(some["spcbpt0"]["tables"], "cached") << "the reference has made those of seed 0";
+    EXPECT_EQ(some["spcbpt1"]["tables"], "made");
+    const double made = first["preparation_seconds"].get<double>(), found = some["spcbpt0"]["preparation_seconds"].get<double>();
+    EXPECT_GT(found, 0.5 * made) << "finding them is not free";
+}
+
 TEST_F(Bench, TwoDoNotWriteToOneFile) {
     make_reference();
     const std::vector<std::string> arguments{

@@ -113,15 +113,15 @@ TEST(WorkerRegistry, KnowsWhoIsThereAndWhoIsIdle) {
     EXPECT_EQ(crew_at(11).most_threads, 2u);
     const auto statuses = registry.statuses(at_second(11));
     ASSERT_EQ(statuses.size(), 2u);
-    EXPECT_FALSE(statuses[first.index].lost);
-    EXPECT_TRUE(statuses[second.index].lost);
+    EXPECT_EQ(statuses[first.index].state, WorkerState::kIdle);
+    EXPECT_EQ(statuses[second.index].state, WorkerState::kGone);
     EXPECT_EQ(statuses[second.index].units_held, 2u);
     EXPECT_EQ(statuses[second.index].seconds_since_heard, 11);
 
     first.left = true;
     EXPECT_EQ(registry.find(first.id), nullptr);
     EXPECT_EQ(crew_at(6).workers, 1u);
-    EXPECT_TRUE(registry.statuses(at_second(6))[first.index].lost);
+    EXPECT_EQ(registry.statuses(at_second(6))[first.index].state, WorkerState::kGone);
     EXPECT_EQ(registry.at(first.index).id, first.id) << "manifests still name it";
 }
 
@@ -242,7 +242,7 @@ TEST(Reducer, WithoutAPartialThereIsNoImage) {
     EXPECT_EQ(reducer.folded_groups(), 0u);
     EXPECT_EQ(reducer.iterations(), 0u);
     EXPECT_EQ(reducer.dropped(), 0u);
-    EXPECT_EQ(reducer.image().status().code(), StatusCode::kFailedPrecondition);
+    EXPECT_EQ(reducer.developed(false).status().code(), StatusCode::kFailedPrecondition);
 }
 
 TEST(Reducer, AGroupThatDoesNotFitTheSumsIsAnError) {

@@ -120,16 +120,18 @@ TEST(Outputs, NeverTakeThePlaceOfAnInput) {
 /// A service that has one finished job, and whose submissions fail as the test says.
 class PlayedPort final : public JobPort {
   public:
-    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec&) override {
+    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec&, const JobLabel&) override {
         request_ids.push_back(request_id);
         if (request_ids.size() <= refusals.size()) return refusals[request_ids.size() - 1];
         return job;
     }
     Result<JobInfo> get_job(const std::string&) override { return job; }
     Result<std::vector<JobInfo>> list_jobs() override { return std::vector<JobInfo>{job}; }
+    Result<std::vector<WorkerStatus>> list_workers(double) override { return std::vector<WorkerStatus>(); }
     Result<JobInfo> cancel_job(const std::string&) override { return job; }
     Status watch_job(const std::string&, const std::function<void(const JobInfo&)>&, std::stop_token) override { return {}; }
     Result<std::string> image(const std::string&, ImageKind) override { return exr; }
+    Result<Preview> preview(const std::string&, PreviewFormat, double) override { return Preview{exr, 1}; }
     Result<std::string> manifest(const std::string&) override {
         return Json{{"image", {{"sha256", job.image_digest.hex()}, {"size_bytes", exr.size()}, {"colour", "float"}}}}.dump();
     }

@@ -1,63 +1,22 @@
 // The programs as a user runs them: coordinator, workers and client as processes on loopback, real light.
 
-#include <grpcpp/create_channel.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
-#include "client/grpc_job_port.h"
-#include "common/core/atomic_file.h"
-#include "tests/service/fake.h"
-#include "tests/service/process.h"
+#include "tests/service/service_process.h"
 
 namespace lightloom {
 namespace {
 
+using testing::kScene;
 using testing::Process;
+using testing::Service;
 using testing::TempDirectory;
 using testing::wait_until;
 using Json = nlohmann::json;
-
-const std::string kScene = std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/cornell.pbrt";
-
-/// A coordinator and the files around it.
-struct Service {
-    explicit Service(std::vector<std::string> more = {}) {
-        std::vector<std::string> arguments{"--listen",   "127.0.0.1:0", "--status",    "127.0.0.1:0", "--data",
-                                           path("data"), "--port-file", path("ports"), "--lease",     "1"};
-        arguments.insert(arguments.end(), more.begin(), more.end());
-        server = std::make_unique<Process>("lightloom-server", arguments, path("server.log"));
-        EXPECT_TRUE(wait_until(60, [&] { return std::filesystem::exists(path("ports")); })) << log("server");
-        std::ifstream(path("ports")) >> port >> status_port;
-    }
-    std::string path(const std::string& name) const { return (directory.path / name).string(); }
-    std::string address() const { return "127.0.0.1:" + std::to_string(port); }
-    std::string log(const std::string& name) const {
-        const auto text = read_file(path(name + ".log"));
-        return text.ok() ? *text : std::string();
-    }
-    std::unique_ptr<Process> worker(const std::string& name, int threads, std::vector<std::string> more = {}) const {
-        std::vector<std::string> arguments{"--server", address(), "--threads", std::to_string(threads), "--cache", path("cache")};
-        arguments.insert(arguments.end(), more.begin(), more.end());
-        return std::make_unique<Process>("lightloom-worker", arguments, path(name + ".log"));
-    }
-    std::unique_ptr<Process> submit(const std::string& name, std::vector<std::string> more) const {
-        std::vector<std::string> arguments{"submit", kScene, "--server", address(), "-o", path(name + ".exr"), "-q"};
-        arguments.insert(arguments.end(), more.begin(), more.end());
-        return std::make_unique<Process>("lightloom", arguments, path(name + ".log"));
-    }
-    GrpcJobPort jobs() const { return GrpcJobPort(grpc::CreateChannel(address(), grpc::InsecureChannelCredentials())); }
-    Digest digest(const std::string& name) const { return *digest_file(path(name + ".exr")); }
-    Json manifest(const std::string& name) const { return Json::parse(*read_file(path(name + ".manifest.json"))); }
-
-    TempDirectory directory;
-    std::unique_ptr<Process> server;
-    int port = 0, status_port = 0;
-};
 
 const std::vector<std::string> kJob{"--algorithm", "bdpt", "--spp", "24", "--resolution", "48x36", "--max-depth", "4"};
 

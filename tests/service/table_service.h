@@ -114,7 +114,7 @@ inline std::string train_by_hand(TableService& service, const JobSpec& spec) {
         EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
     service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
     for (const WorkerStatus& worker : service.coordinator->workers())
-        if (!worker.lost) (void)service.coordinator->goodbye(worker.worker_id);
+        if (worker.state != WorkerState::kGone) (void)service.coordinator->goodbye(worker.worker_id);
     return id;
 }
 

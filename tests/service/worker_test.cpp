@@ -111,7 +111,7 @@ TEST(Workers, JobPortOverGrpcDoesAllThatAClientNeeds) {
 
     Crew crew;
     crew.add(port, service.identity, 1, 0.001);
-    const auto job = jobs.submit_job("r", service.spec(10));
+    const auto job = jobs.submit_job("r", service.spec(10), {});
     ASSERT_TRUE(job.ok()) << job.status().message();
     JobInfo last;
     ASSERT_TRUE(jobs.watch_job(job->job_id, [&](const JobInfo& j) { last = j; }, {}).ok());

@@ -272,6 +272,17 @@ TEST(BenchTable, ShowsMediansPreparationAndRatios) {
     EXPECT_EQ(table.find('~'), std::string::npos) << table;
 }
 
+TEST(BenchTable, MarksPreparationThatWasNotMeasured) {
+    std::vector<Json> done{finished("made", 1, square_root_law(24, 1)), finished("found", 1, square_root_law(24, 1))};
+    EXPECT_EQ(bench_table({"made", "found"}, done, 12).find('*'), std::string::npos);
+    done[0]["tables"] = "made";
+    done[1]["tables"] = "cached";
+    const std::string table = bench_table({"made", "found"}, done, 12);
+    EXPECT_NE(table.find("found         1      0          4.0       4.00      *1.00       5.00"), std::string::npos) << table;
+    EXPECT_NE(table.find("made          1      0          4.0       4.00       1.00       5.00"), std::string::npos) << table;
+    EXPECT_NE(table.find("* as recorded"), std::string::npos) << table;
+}
+
 TEST(BenchTable, MarksWhatIsExtrapolated) {
     const std::vector<Json> done{finished("path", 0, square_root_law(60, 1)), finished("path", 0, square_root_law(240, 1)),
                                  finished("path", 0, square_root_law(360, 1))};

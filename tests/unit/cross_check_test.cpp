@@ -116,7 +116,8 @@ TEST(ProgressiveRender, GrowsByGroupsUpToItsLimit) {
 TEST(MeasureLengths, AddUpToTheImageAndAgreeBetweenAlgorithms) {
     const auto scene = small_scene();
     const RenderSettings path{testing::algorithm_of("path"), 1, 3}, bdpt{testing::algorithm_of("bdpt"), 2, 3};
-    const auto lengths = measure_lengths(scene, path, 0, {});
+    const PreparationSource tables = [&](const RenderSettings& settings) { return prepare(*scene, settings, {}); };
+    const auto lengths = measure_lengths(scene, path, 0, tables, {});
     ASSERT_TRUE(lengths.ok()) << lengths.status().message();
     ASSERT_EQ(lengths->groups.size(), kLeastGroups);
     auto render = ProgressiveRender::start(scene, path, {});
@@ -129,7 +130,7 @@ TEST(MeasureLengths, AddUpToTheImageAndAgreeBetweenAlgorithms) {
         ASSERT_TRUE(reference->advance().ok());
         made.add(*reference->last_group_image(), reference->last_group_iterations());
     }
-    const auto check = cross_check(scene, path, made.estimates(), bdpt, 0.2, {});
+    const auto check = cross_check(scene, path, made.estimates(), bdpt, 0.2, tables, {});
     ASSERT_TRUE(check.ok()) << check.status().message();
     EXPECT_GE(check->rows.size(), 12u);
     EXPECT_NE(check->verdict(), Verdict::kDiffer) << check->table();
