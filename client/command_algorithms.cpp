@@ -1,5 +1,6 @@
 // lightloom algorithms: the catalog.
 
+#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
 

@@ -1,6 +1,7 @@
 // lightloom bench: how soon algorithms come near a reference. Runs are interleaved, so that what the machine does meanwhile
 // meets all of them alike, and time is the time of light transport alone.
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <cstdio>

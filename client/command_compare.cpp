@@ -1,5 +1,6 @@
 // lightloom compare: how far an image is from a reference.
 
+#include <CLI/CLI.hpp>
 #include <array>
 #include <cstdio>
 #include <memory>

@@ -1,5 +1,6 @@
 // lightloom inspect: what a scene file holds, and what of it was ignored.
 
+#include <CLI/CLI.hpp>
 #include <array>
 #include <chrono>
 #include <cinttypes>

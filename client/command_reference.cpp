@@ -1,9 +1,11 @@
 // lightloom reference: an image to measure others by, with its variance, who made it, and whether another algorithm agrees.
 
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "client/commands.h"

@@ -1,5 +1,6 @@
 // lightloom replay: one camera sample of one iteration, or one whole unit, rendered again exactly as a job rendered it.
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <memory>

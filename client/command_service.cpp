@@ -1,5 +1,6 @@
 // lightloom submit, watch, fetch, cancel, list: the commands that talk to a service.
 
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>

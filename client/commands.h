@@ -2,7 +2,9 @@
 // The commands of the `lightloom` program, one file each. A command adds itself to the application; its callback stores the
 // process's exit code.
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace lightloom::client {
 

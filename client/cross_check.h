@@ -3,7 +3,7 @@
 // with simultaneous confidence intervals. A bias of a few percent in one kind of path shows here and not in a picture.
 
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <stop_token>
 #include <string>
 #include <vector>

@@ -1,5 +1,6 @@
 #include "client/job_options.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>

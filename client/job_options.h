@@ -1,13 +1,16 @@
 #pragma once
 // The options that render, submit and replay share, and what they make of a scene file.
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "common/import/import.h"
 #include "common/work/service.h"
+
+namespace CLI {
+class App;
+}
 
 namespace lightloom::client {
 

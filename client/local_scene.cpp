@@ -1,5 +1,7 @@
 #include "client/local_scene.h"
 
+#include <CLI/CLI.hpp>
+
 #include "common/cli/numbers.h"
 #include "common/cli/start.h"
 

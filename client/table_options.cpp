@@ -1,5 +1,6 @@
 #include "client/table_options.h"
 
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>

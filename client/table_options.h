@@ -2,7 +2,10 @@
 // Where learned tables are kept between runs, for the commands that render in this process: the options, and the tables of a job
 // from there or made anew.
 
+#include <cstdint>
+#include <filesystem>
 #include <stop_token>
+#include <string>
 
 #include "client/job_options.h"
 
