@@ -10,6 +10,7 @@
 #include <optional>
 #include <thread>
 
+#include "common/cli/completion.h"
 #include "common/cli/numbers.h"
 #include "common/cli/start.h"
 #include "common/core/atomic_file.h"
@@ -92,6 +93,7 @@ int main(int argc, char** argv) {
                    "File for \"GRPC_PORT STATUS_PORT\", written once both listen (a unix: socket has port 0)");
     app.add_flag("--allow-plaintext", plaintext, "Listen on other than loopback addresses");
     add_log_option(app, level);
+    add_completion_option(app);
     app.add_option("--shuffle-leases", shuffle, "")->group("")->check(whole_number());  // tests: lease units in a random order
     if (const auto ended = parse_and_log(app, argc, argv, level)) return *ended;
     for (const auto& [option, address] : {std::pair{"--listen", &listen}, {"--status", &status}}) {

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <stop_token>
 
+#include "common/cli/completion.h"
 #include "common/cli/numbers.h"
 #include "common/cli/start.h"
 #include "common/work/channel.h"
@@ -50,10 +51,11 @@ int main(int argc, char** argv) {
     std::string cache = default_cache().string();
     uint32_t threads = processor_count();
     app.add_option("--server", server, "HOST:PORT of the coordinator")->capture_default_str();
-    app.add_option("--threads", threads, "Threads to render with")->check(whole_number_between(1, 1024))->capture_default_str();
+    app.add_option("--threads", threads, "Threads to render with (default: all processors)")->check(whole_number_between(1, 1024));
     app.add_option("--cache", cache, "Directory for scene files, and for tables up to 1 GB; may be shared by the workers of a host")
         ->capture_default_str();
     add_log_option(app, level);
+    add_completion_option(app);
     app.add_option("--pretend-golden-digest", golden_override, "")->group("");  // for tests of the refusal
     if (const auto ended = parse_and_log(app, argc, argv, level)) return *ended;
     std::stop_source stop;
