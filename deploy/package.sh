@@ -11,7 +11,7 @@ output=$(cd "${1:-.}" && pwd)
 cd "$root"
 # Files of one commit get the time of that commit.
 if seconds=$(git log -1 --format=%ct 2>/dev/null); then export SOURCE_DATE_EPOCH=$seconds; fi
-[ -f build/release/build.ninja ] || cmake --preset release -DLIGHTLOOM_TESTS=OFF >/dev/null
+[ -f build/release/build.ninja ] || cmake --preset release -DLIGHTLOOM_TESTS=OFF -DLIGHTLOOM_UNITY=ON >/dev/null
 cmake --build --preset release --target lightloom lightloom-server lightloom-worker
 cd build/release
 cpack -G DEB -B "$output"

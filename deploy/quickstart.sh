@@ -16,7 +16,7 @@ bin=$root/build/release/bin
 cd "$root"
 if [ ! -f build/release/build.ninja ]; then
     echo "configuring..."
-    cmake --preset release -DLIGHTLOOM_TESTS=OFF >/dev/null
+    cmake --preset release -DLIGHTLOOM_TESTS=OFF -DLIGHTLOOM_UNITY=ON >/dev/null
 fi
 echo "building (the first time takes some minutes)..."
 work=$(mktemp -d)
