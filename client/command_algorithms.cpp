@@ -1,6 +1,5 @@
 // lightloom algorithms: the catalog.
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
 
@@ -9,8 +8,8 @@
 
 namespace lightloom::client {
 
-void add_algorithms_command(CLI::App& app, int* exit_code) {
-    CLI::App* command = app.add_subcommand("algorithms", "List the algorithms and their parameters (--set)");
+void add_algorithms_command(cli::App app, int* exit_code) {
+    const cli::App command = app.add_subcommand("algorithms", "List the algorithms and their parameters (--set)");
     command->callback([exit_code] {
         for (const AlgorithmInfo* row : catalog()) {
             const AlgorithmInfo& algorithm = *row;

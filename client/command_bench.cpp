@@ -1,7 +1,6 @@
 // lightloom bench: how soon algorithms come near a reference. Runs are interleaved, so that what the machine does meanwhile
 // meets all of them alike, and time is the time of light transport alone.
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -211,9 +210,9 @@ int bench(BenchOptions& options) {
 
 }  // namespace
 
-void add_bench_command(CLI::App& app, int* exit_code) {
+void add_bench_command(cli::App app, int* exit_code) {
     auto options = std::make_shared<BenchOptions>();
-    CLI::App* command = app.add_subcommand("bench", "Measure how soon algorithms come near a reference image");
+    const cli::App command = app.add_subcommand("bench", "Measure how soon algorithms come near a reference image");
     command->footer(kFooter);
     command->add_option("SCENE", options->scene.scene, "pbrt-v4 scene file")->required();
     add_scene_options(*command, options->scene.reading);
@@ -225,10 +224,10 @@ void add_bench_command(CLI::App& app, int* exit_code) {
         ->required();
     command->add_option("--out", options->out, "JSON lines to write")->required()->type_name("FILE");
     command->add_flag("--resume", options->resume, "Skip the runs that FILE holds to the end; start the others again");
-    auto* time =
+    const auto time =
         command->add_option("--time", options->time, "Seconds that a run may take")->check(number_between(0.001, 30 * 86400.0));
-    auto* spp = command->add_option("--spp", options->spp, "Iterations (samples per pixel) that a run may take")
-                    ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
+    const auto spp = command->add_option("--spp", options->spp, "Iterations (samples per pixel) that a run may take")
+                         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     command->add_option("--seeds", options->seeds, "Runs of each algorithm")
         ->capture_default_str()
         ->check(whole_number_between(1, 1000));
@@ -252,7 +251,7 @@ void add_bench_command(CLI::App& app, int* exit_code) {
         ->check(number_between(0.001, 86400.0));
     command->add_flag("-q,--quiet", options->scene.quiet, "The table and errors only");
     command->callback([options, time, spp, exit_code] {
-        if (time->count() + spp->count() == 0) throw CLI::RequiredError("--time or --spp");
+        if (time->count() + spp->count() == 0) cli::throw_required("--time or --spp");
         *exit_code = bench(*options);
     });
 }

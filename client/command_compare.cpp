@@ -1,6 +1,5 @@
 // lightloom compare: how far an image is from a reference.
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <cstdio>
 #include <memory>
@@ -157,17 +156,18 @@ int run(const CompareOptions& options) {
 
 }  // namespace
 
-void add_compare_command(CLI::App& app, int* exit_code) {
+void add_compare_command(cli::App app, int* exit_code) {
     auto options = std::make_shared<CompareOptions>();
-    CLI::App* command = app.add_subcommand("compare", "Measure how far an EXR image is from a reference of the same frame");
+    const cli::App command = app.add_subcommand("compare", "Measure how far an EXR image is from a reference of the same frame");
     command->add_option("image", options->image, "Image to judge (EXR)")->required();
     command->add_option("reference", options->reference, "Reference (EXR)")->required();
-    CLI::Option* json = command
-                            ->add_option("--json", options->json,
-                                         "Write the metrics as JSON to FILE, or to standard output instead of the table if no FILE "
-                                         "follows (then give it last)")
-                            ->type_name("[FILE]")
-                            ->expected(0, 1);
+    const cli::Option json =
+        command
+            ->add_option("--json", options->json,
+                         "Write the metrics as JSON to FILE, or to standard output instead of the table if no FILE "
+                         "follows (then give it last)")
+            ->type_name("[FILE]")
+            ->expected(0, 1);
     command
         ->add_option("--heat", options->heat,
                      "Write the signed relative error as PNG: blue where the image is darker, red where it is brighter")

@@ -1,6 +1,5 @@
 // lightloom inspect: what a scene file holds, and what of it was ignored.
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <chrono>
 #include <cinttypes>
@@ -198,19 +197,19 @@ int run(const Options& options) {
 
 }  // namespace
 
-void add_inspect_command(CLI::App& app, int* exit_code) {
+void add_inspect_command(cli::App app, int* exit_code) {
     const auto options = std::make_shared<Options>();
-    CLI::App* command = app.add_subcommand("inspect",
-                                           "Show what a scene holds: geometry, lights with their power, materials, textures, "
-                                           "memory, and everything in the file that is ignored");
+    const cli::App command = app.add_subcommand("inspect",
+                                                "Show what a scene holds: geometry, lights with their power, materials, textures, "
+                                                "memory, and everything in the file that is ignored");
     command->add_option("scene", options->scene, "The .pbrt file")->required();
     command->add_flag("--why", options->why,
                       "List everything that stops the file, not only the first fault, and exit with 2 if anything does");
     add_scene_options(*command, options->reading);
     command->add_option("--json", options->json, "Write the same as JSON to this file");
-    auto* tables = command->add_option("--tables", options->tables,
-                                       "Also show the learned tables in this file: KEY.tables of a table cache, KEY being "
-                                       "tables.cache_key of a manifest");
+    const auto tables = command->add_option("--tables", options->tables,
+                                            "Also show the learned tables in this file: KEY.tables of a table cache, KEY being "
+                                            "tables.cache_key of a manifest");
     command
         ->add_option("--draw", options->draw,
                      "Write PREFIX-kappa-eye.png, -kappa-light.png, -gamma.png and -q.png: subspaces of what the camera sees, "

@@ -1,6 +1,5 @@
 // lightloom reference: an image to measure others by, with its variance, who made it, and whether another algorithm agrees.
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -162,17 +161,17 @@ int reference(ReferenceOptions& options) {
 
 }  // namespace
 
-void add_reference_command(CLI::App& app, int* exit_code) {
+void add_reference_command(cli::App app, int* exit_code) {
     auto options = std::make_shared<ReferenceOptions>();
-    CLI::App* command = app.add_subcommand("reference", "Render an image that others are measured by, and check it");
+    const cli::App command = app.add_subcommand("reference", "Render an image that others are measured by, and check it");
     command->footer(kFooter);
     add_render_settings(*command, options->job);
     command->add_option("-o,--output", options->job.output, "EXR to write; its description goes beside it as .json")->required();
-    auto* spp = command->add_option("--spp", options->job.samples_per_pixel, "Samples per pixel")
-                    ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
-    auto* time = command->add_option("--time", options->job.time_seconds, "Render for this many seconds")
-                     ->check(number_between(0.001, 30 * 86400.0))
-                     ->excludes(spp);
+    const auto spp = command->add_option("--spp", options->job.samples_per_pixel, "Samples per pixel")
+                         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
+    const auto time = command->add_option("--time", options->job.time_seconds, "Render for this many seconds")
+                          ->check(number_between(0.001, 30 * 86400.0))
+                          ->excludes(spp);
     command->add_option("--cross-check", options->cross_check, "Another algorithm, NAME[:KEY=VALUE]..., that must agree");
     command
         ->add_option("--cross-time", options->cross_time, "Seconds for its image, and as many again for the path lengths of both")
@@ -181,7 +180,7 @@ void add_reference_command(CLI::App& app, int* exit_code) {
     add_threads_option(*command, options->threads);
     command->add_flag("-q,--quiet", options->job.quiet, "No progress; errors and the cross-check only");
     command->callback([options, spp, time, exit_code] {
-        if (spp->count() + time->count() == 0) throw CLI::RequiredError("--time or --spp");
+        if (spp->count() + time->count() == 0) cli::throw_required("--time or --spp");
         *exit_code = reference(*options);
     });
 }

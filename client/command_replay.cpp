@@ -1,6 +1,5 @@
 // lightloom replay: one camera sample of one iteration, or one whole unit, rendered again exactly as a job rendered it.
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <memory>
@@ -178,26 +177,26 @@ int replay(const ReplayOptions& options) {
 
 }  // namespace
 
-void add_replay_command(CLI::App& app, int* exit_code) {
+void add_replay_command(cli::App app, int* exit_code) {
     auto options = std::make_shared<ReplayOptions>();
-    CLI::App* command = app.add_subcommand("replay", "Render one sample or one unit of a job again and print it");
+    const cli::App command = app.add_subcommand("replay", "Render one sample or one unit of a job again and print it");
     command->footer(std::string(kFooter) + kPathSchema);
     add_render_settings(*command, options->job);
-    auto* iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, from 0")
-                          ->check(whole_number_between(0, JobSpec::kMaxSamplesPerPixel - 1));
-    auto* pixel = command->add_option("--pixel", options->pixel, "X,Y in full-frame pixels, 0,0 at the top left")
-                      ->expected(2)
-                      ->delimiter(',')
-                      ->check(whole_number_between(0, 65535));
-    auto* unit = command->add_option("--unit", options->unit, "GROUP,TILE: the whole unit instead of one sample")
-                     ->expected(2)
-                     ->delimiter(',')
-                     ->check(whole_number_between(0, UINT32_MAX));
+    const auto iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, from 0")
+                               ->check(whole_number_between(0, JobSpec::kMaxSamplesPerPixel - 1));
+    const auto pixel = command->add_option("--pixel", options->pixel, "X,Y in full-frame pixels, 0,0 at the top left")
+                           ->expected(2)
+                           ->delimiter(',')
+                           ->check(whole_number_between(0, 65535));
+    const auto unit = command->add_option("--unit", options->unit, "GROUP,TILE: the whole unit instead of one sample")
+                          ->expected(2)
+                          ->delimiter(',')
+                          ->check(whole_number_between(0, UINT32_MAX));
     command->add_option("--spp", options->spp, "Samples per pixel of the job, if it was bounded by them")
         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     iteration->needs(pixel);
     pixel->excludes(unit);
-    auto* paths =
+    const auto paths =
         command->add_flag("--paths", options->paths, "Print every contribution to the sample that --pixel names")->needs(pixel);
     command->add_flag("--json", options->json, "With --paths: one JSON document instead of text")->needs(paths);
     command
@@ -208,7 +207,7 @@ void add_replay_command(CLI::App& app, int* exit_code) {
     add_table_cache_options(*command, options->cache);
     command->add_flag("--strict", options->job.strict, "Exit with 3 if samples were dropped");
     command->callback([options, exit_code] {
-        if (options->pixel.empty() && options->unit.empty()) throw CLI::RequiredError("--pixel or --unit");
+        if (options->pixel.empty() && options->unit.empty()) cli::throw_required("--pixel or --unit");
         *exit_code = replay(*options);
     });
 }

@@ -1,6 +1,5 @@
 // lightloom submit, watch, fetch, cancel, list: the commands that talk to a service.
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -30,7 +29,7 @@ struct ServiceOptions {
     bool detach = false;
 };
 
-void add_server_option(CLI::App& command, ServiceOptions& options) {
+void add_server_option(cli::App command, ServiceOptions& options) {
     command.add_option("--server", options.server, "HOST:PORT of the coordinator")
         ->envname("LIGHTLOOM_SERVER")
         ->capture_default_str();
@@ -123,10 +122,10 @@ int cancel_job(const ServiceOptions& options) {
 
 }  // namespace
 
-void add_service_commands(CLI::App& app, int* exit_code) {
+void add_service_commands(cli::App app, int* exit_code) {
     const auto add = [&](const char* name, const char* help, int (*run)(const ServiceOptions&)) {
         auto options = std::make_shared<ServiceOptions>();
-        CLI::App* command = app.add_subcommand(name, help);
+        const cli::App command = app.add_subcommand(name, help);
         add_server_option(*command, *options);
         command->callback([options, exit_code, run] { *exit_code = run(*options); });
         return std::pair(command, options);
@@ -136,8 +135,8 @@ void add_service_commands(CLI::App& app, int* exit_code) {
         command->footer(kSubmitFooter);
         add_render_settings(*command, options->job);
         add_output_settings(*command, options->job);
-        auto* detach = command->add_flag("--detach", options->detach,
-                                         "Print the job's id and return at once; `fetch --strict` tells of dropped samples");
+        const auto detach = command->add_flag("--detach", options->detach,
+                                              "Print the job's id and return at once; `fetch --strict` tells of dropped samples");
         for (const char* later : {"--output", "--half", "--png", "--json"})  // `fetch` has its own
             detach->excludes(command->get_option(later));
     }

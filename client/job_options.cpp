@@ -1,6 +1,5 @@
 #include "client/job_options.h"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -22,7 +21,7 @@ double seconds_since(Clock::time_point begin) { return std::chrono::duration<dou
 
 }  // namespace
 
-void add_scene_options(CLI::App& command, SceneOptions& options) {
+void add_scene_options(cli::App command, SceneOptions& options) {
     command.add_option("--root", options.root,
                        "Directory that holds the scene file and everything that it refers to (default: one up to three levels "
                        "above the scene file's, or the current one if the scene file lies farther below it)");
@@ -48,7 +47,7 @@ void report_left_out(const SceneOptions& options, const ImportedScene& scene) {
     std::fprintf(stderr, "lightloom: left out: %s\n", text.c_str());
 }
 
-void add_render_settings(CLI::App& command, JobOptions& options) {
+void add_render_settings(cli::App command, JobOptions& options) {
     command
         .add_option("SCENE", options.scene,
                     "pbrt-v4 scene file; everything that it refers to lies beside or below it, or see --root")
@@ -69,21 +68,21 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
         ->check(whole_number());
 }
 
-void add_image_settings(CLI::App& command, JobOptions& options) {
+void add_image_settings(cli::App command, JobOptions& options) {
     command.add_flag("--half", options.half,
                      "Write colour as half floats; refused where a value is beyond their range, and nothing is lost");
-    auto* png = command.add_option("--png", options.png, "Also write an 8-bit sRGB picture");
+    const auto png = command.add_option("--png", options.png, "Also write an 8-bit sRGB picture");
     command.add_option("--exposure", options.exposure, "Stops by which the picture is brightened (the EXR never is)")
         ->check(number_between(-30.0, 30.0))
         ->needs(png);
 }
 
-void add_output_settings(CLI::App& command, JobOptions& options) {
+void add_output_settings(cli::App command, JobOptions& options) {
     command.add_option("-o,--output", options.output, "EXR to write; the manifest goes beside it (default: SCENE's name.exr)");
     add_image_settings(command, options);
     command.add_flag("--layers", options.layers, "Also store albedo, normal and depth of what the camera sees first");
-    auto* spp = command.add_option("--spp", options.samples_per_pixel, "Samples per pixel (default: the scene's)")
-                    ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
+    const auto spp = command.add_option("--spp", options.samples_per_pixel, "Samples per pixel (default: the scene's)")
+                         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     command
         .add_option("--time", options.time_seconds,
                     "Stop after this many seconds of rendering, at a boundary that --spp can reproduce")

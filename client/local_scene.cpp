@@ -1,7 +1,5 @@
 #include "client/local_scene.h"
 
-#include <CLI/CLI.hpp>
-
 #include "common/cli/numbers.h"
 #include "common/cli/start.h"
 
@@ -30,7 +28,7 @@ Result<BuiltJob> build_job(const JobOptions& options, uint32_t threads, const Sc
     return built;
 }
 
-void add_threads_option(CLI::App& command, uint32_t& threads) {
+void add_threads_option(cli::App command, uint32_t& threads) {
     threads = processor_count();
     command.add_option("--threads", threads, "Threads (default: all processors)")->check(whole_number_between(1, 1024));
 }

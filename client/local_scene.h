@@ -32,6 +32,6 @@ struct BuiltJob {
 Result<BuiltJob> build_job(const JobOptions& options, uint32_t threads, const SceneCheck& check = {});
 
 /// --threads of such a command; all processors by default.
-void add_threads_option(CLI::App& command, uint32_t& threads);
+void add_threads_option(cli::App command, uint32_t& threads);
 
 }  // namespace lightloom::client

@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <optional>
@@ -107,13 +106,13 @@ Status watch_units(const BuiltJob& job, const Renderer& renderer, uint32_t threa
 
 }  // namespace
 
-void add_pyramid_options(CLI::App& command, PyramidOptions& options) {
-    auto* pyramid = command
-                        .add_option("--pyramid", options.directory,
-                                    "Instead of an image: a directory with a weighted and an unweighted picture of every "
-                                    "technique, and index.html that shows them (default --spp: at most " +
-                                        std::to_string(kPyramidSamples) + ")")
-                        ->check([](const std::string& name) { return name.empty() ? "an empty name" : std::string(); });
+void add_pyramid_options(cli::App command, PyramidOptions& options) {
+    const auto pyramid = command
+                             .add_option("--pyramid", options.directory,
+                                         "Instead of an image: a directory with a weighted and an unweighted picture of every "
+                                         "technique, and index.html that shows them (default --spp: at most " +
+                                             std::to_string(kPyramidSamples) + ")")
+                             ->check([](const std::string& name) { return name.empty() ? "an empty name" : std::string(); });
     command
         .add_option("--pyramid-depth", options.depth,
                     "Edges of the longest paths with pictures of their own; longer ones share some")

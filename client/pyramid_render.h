@@ -14,7 +14,7 @@ struct PyramidOptions {
 inline constexpr uint32_t kPyramidSamples = 16;
 
 /// --pyramid and --pyramid-depth, which take the place of the other outputs.
-void add_pyramid_options(CLI::App& command, PyramidOptions& options);
+void add_pyramid_options(cli::App command, PyramidOptions& options);
 /// Renders and writes the directory. The exit code.
 int render_pyramid(JobOptions options, const PyramidOptions& pyramid, uint32_t threads, const TableCacheOptions& cache);
 

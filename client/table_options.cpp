@@ -1,6 +1,5 @@
 #include "client/table_options.h"
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -17,7 +16,7 @@ TableCacheOptions::TableCacheOptions() : directory("off") {
     if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache) directory = std::string(cache) + "/lightloom/tables";
 }
 
-void add_table_cache_options(CLI::App& command, TableCacheOptions& options) {
+void add_table_cache_options(cli::App command, TableCacheOptions& options) {
     command
         .add_option("--table-cache", options.directory,
                     "Directory in which learned tables are kept for the next render, or off; it holds nothing else, no "

@@ -23,7 +23,7 @@ struct TableCacheOptions {
 };
 
 /// --table-cache and --table-cache-size.
-void add_table_cache_options(CLI::App& command, TableCacheOptions& options);
+void add_table_cache_options(cli::App command, TableCacheOptions& options);
 
 /// The tables that a job on `scene` renders with, those that a coordinator would learn for it: from the cache, which is where its
 /// `render` put them, or else made here and put there, which a line on standard error says. Empty for an algorithm without tables.

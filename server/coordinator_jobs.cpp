@@ -1,6 +1,5 @@
 // The life of a job between acceptance and end: reading the scene, planning, finishing.
 
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "common/cli/log_line.h"
 #include "common/core/atomic_file.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
@@ -101,8 +101,8 @@ void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, Tab
     discard_training(job);
     size_window(job);
     job.state = JobState::kRunning;
-    spdlog::info("{}: {}x{}, {} tile(s), {} unit(s)", job.id, frame.crop.width(), frame.crop.height(), job.units->tile_count(),
-                 job.units->unit_total());
+    log_info("{}: {}x{}, {} tile(s), {} unit(s)", job.id, frame.crop.width(), frame.crop.height(), job.units->tile_count(),
+             job.units->unit_total());
     changed(job);
     work_changed_.notify_all();
 }

@@ -1,16 +1,16 @@
 // lightloom-server: the coordinator as a process.
 
-#include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iostream>
 #include <optional>
 #include <thread>
 
+#include "common/cli/command_line.h"
 #include "common/cli/completion.h"
+#include "common/cli/log_line.h"
 #include "common/cli/numbers.h"
 #include "common/cli/start.h"
 #include "common/core/atomic_file.h"
@@ -48,7 +48,7 @@ class OwnWorker {
           worker_(port_, cache,
                   {.identity = identity, .thread_count = threads, .host = "coordinator", .process_id = uint64_t(::getpid())}),
           thread_([this](std::stop_token stop) {
-              if (const Status s = worker_.run(stop); !s.ok()) spdlog::error("the coordinator's own worker: {}", s.message());
+              if (const Status s = worker_.run(stop); !s.ok()) log_error("the coordinator's own worker: {}", s.message());
           }) {}
 
   private:
@@ -63,8 +63,8 @@ class OwnWorker {
 
 int main(int argc, char** argv) {
     using namespace lightloom;
-    CLI::App app{"The coordinator of Lightloom: accepts jobs, leases their units to workers and merges the results.",
-                 "lightloom-server"};
+    cli::Program app{"The coordinator of Lightloom: accepts jobs, leases their units to workers and merges the results.",
+                     "lightloom-server"};
     app.footer(kFooter);
     std::string listen = "127.0.0.1:50051", data = "lightloom-data", status = "127.0.0.1:9464", level = "info", port_file;
     double lease = 10;
@@ -140,14 +140,14 @@ int main(int argc, char** argv) {
     std::optional<OwnWorker> own;
     if (threads > 0) own.emplace(coordinator, *identity, threads, std::filesystem::path(data) / "worker");
     const bool tcp = !listen.starts_with("unix:");
-    spdlog::info("build {}, listening on {}, status on port {}", identity->build_id,
-                 tcp ? "port " + std::to_string((*server)->port()) : listen, http ? http->port() : 0);
+    log_info("build {}, listening on {}, status on port {}", identity->build_id,
+             tcp ? "port " + std::to_string((*server)->port()) : listen, http ? http->port() : 0);
     if (!port_file.empty()) {
         const std::string ports =
             std::to_string(tcp ? (*server)->port() : 0) + " " + std::to_string(http ? http->port() : 0) + "\n";
         if (const Status written = write_file_atomically(port_file, ports); !written.ok()) return log_failure(written);
     }
     signals.wait();
-    spdlog::info("stopping");
+    log_info("stopping");
     return kStopped;
 }

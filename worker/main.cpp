@@ -1,15 +1,15 @@
 // lightloom-worker: renders units for a coordinator.
 
-#include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <filesystem>
 #include <stop_token>
 
+#include "common/cli/command_line.h"
 #include "common/cli/completion.h"
+#include "common/cli/log_line.h"
 #include "common/cli/numbers.h"
 #include "common/cli/start.h"
 #include "common/work/channel.h"
@@ -45,7 +45,7 @@ Exit codes: 0 stopped as asked, 1 refused by the coordinator or failed, 2 bad co
 
 int main(int argc, char** argv) {
     using namespace lightloom;
-    CLI::App app{"Renders work units for a Lightloom coordinator.", "lightloom-worker"};
+    cli::Program app{"Renders work units for a Lightloom coordinator.", "lightloom-worker"};
     app.footer(kFooter);
     std::string server = "127.0.0.1:50051", level = "info", golden_override;
     std::string cache = default_cache().string();
@@ -60,7 +60,7 @@ int main(int argc, char** argv) {
     if (const auto ended = parse_and_log(app, argc, argv, level)) return *ended;
     std::stop_source stop;
     const auto leave = [stop]() mutable {
-        spdlog::info("stopping: no new units, the running one is finished");
+        log_info("stopping: no new units, the running one is finished");
         stop.request_stop();
     };
     StopSignals().on_stop(leave, kFailedToRun);

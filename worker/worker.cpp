@@ -1,11 +1,11 @@
 #include "worker/worker.h"
 
-#include <spdlog/spdlog.h>
-
 #include <chrono>
 #include <new>
 #include <random>
 #include <thread>
+
+#include "common/cli/log_line.h"
 
 namespace lightloom {
 namespace {
@@ -65,7 +65,7 @@ Status Worker::sign_in(std::stop_token stop, const std::string& stale_id) {
     while (!stop.stop_requested()) {
         const auto grant = port_.register_worker(hello);
         if (grant.ok()) {
-            spdlog::info("registered as {}", grant->worker_id);
+            log_info("registered as {}", grant->worker_id);
             const std::lock_guard lock(mutex_);
             grant_ = *grant;
             return {};
@@ -78,7 +78,7 @@ Status Worker::sign_in(std::stop_token stop, const std::string& stale_id) {
             refusal_ = grant.status();
             return grant.status();
         }
-        if (!complained) spdlog::warn("waiting for the coordinator: {}", grant.status().message());
+        if (!complained) log_warn("waiting for the coordinator: {}", grant.status().message());
         complained = true;
         wait(backoff.next(), stop);
     }
@@ -139,7 +139,7 @@ void Worker::lane(std::stop_token stop) {
         } else if (leases.status().code() == StatusCode::kNotFound) {
             if (!sign_in(stop, worker_id).ok()) return;
         } else if (!stop.stop_requested()) {
-            spdlog::debug("lease: {}", leases.status().message());
+            log_debug("lease: {}", leases.status().message());
             wait(backoff.next(), stop);
         }
     }
@@ -162,7 +162,7 @@ bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
         made = {StatusCode::kResourceExhausted, "this worker has too little memory for the unit"};
     }
     const bool able = made.ok() || made.code() == StatusCode::kCancelled;
-    if (!able) spdlog::error("{}: {}", name_of(reference), made.message());
+    if (!able) log_error("{}: {}", name_of(reference), made.message());
     // A heartbeat that still named a unit that is being given back would renew its lease, and nobody would render it
     // until that lease expired.
     std::unique_lock beat(beat_mutex_, std::defer_lock);
@@ -173,7 +173,7 @@ bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
     }
     if (!made.ok()) {
         const Status status = port_.release_unit(id(), reference, made);
-        if (!status.ok()) spdlog::debug("release: {}", status.message());
+        if (!status.ok()) log_debug("release: {}", status.message());
     }
     return able;
 }
@@ -234,8 +234,7 @@ Status Worker::submit(const UnitLease& lease, const Send& send, std::stop_token 
         const std::string worker_id = id();
         const auto ack = send(worker_id);
         if (ack.ok()) {
-            if (ack->outcome == SubmitOutcome::kDuplicateDifferent)
-                spdlog::error("{}: {}", name_of(lease.reference()), ack->reason);
+            if (ack->outcome == SubmitOutcome::kDuplicateDifferent) log_error("{}: {}", name_of(lease.reference()), ack->reason);
             // The coordinator has counted the failure, but a heartbeat or our other lane may have leased the unit again
             // meanwhile.
             if (ack->outcome == SubmitOutcome::kRejected) return {StatusCode::kAborted, ack->reason};
@@ -276,7 +275,7 @@ void Worker::send_heartbeat() {
     }
     const auto revoked = port_.heartbeat(worker_id, running);
     if (!revoked.ok()) {
-        spdlog::debug("heartbeat: {}", revoked.status().message());
+        log_debug("heartbeat: {}", revoked.status().message());
         return;
     }
     const std::lock_guard lock(mutex_);

@@ -1,6 +1,5 @@
 #include "common/cli/start.h"
 
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -9,6 +8,7 @@
 #include <thread>
 
 #include "common/cli/log.h"
+#include "common/cli/log_line.h"
 
 namespace lightloom {
 
@@ -28,7 +28,7 @@ std::optional<int> parse_and_log(CLI::App& app, int argc, char** argv, const std
 }
 
 int log_failure(const Status& status, const std::string& prefix) {
-    spdlog::error("{}{}", prefix, status.message());
+    log_error("{}{}", prefix, status.message());
     return kFailedToRun;
 }
 
