@@ -9,6 +9,7 @@
 
 #include "client/commands.h"
 #include "client/job_options.h"
+#include "common/cli/command_line.h"
 #include "common/cli/help.h"
 #include "common/transport/catalog.h"
 
@@ -121,13 +122,13 @@ int run(const std::string& name, bool json) {
 
 }  // namespace
 
-void add_algorithms_command(CLI::App& app, int* exit_code) {
+void add_algorithms_command(cli::App app, int* exit_code) {
     struct Options {
         std::string name;
         bool json = false;
     };
     const auto options = std::make_shared<Options>();
-    CLI::App* command = app.add_subcommand("algorithms", "List the algorithms and their parameters (--algorithm, --set)");
+    const cli::App command = app.add_subcommand("algorithms", "List the algorithms and their parameters (--algorithm, --set)");
     command->footer(kFooter);
     command->add_option("NAME", options->name, "Show this one alone, with all of its parameters");
     command->add_flag("--json", options->json, "Print one JSON document instead of text");

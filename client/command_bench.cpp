@@ -223,9 +223,9 @@ int bench(BenchOptions& options) {
 
 }  // namespace
 
-void add_bench_command(CLI::App& app, int* exit_code) {
+void add_bench_command(cli::App app, int* exit_code) {
     auto options = std::make_shared<BenchOptions>();
-    CLI::App* command = app.add_subcommand("bench", "Measure how soon algorithms come near a reference image");
+    const cli::App command = app.add_subcommand("bench", "Measure how soon algorithms come near a reference image");
     command->footer(kFooter);
     command->add_option("SCENE", options->scene.scene, "pbrt-v4 scene file")->type_name("FILE")->required();
     add_scene_options(*command, options->scene.reading);
@@ -240,12 +240,12 @@ void add_bench_command(CLI::App& app, int* exit_code) {
         ->required();
     command->add_option("-o,--output,--out", options->out, "JSON lines to write")->required()->type_name("FILE");
     command->add_flag("--resume", options->resume, "Skip the runs that FILE holds to the end; start the others again");
-    auto* time = command->add_option("--time", options->time, "Seconds that a run may take; --time or --spp is needed")
-                     ->type_name("SECONDS")
-                     ->check(number_between(0.001, 30 * 86400.0));
-    auto* spp = command->add_option("--spp", options->spp, "Samples per pixel (iterations) that a run may take")
-                    ->type_name("N")
-                    ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
+    const auto time = command->add_option("--time", options->time, "Seconds that a run may take; --time or --spp is needed")
+                          ->type_name("SECONDS")
+                          ->check(number_between(0.001, 30 * 86400.0));
+    const auto spp = command->add_option("--spp", options->spp, "Samples per pixel (iterations) that a run may take")
+                         ->type_name("N")
+                         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     command->add_option("--seeds", options->seeds, "Runs of each algorithm, with as many seeds")
         ->type_name("N")
         ->capture_default_str()
@@ -278,7 +278,7 @@ void add_bench_command(CLI::App& app, int* exit_code) {
         ->check(number_between(0.001, 86400.0));
     command->add_flag("-q,--quiet", options->scene.quiet, "Print the table and errors only");
     command->callback([options, time, spp, exit_code] {
-        if (time->count() + spp->count() == 0) throw CLI::RequiredError("--time or --spp");
+        if (time->count() + spp->count() == 0) cli::throw_required("--time or --spp");
         *exit_code = bench(*options);
     });
 }

@@ -8,6 +8,7 @@
 
 #include "client/commands.h"
 #include "client/output_files.h"
+#include "common/cli/command_line.h"
 #include "common/cli/numbers.h"
 #include "common/core/atomic_file.h"
 #include "common/film/exr_io.h"
@@ -163,17 +164,18 @@ int run(const CompareOptions& options) {
 
 }  // namespace
 
-void add_compare_command(CLI::App& app, int* exit_code) {
+void add_compare_command(cli::App app, int* exit_code) {
     auto options = std::make_shared<CompareOptions>();
-    CLI::App* command = app.add_subcommand("compare", "Measure how far an EXR image is from a reference of the same frame");
+    const cli::App command = app.add_subcommand("compare", "Measure how far an EXR image is from a reference of the same frame");
     command->add_option("IMAGE", options->image, "EXR to judge")->type_name("FILE")->required();
     command->add_option("REFERENCE", options->reference, "EXR to measure it by, of the same frame")->type_name("FILE")->required();
-    CLI::Option* json = command
-                            ->add_option("--json", options->json,
-                                         "Write the metrics as JSON to FILE, or to standard output instead of the table if no FILE "
-                                         "follows (then give it last)")
-                            ->type_name("[FILE]")
-                            ->expected(0, 1);
+    const cli::Option json =
+        command
+            ->add_option("--json", options->json,
+                         "Write the metrics as JSON to FILE, or to standard output instead of the table if no FILE "
+                         "follows (then give it last)")
+            ->type_name("[FILE]")
+            ->expected(0, 1);
     command
         ->add_option("-o,--output,--heat", options->heat,
                      "Also write the signed relative error as a PNG: blue where the image is darker, red where it is brighter")

@@ -14,6 +14,7 @@
 #include "client/inspect_tables.h"
 #include "client/job_options.h"
 #include "client/output_files.h"
+#include "common/cli/command_line.h"
 #include "common/core/atomic_file.h"
 #include "common/import/diagnostics.h"
 #include "common/import/import.h"
@@ -204,21 +205,21 @@ int run(const Options& options) {
 
 }  // namespace
 
-void add_inspect_command(CLI::App& app, int* exit_code) {
+void add_inspect_command(cli::App app, int* exit_code) {
     const auto options = std::make_shared<Options>();
-    CLI::App* command = app.add_subcommand("inspect",
-                                           "Show what a scene holds: geometry, lights with their power, materials, textures, "
-                                           "memory, and everything in the file that is ignored");
+    const cli::App command = app.add_subcommand("inspect",
+                                                "Show what a scene holds: geometry, lights with their power, materials, textures, "
+                                                "memory, and everything in the file that is ignored");
     command->add_option("SCENE", options->scene, "pbrt-v4 scene file")->type_name("FILE")->required();
     command->add_flag("--why", options->why,
                       "List everything that stops the file, not only the first fault, and exit with 2 if anything does");
     add_scene_options(*command, options->reading);
     command->add_option("-o,--output,--json", options->json, "Write the same as JSON to FILE")->type_name("FILE");
-    auto* tables = command
-                       ->add_option("--tables", options->tables,
-                                    "Also show the learned tables in this file: KEY.tables of a table cache, KEY being "
-                                    "tables.cache_key of a manifest")
-                       ->type_name("FILE");
+    const auto tables = command
+                            ->add_option("--tables", options->tables,
+                                         "Also show the learned tables in this file: KEY.tables of a table cache, KEY being "
+                                         "tables.cache_key of a manifest")
+                            ->type_name("FILE");
     command
         ->add_option("--draw", options->draw,
                      "Write PREFIX-kappa-eye.png, -kappa-light.png, -gamma.png and -q.png: subspaces of what the camera sees, "

@@ -22,7 +22,7 @@ std::string resolution_text(const JobInfo& job) {
 /// "12/64 spp 18 %", or without the total for a job with a time limit.
 std::string progress_text(const JobInfo& job) {
     std::string text = std::to_string(job.samples_per_pixel_done);
-    if (job.spec.samples_per_pixel > 0) text += "/" + std::to_string(job.spec.samples_per_pixel);
+    if (job.spec.samples_per_pixel > 0) text.append("/").append(std::to_string(job.spec.samples_per_pixel));
     return text + " spp " + std::to_string(int(100 * rendered_share(job))) + " %";
 }
 

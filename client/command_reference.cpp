@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "client/commands.h"
@@ -170,21 +171,21 @@ int reference(ReferenceOptions& options) {
 
 }  // namespace
 
-void add_reference_command(CLI::App& app, int* exit_code) {
+void add_reference_command(cli::App app, int* exit_code) {
     auto options = std::make_shared<ReferenceOptions>();
-    CLI::App* command = app.add_subcommand("reference", "Render an image that others are measured by, and check it");
+    const cli::App command = app.add_subcommand("reference", "Render an image that others are measured by, and check it");
     command->footer(kFooter);
     add_render_settings(*command, options->job);
     command->add_option("-o,--output", options->job.output, "EXR to write; its description goes beside it as .json")
         ->type_name("FILE")
         ->required();
-    auto* spp = command->add_option("--spp", options->job.samples_per_pixel, "Samples per pixel; --spp or --time is needed")
-                    ->type_name("N")
-                    ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
-    auto* time = command->add_option("--time", options->job.time_seconds, "Stop after so many seconds of rendering")
-                     ->type_name("SECONDS")
-                     ->check(number_between(0.001, 30 * 86400.0))
-                     ->excludes(spp);
+    const auto spp = command->add_option("--spp", options->job.samples_per_pixel, "Samples per pixel; --spp or --time is needed")
+                         ->type_name("N")
+                         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
+    const auto time = command->add_option("--time", options->job.time_seconds, "Stop after so many seconds of rendering")
+                          ->type_name("SECONDS")
+                          ->check(number_between(0.001, 30 * 86400.0))
+                          ->excludes(spp);
     command->add_option("--cross-check", options->cross_check, "Another algorithm that must agree")
         ->type_name("NAME[:KEY=VALUE]...");
     command
@@ -196,7 +197,7 @@ void add_reference_command(CLI::App& app, int* exit_code) {
     add_table_cache_options(*command, options->cache);
     command->add_flag("-q,--quiet", options->job.quiet, "Print errors and the cross-check only");
     command->callback([options, spp, time, exit_code] {
-        if (spp->count() + time->count() == 0) throw CLI::RequiredError("--time or --spp");
+        if (spp->count() + time->count() == 0) cli::throw_required("--time or --spp");
         *exit_code = reference(*options);
     });
 }

@@ -122,7 +122,7 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, c
 
 }  // namespace
 
-void add_render_command(CLI::App& app, int* exit_code) {
+void add_render_command(cli::App app, int* exit_code) {
     struct Options {
         JobOptions job;
         uint32_t threads = 0, workers = 1;
@@ -130,7 +130,7 @@ void add_render_command(CLI::App& app, int* exit_code) {
         PyramidOptions pyramid;
     };
     auto options = std::make_shared<Options>();
-    CLI::App* command = app.add_subcommand("render", "Render a scene on this machine");
+    const cli::App command = app.add_subcommand("render", "Render a scene on this machine");
     command->footer(kFooter);
     add_render_settings(*command, options->job);
     add_output_settings(*command, options->job);

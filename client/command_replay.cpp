@@ -201,32 +201,34 @@ int replay(const ReplayOptions& options) {
 
 }  // namespace
 
-void add_replay_command(CLI::App& app, int* exit_code) {
+void add_replay_command(cli::App app, int* exit_code) {
     auto options = std::make_shared<ReplayOptions>();
-    CLI::App* command = app.add_subcommand("replay", "Render one sample or one unit of a job again and print it");
+    const cli::App command = app.add_subcommand("replay", "Render one sample or one unit of a job again and print it");
     command->footer(std::string(kFooter) + kPathSchema);
     add_render_settings(*command, options->job);
     command->add_option("-o,--output", options->job.output, "Write what is printed to FILE instead")->type_name("FILE");
-    auto* iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, counted from 0")
-                          ->type_name("N")
-                          ->capture_default_str()
-                          ->check(whole_number_between(0, JobSpec::kMaxSamplesPerPixel - 1));
-    auto* pixel = command->add_option("--pixel", options->pixel, "The sample's pixel of the whole frame; 0,0 is at the top left")
-                      ->type_name("X,Y")
-                      ->expected(2)
-                      ->delimiter(',')
-                      ->check(whole_number_between(0, 65535));
-    auto* unit = command->add_option("--unit", options->unit, "The whole unit instead of one sample, as a manifest lists units")
-                     ->type_name("GROUP,TILE")
-                     ->expected(2)
-                     ->delimiter(',')
-                     ->check(whole_number_between(0, UINT32_MAX));
+    const auto iteration = command->add_option("--iteration", options->iteration, "Iteration of the sample, counted from 0")
+                               ->type_name("N")
+                               ->capture_default_str()
+                               ->check(whole_number_between(0, JobSpec::kMaxSamplesPerPixel - 1));
+    const auto pixel =
+        command->add_option("--pixel", options->pixel, "The sample's pixel of the whole frame; 0,0 is at the top left")
+            ->type_name("X,Y")
+            ->expected(2)
+            ->delimiter(',')
+            ->check(whole_number_between(0, 65535));
+    const auto unit =
+        command->add_option("--unit", options->unit, "The whole unit instead of one sample, as a manifest lists units")
+            ->type_name("GROUP,TILE")
+            ->expected(2)
+            ->delimiter(',')
+            ->check(whole_number_between(0, UINT32_MAX));
     command->add_option("--spp", options->spp, "Samples per pixel of the job, if it was bounded by them (default: it was not)")
         ->type_name("N")
         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     iteration->needs(pixel);
     pixel->excludes(unit);
-    auto* paths =
+    const auto paths =
         command->add_flag("--paths", options->paths, "Print every contribution to the sample that --pixel names")->needs(pixel);
     command->add_flag("--json", options->json, "With --paths: one JSON document instead of text")->needs(paths);
     command
@@ -237,7 +239,7 @@ void add_replay_command(CLI::App& app, int* exit_code) {
     add_table_cache_options(*command, options->cache);
     command->add_flag("--strict", options->job.strict, "Exit with 3 if the sample, or one of the unit, is not finite");
     command->callback([options, exit_code] {
-        if (options->pixel.empty() && options->unit.empty()) throw CLI::RequiredError("--pixel or --unit");
+        if (options->pixel.empty() && options->unit.empty()) cli::throw_required("--pixel or --unit");
         *exit_code = replay(*options);
     });
 }

@@ -103,10 +103,10 @@ constexpr const char* kPreviewFooter =
 
 }  // namespace
 
-void add_service_commands(CLI::App& app, int* exit_code) {
+void add_service_commands(cli::App app, int* exit_code) {
     const auto add = [&](const char* name, const char* help, int (*run)(const ServiceOptions&)) {
         auto options = std::make_shared<ServiceOptions>();
-        CLI::App* command = app.add_subcommand(name, help);
+        const cli::App command = app.add_subcommand(name, help);
         add_server_option(*command, *options);
         command->callback([options, exit_code, run] { *exit_code = run(*options); });
         return std::pair(command, options);
@@ -122,8 +122,8 @@ void add_service_commands(CLI::App& app, int* exit_code) {
             ->check([](const std::string& name) {
                 return check_label({name, {}}).message();
             });
-        auto* detach = command->add_flag("--detach", options->detach,
-                                         "Print the job's id and return at once; `fetch --strict` tells of dropped samples");
+        const auto detach = command->add_flag("--detach", options->detach,
+                                              "Print the job's id and return at once; `fetch --strict` tells of dropped samples");
         for (const char* later : {"--output", "--half", "--png", "--json"})  // `fetch` has its own
             detach->excludes(command->get_option(later));
     }

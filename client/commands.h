@@ -2,7 +2,7 @@
 // The commands of the `lightloom` program, one file each. A command adds itself to the application; its callback stores the
 // process's exit code.
 
-#include <CLI/CLI.hpp>
+#include "common/cli/command_line.h"
 
 namespace lightloom::client {
 
@@ -16,13 +16,13 @@ enum ExitCode : int {
     kCancelled = 130,
 };
 
-void add_render_command(CLI::App& app, int* exit_code);    // render, embedded
-void add_service_commands(CLI::App& app, int* exit_code);  // submit, watch, fetch, cancel, list, workers, preview
-void add_inspect_command(CLI::App& app, int* exit_code);
-void add_compare_command(CLI::App& app, int* exit_code);
-void add_algorithms_command(CLI::App& app, int* exit_code);
-void add_replay_command(CLI::App& app, int* exit_code);
-void add_bench_command(CLI::App& app, int* exit_code);
-void add_reference_command(CLI::App& app, int* exit_code);
+void add_render_command(cli::App app, int* exit_code);    // render, embedded
+void add_service_commands(cli::App app, int* exit_code);  // submit, watch, fetch, cancel, list, workers, preview
+void add_inspect_command(cli::App app, int* exit_code);
+void add_compare_command(cli::App app, int* exit_code);
+void add_algorithms_command(cli::App app, int* exit_code);
+void add_replay_command(cli::App app, int* exit_code);
+void add_bench_command(cli::App app, int* exit_code);
+void add_reference_command(cli::App app, int* exit_code);
 
 }  // namespace lightloom::client

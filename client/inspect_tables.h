@@ -2,7 +2,7 @@
 // What a file of learned tables holds, in numbers and pictures.
 
 #include <array>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "common/scene/scene.h"

@@ -7,6 +7,7 @@
 
 #include "client/commands.h"
 #include "client/default_algorithm.h"
+#include "common/cli/command_line.h"
 #include "common/cli/numbers.h"
 #include "common/import/features.h"
 #include "common/path/path_view.h"
@@ -21,7 +22,7 @@ double seconds_since(Clock::time_point begin) { return std::chrono::duration<dou
 
 }  // namespace
 
-void add_scene_options(CLI::App& command, SceneOptions& options) {
+void add_scene_options(cli::App command, SceneOptions& options) {
     command
         .add_option("--root", options.root,
                     "Directory that holds the scene file and everything that it refers to (default: one up to three levels "
@@ -50,7 +51,7 @@ void report_left_out(const SceneOptions& options, const ImportedScene& scene) {
     std::fprintf(stderr, "lightloom: left out: %s\n", text.c_str());
 }
 
-void add_render_settings(CLI::App& command, JobOptions& options) {
+void add_render_settings(cli::App command, JobOptions& options) {
     command
         .add_option("SCENE", options.scene,
                     "pbrt-v4 scene file; everything that it refers to lies beside or below it, or see --root")
@@ -85,10 +86,10 @@ void add_render_settings(CLI::App& command, JobOptions& options) {
         ->check(whole_number());
 }
 
-void add_image_settings(CLI::App& command, JobOptions& options) {
+void add_image_settings(cli::App command, JobOptions& options) {
     command.add_flag("--half", options.half,
                      "Write colour as half floats; refused where a value is beyond their range, and nothing is lost");
-    auto* png = command.add_option("--png", options.png, "Also write an 8-bit sRGB picture")->type_name("FILE");
+    const auto png = command.add_option("--png", options.png, "Also write an 8-bit sRGB picture")->type_name("FILE");
     command.add_option("--exposure", options.exposure, "Stops by which the picture is brightened (the EXR never is)")
         ->type_name("STOPS")
         ->capture_default_str()
@@ -96,7 +97,7 @@ void add_image_settings(CLI::App& command, JobOptions& options) {
         ->needs(png);
 }
 
-void add_output_settings(CLI::App& command, JobOptions& options) {
+void add_output_settings(cli::App command, JobOptions& options) {
     command
         .add_option("-o,--output", options.output,
                     "EXR to write; its manifest goes beside it (default: the scene's name with .exr, in the "
@@ -104,7 +105,7 @@ void add_output_settings(CLI::App& command, JobOptions& options) {
         ->type_name("FILE");
     add_image_settings(command, options);
     command.add_flag("--layers", options.layers, "Also store albedo, normal and depth of what the camera sees first");
-    auto* spp =
+    const auto spp =
         command.add_option("--spp", options.samples_per_pixel, "Samples per pixel (default: the scene's, unless --time is given)")
             ->type_name("N")
             ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));

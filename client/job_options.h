@@ -1,11 +1,11 @@
 #pragma once
 // The options that render, submit and replay share, and what they make of a scene file.
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "common/cli/command_line.h"
 #include "common/import/import.h"
 #include "common/work/service.h"
 
@@ -17,7 +17,7 @@ struct SceneOptions {
     std::vector<std::string> without;  ///< ImportOptions::without.
 };
 /// --root and --without.
-void add_scene_options(CLI::App& command, SceneOptions& options);
+void add_scene_options(cli::App command, SceneOptions& options);
 /// "lightloom: left out: ..." on standard error, if something was to be.
 void report_left_out(const SceneOptions& options, const ImportedScene& scene);
 
@@ -40,11 +40,11 @@ struct JobOptions {
 };
 
 /// Scene, algorithm, depth, resolution, crop window, seed and parameters.
-void add_render_settings(CLI::App& command, JobOptions& options);
+void add_render_settings(cli::App command, JobOptions& options);
 /// --half, --png and --exposure, for every command that writes an image.
-void add_image_settings(CLI::App& command, JobOptions& options);
+void add_image_settings(cli::App command, JobOptions& options);
 /// Output, bounds, statistics.
-void add_output_settings(CLI::App& command, JobOptions& options);
+void add_output_settings(cli::App command, JobOptions& options);
 
 /// A scene that was read on this host.
 struct LocalScene {

@@ -28,7 +28,7 @@ Result<BuiltJob> build_job(const JobOptions& options, uint32_t threads, const Sc
     return built;
 }
 
-void add_threads_option(CLI::App& command, uint32_t& threads) {
+void add_threads_option(cli::App command, uint32_t& threads) {
     threads = processor_count();
     command.add_option("-t,--threads", threads, "Threads to render with (default: all processors)")
         ->type_name("N")

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "client/job_options.h"
+#include "common/cli/command_line.h"
 #include "common/scene/scene.h"
 
 namespace lightloom::client {
@@ -32,6 +33,6 @@ struct BuiltJob {
 Result<BuiltJob> build_job(const JobOptions& options, uint32_t threads, const SceneCheck& check = {});
 
 /// -t, --threads of such a command; all processors by default.
-void add_threads_option(CLI::App& command, uint32_t& threads);
+void add_threads_option(cli::App command, uint32_t& threads);
 
 }  // namespace lightloom::client

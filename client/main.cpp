@@ -8,9 +8,11 @@
 #include <memory>
 
 #include "client/commands.h"
+#include "common/cli/completion.h"
 #include "common/cli/help.h"
 #include "common/cli/log.h"
 #include "common/cli/start.h"
+#include "common/transport/catalog.h"
 #include "common/work/identity.h"
 
 namespace {
@@ -24,6 +26,13 @@ constexpr const char* kFooter = R"(First steps:
 Exit codes: 0 success; 1 the job failed, or the service does not know it; 2 bad command line or input file; 3 --strict
 and non-finite samples were dropped; 4 the service could not be reached; 130 interrupted, or the job was cancelled.)";
 
+/// What completion offers as values.
+lightloom::OptionWords option_words() {
+    lightloom::OptionWords words;
+    for (const lightloom::AlgorithmInfo* algorithm : lightloom::catalog()) words["--algorithm"].emplace_back(algorithm->name);
+    return words;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -32,6 +41,7 @@ int main(int argc, char** argv) {
     app.formatter(std::make_shared<lightloom::HelpFormatter>());
     lightloom::add_version_option(app, lightloom::kBuildId);
     app.require_subcommand(1);
+    lightloom::add_completion_option(app, option_words());
     std::string level = "warn";
     app.parse_complete_callback([&] { lightloom::set_up_logging("lightloom", level); });
     int exit_code = kSuccess;

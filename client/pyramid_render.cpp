@@ -11,6 +11,7 @@
 #include "client/local_scene.h"
 #include "client/pyramid.h"
 #include "client/run_job.h"
+#include "common/cli/command_line.h"
 #include "common/cli/numbers.h"
 #include "common/core/fork_join.h"
 #include "common/film/grouped_sum.h"
@@ -107,15 +108,15 @@ Status watch_units(const BuiltJob& job, const Renderer& renderer, uint32_t threa
 
 }  // namespace
 
-void add_pyramid_options(CLI::App& command, PyramidOptions& options) {
-    auto* pyramid = command
-                        .add_option("--pyramid", options.directory,
-                                    "Instead of an image: a folder with a weighted and an unweighted picture of every "
-                                    "technique, and index.html that shows them; DIR may be given by -o instead (then no word "
-                                    "but an option follows --pyramid). At most " +
-                                        std::to_string(kPyramidSamples) + " samples per pixel unless --spp is given")
-                        ->type_name("[DIR]")
-                        ->expected(0, 1);
+void add_pyramid_options(cli::App command, PyramidOptions& options) {
+    const auto pyramid = command
+                             .add_option("--pyramid", options.directory,
+                                         "Instead of an image: a folder with a weighted and an unweighted picture of every "
+                                         "technique, and index.html that shows them; DIR may be given by -o instead (then no word "
+                                         "but an option follows --pyramid). At most " +
+                                             std::to_string(kPyramidSamples) + " samples per pixel unless --spp is given")
+                             ->type_name("[DIR]")
+                             ->expected(0, 1);
     command
         .add_option("--pyramid-depth", options.depth,
                     "Edges of the longest paths with pictures of their own; longer ones share some")

@@ -2,6 +2,7 @@
 // lightloom render --pyramid: the units of the job that `render` would run, rendered here so that every contribution is seen.
 
 #include "client/table_options.h"
+#include "common/cli/command_line.h"
 
 namespace lightloom::client {
 
@@ -15,7 +16,7 @@ struct PyramidOptions {
 inline constexpr uint32_t kPyramidSamples = 16;
 
 /// --pyramid and --pyramid-depth, which take the place of the other outputs.
-void add_pyramid_options(CLI::App& command, PyramidOptions& options);
+void add_pyramid_options(cli::App command, PyramidOptions& options);
 /// Takes the folder from -o where --pyramid names none. kInvalidArgument where both name one, or neither.
 Status settle_pyramid_options(JobOptions& job, PyramidOptions& pyramid);
 /// Renders and writes the directory. The exit code.

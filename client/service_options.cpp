@@ -1,20 +1,19 @@
 #include "client/service_options.h"
 
-#include <CLI/CLI.hpp>
-
 #include "client/commands.h"
 #include "client/run_job.h"
+#include "common/cli/command_line.h"
 #include "common/work/channel.h"
 
 namespace lightloom::client {
 
-void add_server_option(CLI::App& command, ServiceOptions& options) {
+void add_server_option(cli::App command, ServiceOptions& options) {
     command.add_option("--server", options.server, "HOST:PORT of the coordinator")
         ->envname("LIGHTLOOM_SERVER")
         ->capture_default_str();
 }
 
-void add_job_argument(CLI::App& command, ServiceOptions& options) {
+void add_job_argument(cli::App command, ServiceOptions& options) {
     command.add_option("JOB", options.job_id, "Id from `submit --detach` or `list`")->required();
 }
 

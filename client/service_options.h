@@ -5,10 +5,7 @@
 
 #include "client/grpc_job_port.h"
 #include "client/job_options.h"
-
-namespace CLI {
-class App;
-}
+#include "common/cli/command_line.h"
 
 namespace lightloom::client {
 
@@ -19,9 +16,9 @@ struct ServiceOptions {
     bool detach = false, json = false, all = false;
 };
 
-void add_server_option(CLI::App& command, ServiceOptions& options);
+void add_server_option(cli::App command, ServiceOptions& options);
 /// Adds the argument JOB.
-void add_job_argument(CLI::App& command, ServiceOptions& options);
+void add_job_argument(cli::App command, ServiceOptions& options);
 GrpcJobPort connect(const ServiceOptions& options);
 
 /// Prints an error and gives the exit code, as report_error(); says clearly when a service does not answer.

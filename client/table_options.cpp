@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "common/cli/command_line.h"
 #include "common/cli/numbers.h"
 #include "common/transport/training.h"
 #include "common/work/identity.h"
@@ -11,7 +12,7 @@
 namespace lightloom::client {
 namespace {
 
-void add_size_option(CLI::App& command, TableCacheOptions& options) {
+void add_size_option(cli::App command, TableCacheOptions& options) {
     command.add_option("--table-cache-size", options.megabytes, "MiB that it may hold; the tables used least recently go first")
         ->type_name("MIB")
         ->check(whole_number_between(1, uint64_t(1) << 30))
@@ -25,7 +26,7 @@ TableCacheOptions::TableCacheOptions() : directory("off") {
     if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache) directory = std::string(cache) + "/lightloom/tables";
 }
 
-void add_table_cache_options(CLI::App& command, TableCacheOptions& options) {
+void add_table_cache_options(cli::App command, TableCacheOptions& options) {
     command
         .add_option("--table-cache", options.directory,
                     "Directory in which learned tables are kept for the next render, or off; it holds nothing else, no "
@@ -36,7 +37,7 @@ void add_table_cache_options(CLI::App& command, TableCacheOptions& options) {
     add_size_option(command, options);
 }
 
-void add_measured_table_cache_options(CLI::App& command, TableCacheOptions& options) {
+void add_measured_table_cache_options(cli::App command, TableCacheOptions& options) {
     options.directory = "off";
     command
         .add_option("--table-cache", options.directory,

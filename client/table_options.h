@@ -2,10 +2,14 @@
 // Where learned tables are kept between runs, for the commands that render in this process: the options, and the tables of a job
 // from there or made anew.
 
+#include <cstdint>
+#include <filesystem>
 #include <stop_token>
+#include <string>
 
 #include "client/job_options.h"
 #include "client/progressive_render.h"
+#include "common/cli/command_line.h"
 
 namespace lightloom::client {
 
@@ -21,10 +25,10 @@ struct TableCacheOptions {
 };
 
 /// --table-cache and --table-cache-size.
-void add_table_cache_options(CLI::App& command, TableCacheOptions& options);
+void add_table_cache_options(cli::App command, TableCacheOptions& options);
 
 /// Adds the same options for a command that measures: the cache is off, whatever the environment says, until a directory is given.
-void add_measured_table_cache_options(CLI::App& command, TableCacheOptions& options);
+void add_measured_table_cache_options(cli::App command, TableCacheOptions& options);
 
 /// The tables that a job on `scene` renders with, those that a coordinator would learn for it: from the cache, which is where its
 /// `render` put them, or else made here, on the threads of the calling arena, and put there, which a line on standard error says.

@@ -1,14 +1,24 @@
 #!/usr/bin/env bash
-# Installs the packages for building and testing that this host lacks, from Debian 12. Silent when nothing is missing.
+# Installs the packages of a set that this host lacks, from Debian 12. Silent when nothing is missing.
+#
+#   deploy/install-deps.sh render      to build the three programs, and to pack them (deploy/package.sh)
+#   deploy/install-deps.sh [develop]   also the tests, the fuzz targets and the format check
 set -euo pipefail
 
 packages=(
-    build-essential cmake ninja-build pkg-config ccache
-    libembree-dev libopenexr-dev libtbb-dev libpng-dev zlib1g-dev libjpeg-dev libstb-dev
+    build-essential cmake ninja-build pkg-config help2man
+    libembree-dev libopenexr-dev libtbb-dev libpng-dev zlib1g-dev libstb-dev
     libgrpc++-dev protobuf-compiler protobuf-compiler-grpc libprotobuf-dev libssl-dev
-    libspdlog-dev nlohmann-json3-dev libcli11-dev libboost-dev libsqlite3-dev
-    libgtest-dev libgmock-dev clang-14 libclang-rt-14-dev clang-format-14 curl
+    libspdlog-dev nlohmann-json3-dev libcli11-dev libboost-dev
 )
+case ${1:-develop} in
+    render) ;;
+    develop) packages+=(ccache libgtest-dev clang-14 libclang-rt-14-dev clang-format-14 curl) ;;
+    *)
+        echo "install-deps: there are the sets render and develop, not $1" >&2
+        exit 2
+        ;;
+esac
 
 missing=()
 for package in "${packages[@]}"; do

@@ -12,11 +12,11 @@ spp=${LIGHTLOOM_QUICKSTART_SPP:-40}
 scene=$root/tests/scenes/quickstart.pbrt
 bin=$root/build/release/bin
 
-"$root/deploy/install-deps.sh"
+"$root/deploy/install-deps.sh" render
 cd "$root"
 if [ ! -f build/release/build.ninja ]; then
     echo "configuring..."
-    cmake --preset release >/dev/null
+    cmake --preset release -DLIGHTLOOM_TESTS=OFF -DLIGHTLOOM_UNITY=ON >/dev/null
 fi
 echo "building (the first time takes some minutes)..."
 work=$(mktemp -d)

@@ -15,7 +15,7 @@ if git rev-parse --is-inside-work-tree >/dev/null 2>&1 &&
     echo "test: sources are not formatted; mend it with: git ls-files '*.h' '*.cpp' | xargs clang-format-14 -i" >&2
     exit 1
 fi
-# The quick start's build is reused; CI adds warnings as errors.
+# CI adds warnings as errors.
 werror=OFF
 if [ "${CI:-}" = true ]; then werror=ON; fi
 cmake --preset release -DLIGHTLOOM_WERROR=$werror >/dev/null

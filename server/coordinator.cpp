@@ -1,12 +1,11 @@
 #include "server/coordinator.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cmath>
 #include <new>
 #include <random>
 
+#include "common/cli/log_line.h"
 #include "common/core/atomic_file.h"
 #include "common/path/path_view.h"
 #include "server/job_record.h"
@@ -40,7 +39,7 @@ Coordinator::Coordinator(CoordinatorOptions options)
       ticker_([this](std::stop_token stop) { tick(stop); }) {
     // Jobs do not outlive the coordinator, so that nothing refers to tables that are found at the start.
     if (const size_t count = assets_.remove_all_that_begin_with(kTablesPrefix); count > 0)
-        spdlog::info("removed the tables of {} earlier job(s)", count);
+        log_info("removed the tables of {} earlier job(s)", count);
 }
 
 Coordinator::~Coordinator() {
@@ -152,7 +151,7 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     job.directory = options_.directory / "jobs" / job.id;
     jobs_.push_back(std::move(record));
     requests_[request_id] = &job;
-    spdlog::info("{}: accepted, {} {}", job.id, spec.algorithm.name(), job.spec.scene_root.hex().substr(0, 12));
+    log_info("{}: accepted, {} {}", job.id, spec.algorithm.name(), job.spec.scene_root.hex().substr(0, 12));
     start_task(job, &job.prepare_task, "to prepare this job: its scene or frame is too large",
                [this, &job](std::stop_token stop) { return prepare(job, stop); });
     return job.info(options_.clock());
@@ -273,7 +272,7 @@ void Coordinator::end_job(JobRecord& job, JobState state) {
     if (job.reducer) discarded_.push_back(std::move(job.reducer));
     discarded_.push_back(std::make_shared<std::vector<ImageLayer>>(std::move(job.layers)));
     job.reducer.reset();
-    spdlog::info("{}: {}{}{}", job.id, to_string(state), job.message.empty() ? "" : ": ", job.message);
+    log_info("{}: {}{}{}", job.id, to_string(state), job.message.empty() ? "" : ": ", job.message);
     changed(job);
 }
 
@@ -285,7 +284,7 @@ void Coordinator::fail_job(JobRecord& job, const Status& why) {
 
 void Coordinator::unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Failures failures, const Status& why) {
     const std::string unit = unit_name(key);
-    spdlog::warn("{}: unit {} failed ({}): {}", job.id, unit, failures.total, why.message());
+    log_warn("{}: unit {} failed ({}): {}", job.id, unit, failures.total, why.message());
     // Units are pure functions: a request that is wrong is wrong on every worker.
     if (failures.workers >= kMaxFailedWorkers || failures.total >= kMaxUnitFailures || why.code() == StatusCode::kInvalidArgument)
         fail_job(job, {why.code(), "unit " + unit + ": " + why.message()});
@@ -294,7 +293,7 @@ void Coordinator::unit_failed(JobRecord& job, const UnitKey& key, UnitTable::Fai
 
 void Coordinator::leases_expired(JobRecord& job, UnitTable& units, const std::vector<UnitTable::Expired>& expired) {
     job.expired_leases += expired.size();
-    spdlog::warn("{}: {} lease(s) ran out; the units go to other workers", job.id, expired.size());
+    log_warn("{}: {} lease(s) ran out; the units go to other workers", job.id, expired.size());
     work_changed_.notify_all();
     for (const UnitTable::Expired& lease : expired) {
         // Of the units that a silent worker held, the oldest was being rendered and counts as the cause; the others
@@ -319,7 +318,7 @@ void Coordinator::forget_old_jobs() {
         if (surplus == 0 || !is_terminal(job->state) || job->running_tasks > 0) return false;
         --surplus;
         requests_.erase(job->request_id);
-        spdlog::info("{}: forgotten; {} newer jobs have ended", job->id, options_.kept_jobs);
+        log_info("{}: forgotten; {} newer jobs have ended", job->id, options_.kept_jobs);
         discarded_.push_back(job);
         return true;
     });

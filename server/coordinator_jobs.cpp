@@ -1,6 +1,5 @@
 // The life of a job between acceptance and end: reading the scene, planning, finishing.
 
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "common/cli/log_line.h"
 #include "common/core/atomic_file.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
@@ -101,8 +101,8 @@ void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, Tab
     discard_training(job);
     size_window(job);
     job.state = JobState::kRunning;
-    spdlog::info("{}: {}x{}, {} tile(s), {} unit(s)", job.id, frame.crop.width(), frame.crop.height(), job.units->tile_count(),
-                 job.units->unit_total());
+    log_info("{}: {}x{}, {} tile(s), {} unit(s)", job.id, frame.crop.width(), frame.crop.height(), job.units->tile_count(),
+             job.units->unit_total());
     changed(job);
     work_changed_.notify_all();
 }
@@ -144,15 +144,12 @@ Status Coordinator::write_results(JobRecord& job) {
         spec = job.spec;
     }
     reducer->freeze();
-    const auto image = encode_image(spec, *reducer, std::move(layers));
+    auto developed = reducer->developed(true);
+    if (!developed.ok()) return developed.status();
+    const RareLightReport rare_light_report = reducer->rare_light_report(mean_luminance(developed->color));
+    const auto image = encode_image(spec, *std::move(developed), std::move(layers));
     if (!image.ok()) return image.status();
     const Digest digest = sha256(*image);
-    RareLight rare_light;
-    {
-        const std::lock_guard lock(mutex_);
-        rare_light = job.rare_light;
-    }
-    const RareLightReport rare_light_report = reducer->rare_light_report(rare_light);
 
     Manifest manifest;
     {

@@ -1,10 +1,9 @@
 // The coordinator's side of learning: learn_tables() runs on a thread of the job's own. Through a TracingPort it
 // reaches what only the coordinator has: units that workers trace, other jobs with the same tables, and the mutex.
 
-#include <spdlog/spdlog.h>
-
 #include <chrono>
 
+#include "common/cli/log_line.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
 #include "server/learn_tables.h"
@@ -72,8 +71,8 @@ class Coordinator::Tracing final : public TracingPort {
     }
 
     Result<bool> settle(const AffordableSet& set) override {
-        spdlog::info("{}: the time limit has room for {} of {} training samples; {} traced in {:.3f} s, learned in {:.3f} s",
-                     job_.id, set.samples, set.wanted, set.probe_samples, set.probe_traced_seconds, set.probe_learned_seconds);
+        log_info("{}: the time limit has room for {} of {} training samples; {} traced in {:.3f} s, learned in {:.3f} s", job_.id,
+                 set.samples, set.wanted, set.probe_samples, set.probe_traced_seconds, set.probe_learned_seconds);
         const bool smaller = set.samples < set.wanted;
         SceneFacts facts;
         {
@@ -181,9 +180,9 @@ Status Coordinator::finish_tables(JobRecord& job, LearnedTables learned) {
     }
     const std::string bytes = serialize(learned.tables);
     table_cache_.store(info.cache_key, bytes, info);
-    spdlog::info("{}: tables of {} x {} subspaces from {} samples; {:.2f} s traced, {:.2f} s learned{}{}", job.id,
-                 info.light_subspaces, info.eye_subspaces, info.training_samples, info.trace_seconds, learning_seconds(info),
-                 info.note.empty() ? "" : "; ", info.note);
+    log_info("{}: tables of {} x {} subspaces from {} samples; {:.2f} s traced, {:.2f} s learned{}{}", job.id, info.light_subspaces,
+             info.eye_subspaces, info.training_samples, info.trace_seconds, learning_seconds(info), info.note.empty() ? "" : "; ",
+             info.note);
     return adopt_tables(job, learned.spec, facts, bytes, std::move(info));
 }
 

@@ -2,12 +2,11 @@
 // units are leased, renewed, given back and merged exactly once like units of the image; their order of arrival does
 // not matter, because the data are joined in the order of their numbers.
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <chrono>
 #include <thread>
 
+#include "common/cli/log_line.h"
 #include "common/transport/parameters.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
@@ -78,7 +77,7 @@ bool Coordinator::wait_for_maker(JobRecord& job) {
     job.training_begin = {};
     discard_round(job);
     job.phase = PreparePhase::kWaitingForTables;
-    spdlog::info("{}: waits for the tables of {}", job.id, job.maker->id);
+    log_info("{}: waits for the tables of {}", job.id, job.maker->id);
     prepared_further(job);
     return true;
 }
@@ -131,7 +130,7 @@ bool Coordinator::adopt_cached_tables(JobRecord& job, const JobSpec& spec, const
     const Digest key = table_key(options_.identity, spec);
     auto entry = table_cache_.find(key, spec.algorithm.info().learning->parts);
     if (!entry) return false;
-    spdlog::info("{}: tables {} of an earlier job are used again", job.id, entry->info.asset.digest.hex().substr(0, 12));
+    log_info("{}: tables {} of an earlier job are used again", job.id, entry->info.asset.digest.hex().substr(0, 12));
     entry->info.capped_by_time_limit = job.capped_by_time_limit;
     if (const Status s = adopt_tables(job, spec, facts, entry->bytes, std::move(entry->info)); !s.ok()) {
         const std::lock_guard lock(mutex_);
@@ -261,7 +260,7 @@ bool Coordinator::repair_tables(const std::string& job_id) {
                           : cached ? assets_.put(digest, entry->bytes)
                                    : data_loss("no other copy is left; submit the job again");
     if (stored.ok() || stored.code() == StatusCode::kAborted) {
-        spdlog::warn("{}: tables {} were damaged on disk and are restored", job_id, digest.hex().substr(0, 12));
+        log_warn("{}: tables {} were damaged on disk and are restored", job_id, digest.hex().substr(0, 12));
         const std::lock_guard lock(mutex_);
         if (is_terminal(job->state)) drop_tables(digest);  // the job ended meanwhile
         return true;

@@ -1,7 +1,6 @@
 // The coordinator's side of a worker's life: registration, leases, heartbeats and results.
 
-#include <spdlog/spdlog.h>
-
+#include "common/cli/log_line.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
 
@@ -27,14 +26,14 @@ Result<WorkerGrant> Coordinator::register_worker(const WorkerHello& hello) {
         const Status refusal = failed_precondition(
             "this worker could render other pixels than the coordinator and is refused: worker has " + describe(hello.identity) +
             "; coordinator has " + describe(options_.identity) + "; install the same build on both hosts");
-        spdlog::error("worker on {} (process {}): {}", hello.host, hello.process_id, refusal.message());
+        log_error("worker on {} (process {}): {}", hello.host, hello.process_id, refusal.message());
         const std::lock_guard lock(mutex_);
         workers_.refuse(hello, refusal.message(), options_.clock());
         return refusal;
     }
     const std::lock_guard lock(mutex_);
     const WorkerRecord& worker = workers_.add(hello, options_.clock());
-    spdlog::info("{}: registered, {} thread(s)", worker.id, hello.thread_count);
+    log_info("{}: registered, {} thread(s)", worker.id, hello.thread_count);
     return WorkerGrant{worker.id, options_.heartbeat_seconds, options_.lease_seconds};
 }
 
@@ -157,7 +156,7 @@ Status Coordinator::goodbye(const std::string& worker_id) {
     }
     worker->held.clear();
     worker->left = true;
-    spdlog::info("{}: left", worker_id);
+    log_info("{}: left", worker_id);
     work_changed_.notify_all();
     return {};
 }
@@ -207,7 +206,7 @@ std::optional<SubmitAck> Coordinator::repeated_result(JobRecord& job, UnitTable&
         case UnitTable::Completion::kDuplicateDifferent:
             ++job.duplicates_different;
             changed(job);
-            spdlog::error(
+            log_error(
                 "{}: unit {} from {} differs from the bytes accepted before; one of two workers computes wrongly: "
                 "compare their hosts and builds",
                 job.id, unit_name(key), worker.id);
@@ -239,7 +238,6 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     }
     const UnitCounters counters = partial.counters;
     const uint64_t dropped = partial.dropped_count;
-    const RareLight rare_light = partial.rare_light;
     const double splats_per_path =
         unit.render.light_path_count > 0 ? double(partial.splats.size()) / double(unit.render.light_path_count) : 0;
     const auto refused = reducer->add(unit, std::move(partial));
@@ -270,7 +268,6 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     job->workers.insert(index);
     job->counters += counters;
     job->dropped += dropped;
-    if (unit.key == UnitKey{}) job->rare_light = rare_light;
     const uint32_t groups = reducer->folded_groups();
     if (groups > job->merged_groups) {
         job->merged_groups = groups;

@@ -45,7 +45,6 @@ struct JobRecord {
     /// Work of all units that arrived; in the end, of those in the image. The same holds for `dropped`.
     UnitCounters counters;
     uint64_t dropped = 0;
-    RareLight rare_light;               ///< From the first unit, once it has been merged.
     RareLightReport rare_light_report;  ///< About the finished image.
     uint64_t duplicates_same = 0, duplicates_different = 0, expired_leases = 0, rejected = 0;
     Digest image_digest;

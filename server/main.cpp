@@ -1,17 +1,17 @@
 // lightloom-server: the coordinator as a process.
 
-#include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <thread>
 
-#include "common/cli/help.h"
+#include "common/cli/command_line.h"
+#include "common/cli/completion.h"
 #include "common/cli/log.h"
+#include "common/cli/log_line.h"
 #include "common/cli/numbers.h"
 #include "common/cli/start.h"
 #include "common/core/atomic_file.h"
@@ -49,7 +49,7 @@ class OwnWorker {
           worker_(port_, cache,
                   {.identity = identity, .thread_count = threads, .host = "coordinator", .process_id = uint64_t(::getpid())}),
           thread_([this](std::stop_token stop) {
-              if (const Status s = worker_.run(stop); !s.ok()) spdlog::error("the coordinator's own worker: {}", s.message());
+              if (const Status s = worker_.run(stop); !s.ok()) log_error("the coordinator's own worker: {}", s.message());
           }) {}
 
   private:
@@ -64,9 +64,8 @@ class OwnWorker {
 
 int main(int argc, char** argv) {
     using namespace lightloom;
-    CLI::App app{"The coordinator of Lightloom: accepts jobs, leases their units to workers and merges the results.",
-                 "lightloom-server"};
-    app.formatter(std::make_shared<HelpFormatter>());
+    cli::Program app{"The coordinator of Lightloom: accepts jobs, leases their units to workers and merges the results.",
+                     "lightloom-server"};
     app.footer(kFooter);
     std::string listen = "127.0.0.1:50051", data = "lightloom-data", status = "127.0.0.1:9464", level = "info", port_file;
     double lease = 10;
@@ -105,6 +104,7 @@ int main(int argc, char** argv) {
         ->type_name("FILE");
     app.add_flag("--allow-plaintext", plaintext, "Let --listen and --status name other than loopback addresses");
     add_log_option(app, level);
+    add_completion_option(app);
     add_version_option(app, kBuildId);
     app.add_option("--shuffle-leases", shuffle, "")->group("")->check(whole_number());  // tests: lease units in a random order
     if (const auto ended = parse_and_log(app, argc, argv, level)) return *ended;
@@ -152,14 +152,14 @@ int main(int argc, char** argv) {
     std::optional<OwnWorker> own;
     if (threads > 0) own.emplace(coordinator, *identity, threads, std::filesystem::path(data) / "worker");
     const bool tcp = !listen.starts_with("unix:");
-    spdlog::info("build {}, listening on {}, status on port {}", identity->build_id,
-                 tcp ? "port " + std::to_string((*server)->port()) : listen, http ? http->port() : 0);
+    log_info("build {}, listening on {}, status on port {}", identity->build_id,
+             tcp ? "port " + std::to_string((*server)->port()) : listen, http ? http->port() : 0);
     if (!port_file.empty()) {
         const std::string ports =
             std::to_string(tcp ? (*server)->port() : 0) + " " + std::to_string(http ? http->port() : 0) + "\n";
         if (const Status written = write_file_atomically(port_file, ports); !written.ok()) return report_failure(written);
     }
     signals.wait();
-    spdlog::info("stopping");
+    log_info("stopping");
     return kStopped;
 }

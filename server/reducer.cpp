@@ -66,6 +66,7 @@ Status Reducer::add_to_current(const WorkUnit& unit, const Partial& partial, std
         refused.push_back({unit.key, added});
         return {};
     }
+    if (unit.key == UnitKey{}) rare_light_ = partial.rare_light;
     for (const DroppedSample& sample : partial.dropped)
         if (dropped_.size() < kMaxDropped) dropped_.push_back({unit.key, sample});
     return sums_->current_units() < tile_count_ ? Status() : sums_->fold(unit.render.iteration_count).status();
@@ -130,16 +131,12 @@ Result<DevelopedImage> Reducer::developed(bool with_variance, const std::functio
     }
 }
 
-RareLightReport Reducer::rare_light_report(const RareLight& light) const {
-    if (!light.known()) return {};
-    const auto complete = developed(false);
-    if (!complete.ok()) return {};
-    double sum = 0;
-    const std::vector<float>& pixels = complete->color.pixels;
-    for (size_t i = 0; i + 2 < pixels.size(); i += 3) sum += double(Rgb(pixels[i], pixels[i + 1], pixels[i + 2]).luminance());
+RareLightReport Reducer::rare_light_report(double image_mean) const {
+    const std::lock_guard lock(mutex_);
+    if (!sums_) return {};
     const FilmResponse::Triple grey = response_.of(Rgb(1.0f));
     const double exposure = double(Rgb(float(grey[0]), float(grey[1]), float(grey[2])).luminance());
-    return RareLightReport::of(light, double(counters().camera_samples), 3 * sum / double(pixels.size()), exposure);
+    return RareLightReport::of(rare_light_, double(sums_->counters().camera_samples), image_mean, exposure);
 }
 
 }  // namespace lightloom

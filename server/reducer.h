@@ -57,8 +57,8 @@ class Reducer {
     /// begins again (a few times; then results wait until it is done). `between` is called between two parts (tests).
     Result<DevelopedImage> developed(bool with_variance, const std::function<void()>& between = {}) const;
     static constexpr size_t kPixelsAtATime = size_t(1) << 16;
-    /// The consequences of `light` for the image of the complete groups.
-    RareLightReport rare_light_report(const RareLight& light) const;
+    /// The consequences of the first unit's RareLight for the image of the complete groups, whose mean luminance is `image_mean`.
+    RareLightReport rare_light_report(double image_mean) const;
 
   private:
     Result<std::vector<Refusal>> add_locked(const WorkUnit& unit, Partial partial);
@@ -71,6 +71,7 @@ class Reducer {
     mutable std::mutex mutex_;
     std::unique_ptr<GroupedSum> sums_;
     std::vector<Dropped> dropped_;  ///< Including those of the group that is being summed, which are the last.
+    RareLight rare_light_;          ///< From the first unit.
     bool frozen_ = false;
     /// Partials of later groups wait unmerged, because a group's sums would take four times their memory.
     std::map<uint32_t, std::vector<std::pair<WorkUnit, Partial>>> waiting_;

@@ -185,6 +185,13 @@ std::string to_json(const Manifest& m) {
     return json.dump(1) + "\n";
 }
 
+double mean_luminance(const RgbImage& image) {
+    double sum = 0;
+    const std::vector<float>& pixels = image.pixels;
+    for (size_t i = 0; i + 2 < pixels.size(); i += 3) sum += double(Rgb(pixels[i], pixels[i + 1], pixels[i + 2]).luminance());
+    return pixels.empty() ? 0 : 3 * sum / double(pixels.size());
+}
+
 Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers) {
     std::string parameters;  // with numbers for choices, as in the images of earlier versions: an image's bytes stay what they are
     for (const auto& [key, value] : spec.algorithm.text()) parameters += (parameters.empty() ? "" : " ") + key + "=" + value;

@@ -50,6 +50,8 @@ nlohmann::ordered_json to_json(const TablesInfo& tables);
 /// The manifest as JSON text.
 std::string to_json(const Manifest& manifest);
 
+/// Rec.709, over all pixels; 0 for an empty image.
+double mean_luminance(const RgbImage& image);
 /// The EXR's bytes: colour, its variance where that is known, and `layers`. They do not depend on who rendered it, and
 /// how.
 Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers);

@@ -1,12 +1,11 @@
 #include "server/table_cache.h"
 
-#include <spdlog/spdlog.h>
-
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
+#include "common/cli/log_line.h"
 #include "common/core/atomic_file.h"
 #include "common/work/cache_trim.h"
 #include "common/work/job_fields.h"
@@ -126,7 +125,7 @@ std::optional<TableCache::Entry> TableCache::find(const Digest& key, std::span<c
     status = info.status();
     std::error_code ignored;
     if (!status.ok()) {
-        spdlog::warn("cached tables {} cannot be used and are made again: {}", path.string(), status.message());
+        log_warn("cached tables {} cannot be used and are made again: {}", path.string(), status.message());
         fs::remove(path, ignored);
         return std::nullopt;
     }
@@ -145,7 +144,7 @@ void TableCache::store(const Digest& key, std::string_view bytes, const TablesIn
     std::string file = std::string(kMagic) + sha256(rest).hex() + "\n" + rest;
     if (file.size() > max_bytes_) return;
     if (const Status s = write_file_atomically(path_of(key).string(), file); !s.ok()) {
-        spdlog::warn("the tables could not be cached: {}", s.message());
+        log_warn("the tables could not be cached: {}", s.message());
         return;
     }
     trim(key);

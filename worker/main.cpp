@@ -1,17 +1,17 @@
 // lightloom-worker: renders units for a coordinator.
 
-#include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <stop_token>
 
-#include "common/cli/help.h"
+#include "common/cli/command_line.h"
+#include "common/cli/completion.h"
 #include "common/cli/log.h"
+#include "common/cli/log_line.h"
 #include "common/cli/numbers.h"
 #include "common/cli/start.h"
 #include "common/work/channel.h"
@@ -47,8 +47,7 @@ Exit codes: 0 stopped as asked, 1 refused by the coordinator or failed, 2 bad co
 
 int main(int argc, char** argv) {
     using namespace lightloom;
-    CLI::App app{"Renders work units for a Lightloom coordinator.", "lightloom-worker"};
-    app.formatter(std::make_shared<HelpFormatter>());
+    cli::Program app{"Renders work units for a Lightloom coordinator.", "lightloom-worker"};
     app.footer(kFooter);
     std::string server = "127.0.0.1:50051", level = "info", golden_override;
     std::string cache = default_cache().string();
@@ -62,12 +61,13 @@ int main(int argc, char** argv) {
                    "(default: lightloom in $XDG_CACHE_HOME or ~/.cache)")
         ->type_name("DIR");
     add_log_option(app, level);
+    add_completion_option(app);
     add_version_option(app, kBuildId);
     app.add_option("--pretend-golden-digest", golden_override, "")->group("");  // for tests of the refusal
     if (const auto ended = parse_and_log(app, argc, argv, level)) return *ended;
     std::stop_source stop;
     const auto leave = [stop]() mutable {
-        spdlog::info("stopping: no new units, the running one is finished");
+        log_info("stopping: no new units, the running one is finished");
         stop.request_stop();
     };
     StopSignals().on_stop(leave, kFailedToRun);

@@ -1,11 +1,11 @@
 #include "worker/scene_cache.h"
 
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <random>
 #include <thread>
 
+#include "common/cli/log_line.h"
 #include "common/core/atomic_file.h"
 #include "common/import/import.h"
 #include "common/transport/training.h"
@@ -108,7 +108,7 @@ Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, st
     if (!imported.ok()) return imported.status();
     auto scene = Scene::build(std::move(imported->description), scene_options(spec));
     if (!scene.ok()) return scene.status();
-    spdlog::info("scene {} built", root.hex().substr(0, 12));
+    log_info("scene {} built", root.hex().substr(0, 12));
     return std::shared_ptr<const Scene>(std::move(scene).value());
 }
 
@@ -132,7 +132,7 @@ Result<std::string> SceneFetcher::tables(const AssetReference& tables, std::stop
         } else if (status.code() != StatusCode::kDataLoss) {
             return status;
         }
-        spdlog::warn("tables {} are fetched again: {}", tables.digest.hex().substr(0, 12), status.message());
+        log_warn("tables {} are fetched again: {}", tables.digest.hex().substr(0, 12), status.message());
     }
     return status;
 }

@@ -1,11 +1,11 @@
 #include "worker/worker.h"
 
-#include <spdlog/spdlog.h>
-
 #include <chrono>
 #include <new>
 #include <random>
 #include <thread>
+
+#include "common/cli/log_line.h"
 
 namespace lightloom {
 namespace {
@@ -37,6 +37,18 @@ std::string name_of(const UnitReference& unit) {
     return unit.job_id + " unit " + std::to_string(unit.key.group) + "/" + std::to_string(unit.key.tile);
 }
 
+/// A rendered unit is worth more than the estimate that goes with it: if that fails, the unit goes without.
+RareLight rare_light_of(const Renderer& renderer, std::stop_token stop) {
+    try {
+        const RareLight light = renderer.rare_light(std::move(stop));
+        if (light.is_valid()) return light;
+        log_warn("the estimate of light that only chance finds is not finite; the job will not have it");
+    } catch (const std::exception& error) {
+        log_warn("the estimate of light that only chance finds failed ({}); the job will not have it", error.what());
+    }
+    return {};
+}
+
 }  // namespace
 
 Worker::Worker(WorkerPort& port, WorkerOptions options, RendererSource renderers, TracerSource tracers)
@@ -65,7 +77,7 @@ Status Worker::sign_in(std::stop_token stop, const std::string& stale_id) {
     while (!stop.stop_requested()) {
         const auto grant = port_.register_worker(hello);
         if (grant.ok()) {
-            spdlog::info("registered as {}", grant->worker_id);
+            log_info("registered as {}", grant->worker_id);
             const std::lock_guard lock(mutex_);
             grant_ = *grant;
             return {};
@@ -78,7 +90,7 @@ Status Worker::sign_in(std::stop_token stop, const std::string& stale_id) {
             refusal_ = grant.status();
             return grant.status();
         }
-        if (!complained) spdlog::warn("waiting for the coordinator: {}", grant.status().message());
+        if (!complained) log_warn("waiting for the coordinator: {}", grant.status().message());
         complained = true;
         wait(backoff.next(), stop);
     }
@@ -139,7 +151,7 @@ void Worker::lane(std::stop_token stop) {
         } else if (leases.status().code() == StatusCode::kNotFound) {
             if (!sign_in(stop, worker_id).ok()) return;
         } else if (!stop.stop_requested()) {
-            spdlog::debug("lease: {}", leases.status().message());
+            log_debug("lease: {}", leases.status().message());
             wait(backoff.next(), stop);
         }
     }
@@ -162,7 +174,7 @@ bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
         made = {StatusCode::kResourceExhausted, "this worker has too little memory for the unit"};
     }
     const bool able = made.ok() || made.code() == StatusCode::kCancelled;
-    if (!able) spdlog::error("{}: {}", name_of(reference), made.message());
+    if (!able) log_error("{}: {}", name_of(reference), made.message());
     // A heartbeat that still named a unit that is being given back would renew its lease, and nobody would render it
     // until that lease expired.
     std::unique_lock beat(beat_mutex_, std::defer_lock);
@@ -173,7 +185,7 @@ bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
     }
     if (!made.ok()) {
         const Status status = port_.release_unit(id(), reference, made);
-        if (!status.ok()) spdlog::debug("release: {}", status.message());
+        if (!status.ok()) log_debug("release: {}", status.message());
     }
     return able;
 }
@@ -192,17 +204,18 @@ Status Worker::render_unit(const UnitLease& lease, std::stop_token unit_stop, st
     const auto renderer = renderers_(lease, unit_stop);
     if (!renderer.ok()) return renderer.status();
     Result<Partial> partial = internal_error("not rendered");
-    const auto seconds = in_turn(lease, unit_stop, drain, [&] { partial = (*renderer)->render(lease.unit.render, unit_stop); });
-    if (!seconds.ok()) return seconds.status();
+    double seconds = 0;
+    const auto taken = in_turn(lease, unit_stop, drain, [&] {
+        const auto begin = Clock::now();
+        partial = (*renderer)->render(lease.unit.render, unit_stop);
+        seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+        // What samples cannot tell of the job's error is estimated once, by whoever renders its first unit.
+        if (partial.ok() && lease.unit.key == UnitKey{}) partial->rare_light = rare_light_of(**renderer, unit_stop);
+    });
+    if (!taken.ok()) return taken.status();
     if (!partial.ok()) return partial.status();
-    // What samples cannot tell of the job's error is estimated once, by whoever renders its first unit.
-    if (lease.unit.key == UnitKey{}) {
-        const auto looked = in_turn(lease, unit_stop, drain, [&] { partial->rare_light = (*renderer)->rare_light(unit_stop); });
-        if (!looked.ok()) return looked.status();
-        if (unit_stop.stop_requested()) return {StatusCode::kCancelled, "given back"};
-    }
     return submit(
-        lease, [&](const std::string& worker_id) { return port_.submit_result(worker_id, lease, *partial, *seconds); }, drain);
+        lease, [&](const std::string& worker_id) { return port_.submit_result(worker_id, lease, *partial, seconds); }, drain);
 }
 
 Status Worker::trace_unit(const UnitLease& lease, std::stop_token unit_stop, std::stop_token drain) {
@@ -234,8 +247,7 @@ Status Worker::submit(const UnitLease& lease, const Send& send, std::stop_token 
         const std::string worker_id = id();
         const auto ack = send(worker_id);
         if (ack.ok()) {
-            if (ack->outcome == SubmitOutcome::kDuplicateDifferent)
-                spdlog::error("{}: {}", name_of(lease.reference()), ack->reason);
+            if (ack->outcome == SubmitOutcome::kDuplicateDifferent) log_error("{}: {}", name_of(lease.reference()), ack->reason);
             // The coordinator has counted the failure, but a heartbeat or our other lane may have leased the unit again
             // meanwhile.
             if (ack->outcome == SubmitOutcome::kRejected) return {StatusCode::kAborted, ack->reason};
@@ -276,7 +288,7 @@ void Worker::send_heartbeat() {
     }
     const auto revoked = port_.heartbeat(worker_id, running);
     if (!revoked.ok()) {
-        spdlog::debug("heartbeat: {}", revoked.status().message());
+        log_debug("heartbeat: {}", revoked.status().message());
         return;
     }
     const std::lock_guard lock(mutex_);

@@ -1,5 +1,5 @@
 #pragma once
-// Logging set-up. Logs go to standard error so that standard output stays for results; use spdlog's own macros/functions.
+// Logging set-up. Logs go to standard error so that standard output stays for results; see log_line.h.
 
 #include <string>
 #include <string_view>

@@ -1,8 +1,6 @@
 #pragma once
 // How the programs start and stop: the command line, the log, threads and signals.
 
-#include <CLI/CLI.hpp>
-
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -11,6 +9,11 @@
 #include <signal.h>
 
 #include "common/core/result.h"
+
+namespace CLI {
+class App;
+class ParseError;
+}  // namespace CLI
 
 namespace lightloom {
 

@@ -143,14 +143,23 @@ void ContactFinder::for_each_near(const Vec3 (&corners)[3], int level, const std
     constexpr int kLevels = 8;
     constexpr size_t kMany = 128;
     const Vec3 centre = (corners[0] + corners[1] + corners[2]) / 3;
-    float radius = float(kZero * double(largest_));
-    for (const Vec3& c : corners) radius = std::max(radius, length(c - centre));
+    float extent = 0;
+    for (const Vec3& c : corners) extent = std::max(extent, length(c - centre));
+    const float least = float(kZero * double(largest_)), radius = 1.001f * std::max(extent, least);
+    // A triangle that is hardly larger than the least ball gains nothing by being divided.
+    if (level == kLevels || extent < 4 * least) {
+        accel_.for_each_near(centre, radius, [&](const RawHit& at) {
+            visit(at);
+            return true;
+        });
+        return;
+    }
     std::vector<RawHit> found;
-    accel_.for_each_near(centre, radius * 1.001f, [&](const RawHit& at) {
+    accel_.for_each_near(centre, radius, [&](const RawHit& at) {
         found.push_back(at);
-        return level == kLevels || found.size() <= kMany;
+        return found.size() <= kMany;
     });
-    if (level == kLevels || found.size() <= kMany) {
+    if (found.size() <= kMany) {
         for (const RawHit& at : found) visit(at);
         return;
     }

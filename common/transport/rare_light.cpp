@@ -27,8 +27,8 @@ constexpr size_t kPhotonPaths = 32768, kCameraSamples = 16384, kProbes = 2048, k
 /// Longest chain of mirrors and glass. Longer ones carry next to no light, and in a closed room of mirrors a walk would
 /// not end.
 constexpr int kLongestChain = 12;
-/// Radius over the length of the camera sub-path: about half a degree, as seen from the lens.
-constexpr float kRadiusPerLength = 0.01f;
+/// Radius of the search over the width of what the frame shows there, as if it were square.
+constexpr float kRadiusPerWidth = 1.0f / 80;
 
 /// A place at which light arrived through mirrors and glass alone.
 struct Photon {
@@ -39,46 +39,50 @@ struct Photon {
     bool can_be_hit = false;
 };
 
-bool is_dirac(const PathVertex& v) { return !v.bsdf.has_smooth_lobe(); }
+/// Whether a vertex has a mirror's or a smooth glass's part, perhaps beside others, as a varnish has.
+bool has_dirac_lobe(const PathVertex& v) { return v.bsdf.has_delta_lobe(); }
 
 struct Estimator {
     const Scene& scene;
     const uint64_t seed;
     const int max_edges;
     const Traces traces;
-    const RouletteRule endless{.first_vertex = kMaxEdges + 2, .min_survival = 1};
+    const RouletteRule roulette{};
 
-    /// Appends the photon of a light sub-path, if it leaves one; true if the sub-path met a mirror or glass at all.
-    bool trace_photon(size_t number, std::vector<PathVertex>& y, std::vector<Photon>* out) const {
+    /// Appends the photons of a light sub-path, one at each vertex that it reaches through Dirac events alone and that scatters
+    /// otherwise as well; true if the sub-path met a mirror or glass at all.
+    bool trace_photons(size_t number, std::vector<PathVertex>& y, std::vector<Photon>* out) const {
         LightSampler sampler({seed, Stage::kLightPool, 1, number});
         WalkCounters counters;
-        const int n = trace_light_path(scene, sampler, int(y.size()), endless, y.data(), &counters);
-        if (n < 3 || !is_dirac(y[1])) return false;
-        int s = 2;
-        while (s < n && is_dirac(y[size_t(s)])) ++s;
-        if (s == n) return true;
-        const PathVertex &start = y[0], &end = y[size_t(s)];
+        const int n = trace_light_path(scene, sampler, int(y.size()), roulette, y.data(), &counters);
+        if (n < 2 || !has_dirac_lobe(y[1])) return false;
+        for (int s = 2; s < n && y[size_t(s) - 1].delta; ++s)
+            if (y[size_t(s)].bsdf.has_smooth_lobe()) add_photon(y.data(), s, out);
+        return true;
+    }
+
+    /// The photon y[s], s >= 2, behind the Dirac events y[1 .. s-1].
+    void add_photon(const PathVertex* y, int s, std::vector<Photon>* out) const {
+        const PathVertex &start = y[0], &end = y[s];
         // A camera sub-path that leaves the glass again regains the radiance that refraction took from it.
         float index_ratio = 1;
         for (int i = 1; i < s; ++i) {
-            const PathVertex& v = y[size_t(i)];
-            index_ratio *= index_ratio2(v, v.shading.to_local(normalize(y[size_t(i) + 1].p - v.p)));
+            index_ratio *= index_ratio2(y[i], y[i].shading.to_local(normalize(y[i + 1].p - y[i].p)));
         }
         const EmitterSet& emitters = scene.emitters();
         const Emitter& e = emitters[uint32_t(start.emitter)];
         const Vec3 w = e.is_infinite() ? start.ng : normalize(y[1].p - start.p);
         out->push_back(
             {end.p, end.ng, end.wo, end.alpha, emitters.emitted(e, start.p, start.ng, w) * index_ratio, s, e.can_be_hit()});
-        return true;
     }
 
-    /// Whether the camera sub-path z[0 .. t-1], whose end is not a Dirac vertex, goes on to a photon's chain without an
-    /// edge that another technique connects.
+    /// Whether the camera sub-path z[0 .. t-1], whose end scatters to a photon's chain, has no edge that another technique
+    /// connects.
     bool only_hits_follow(const PathVertex* z, int t) const {
         if (traces == Traces::kCamera) return true;
         bool previous_is_dirac = false;  // the lens
         for (int i = 1; i < t; ++i) {
-            const bool dirac = is_dirac(z[i]);
+            const bool dirac = i < t - 1 && z[i].delta;
             if (!dirac && !previous_is_dirac) return false;
             previous_is_dirac = dirac;
         }
@@ -86,10 +90,9 @@ struct Estimator {
     }
 
     /// Adds the energy of the photons near the end of the camera sub-path z[0 .. t-1].
-    void gather(const PhotonMap& map, const std::vector<Photon>& photons, const PathVertex* z, int t, float length,
+    void gather(const PhotonMap& map, const std::vector<Photon>& photons, const PathVertex* z, int t, float radius,
                 RareLight* sum) const {
         const PathVertex& v = z[t - 1];
-        const float radius = kRadiusPerLength * length;
         const auto corner = [&](float r) { return Point(v.p.x + r, v.p.y + r, v.p.z + r); };
         const Box box(corner(-radius), corner(radius));
         for (auto found = map.qbegin(bg::index::intersects(box)); found != map.qend(); ++found) {
@@ -98,7 +101,7 @@ struct Estimator {
             if (dot(between, between) > radius * radius || std::fabs(dot(photon.ng, v.ng)) < 0.8f) continue;
             if (t - 1 + photon.edges > max_edges) continue;
             const Scatter event = scatter<TransportMode::kRadiance>(v, photon.wo);
-            const float cosine = abs_dot(photon.wo, v.shading_normal());
+            const float cosine = abs_dot(photon.wo, v.ng);
             if (!(event.pdf_fwd > 0) || !(cosine > 1e-3f)) continue;
             const Rgb density = photon.flux * (1 / (kPi * radius * radius * float(kPhotonPaths)));
             const Rgb energy = v.alpha * event.value * density * (1 / cosine);
@@ -126,18 +129,21 @@ struct Estimator {
         CameraSampler sampler(seed, uint64_t(i), uint64_t(crop.index(px, py)));
         WalkCounters counters;
         bool met_dirac = false;
-        float length = 0;
+        // The radius follows the frame as far as the first surface that scatters; light that goes on from there is not looked at
+        // any closer.
+        float distance = 0, radius = 0;
+        const float pdf = sampler.ray(scene.camera(), px, py).pdf;
+        const float width = std::sqrt(float(crop.area()) / pdf);  // at distance 1, or of parallel rays
         const auto visit = [&](int t) {
             const PathVertex& v = z[size_t(t) - 1];
-            length += lightloom::length(v.p - z[size_t(t) - 2].p);
+            distance += length(v.p - z[size_t(t) - 2].p);
             if (t > max_edges) return;
-            if (is_dirac(v)) {
-                met_dirac = true;
-            } else if (map && only_hits_follow(z.data(), t)) {
-                gather(*map, photons, z.data(), t, length, sum);
-            }
+            met_dirac |= has_dirac_lobe(v);
+            if (!v.bsdf.has_smooth_lobe()) return;
+            if (radius == 0) radius = kRadiusPerWidth * width * (scene.camera().has_parallel_rays() ? 1 : distance);
+            if (map && only_hits_follow(z.data(), t)) gather(*map, photons, z.data(), t, radius, sum);
         };
-        trace_camera_path(scene, sampler, px, py, max_edges, endless, z.data(), &counters, visit, [](int, const WalkRay&) {});
+        trace_camera_path(scene, sampler, px, py, max_edges, roulette, z.data(), &counters, visit, [](int, const WalkRay&) {});
         return met_dirac;
     }
 };
@@ -172,13 +178,13 @@ RareLight estimate_rare_light(const Scene& scene, const RenderSettings& settings
         std::vector<PathVertex> chain(light_room);
         for (size_t i = 0; i < kProbes && !met_dirac; ++i)
             met_dirac =
-                estimator.trace_photon(i, chain, &photons) || estimator.trace_camera(i, nullptr, photons, vertices, &nothing);
+                estimator.trace_photons(i, chain, &photons) || estimator.trace_camera(i, nullptr, photons, vertices, &nothing);
     }
     if (!met_dirac || stop.stop_requested()) return {};
 
     std::vector<Photon> photons;
     for (auto& chunk : in_chunks<std::vector<Photon>>(kPhotonPaths, light_room, [&](size_t i, auto&y, auto*out) {
-             if (!stop.stop_requested()) estimator.trace_photon(i, y, out);
+             if (!stop.stop_requested()) estimator.trace_photons(i, y, out);
          }))
         photons.insert(photons.end(), std::make_move_iterator(chunk.begin()), std::make_move_iterator(chunk.end()));
     std::vector<Entry> entries;

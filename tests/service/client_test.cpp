@@ -29,8 +29,8 @@ using testing::TempDirectory;
 using Json = nlohmann::json;
 
 TEST(CommandLine, NumbersAreDecimalAndInRange) {
-    const auto accepts = [](const CLI::Validator& check, std::string text) { return check(text).empty(); };
-    const CLI::Validator whole = whole_number_between(1, 1024), real = number_between(-30, 2592000);
+    const auto accepts = [](const cli::Check& check, const std::string& text) { return check.find_fault(text).empty(); };
+    const cli::Check whole = whole_number_between(1, 1024), real = number_between(-30, 2592000);
     for (const char* text : {"1", "10", "1024"}) EXPECT_TRUE(accepts(whole, text)) << text;
     for (const char* text : {"", "0", "1025", "010", "0x10", "+1", "-1", " 1", "1 ", "1.0", "1e2", "nan", "18446744073709551617"})
         EXPECT_FALSE(accepts(whole, text)) << text;
@@ -40,8 +40,7 @@ TEST(CommandLine, NumbersAreDecimalAndInRange) {
         EXPECT_FALSE(accepts(real, text)) << text;
     EXPECT_TRUE(accepts(whole_number(), "0"));
     EXPECT_TRUE(accepts(whole_number(), "18446744073709551615"));
-    std::string text = "3e6";
-    EXPECT_EQ(real(text), "\"3e6\" is no number from -30 to 2592000");
+    EXPECT_EQ(real.find_fault("3e6"), "\"3e6\" is no number from -30 to 2592000");
 }
 
 TEST(DefaultAlgorithm, IsTheScenesIntegratorAsFarAsTheCatalogHasIt) {

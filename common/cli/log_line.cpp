@@ -1,0 +1,19 @@
+#include "common/cli/log_line.h"
+
+#include <fmt/args.h>
+#include <spdlog/spdlog.h>
+
+namespace lightloom {
+
+void log_line(LogLevel level, std::string_view format, std::initializer_list<LogValue> values) {
+    const auto severity = level == LogLevel::kDebug  ? spdlog::level::debug
+                          : level == LogLevel::kInfo ? spdlog::level::info
+                          : level == LogLevel::kWarn ? spdlog::level::warn
+                                                     : spdlog::level::err;
+    if (!spdlog::should_log(severity)) return;
+    fmt::dynamic_format_arg_store<fmt::format_context> store;
+    for (const LogValue& value : values) std::visit([&](const auto& held) { store.push_back(held); }, value.value());
+    spdlog::log(severity, spdlog::string_view_t(fmt::vformat({format.data(), format.size()}, store)));
+}
+
+}  // namespace lightloom
