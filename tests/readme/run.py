@@ -43,6 +43,7 @@ RULES = [
     (r"--spp \d+", "--spp 1", "one sample per pixel"),
     (r"^(?!.*--(?:spp|time|pyramid|help)\b)((?:.*[( ])?(?:\S+/)?lightloom (?:render|submit)\b)", r"\1 --spp 1",
      "also where the scene asks for more"),
+    (r"(lightloom reference\b.*)--time 0\.5\b", r"\1--spp 20", "as many samples as a cross-check needs at least"),
     (r"--seeds \d+", "--seeds 1", "one run of each algorithm"),
     (r"(?<=--resolution )320x180\b", "80x45", "a smaller picture"),
     (r"(?<=--resolution )160x90\b", "32x18", "a smaller picture"),
