@@ -1,4 +1,5 @@
-// Every scene of the shared collection loads, with nothing said that would change its picture.
+// Every scene of the shared collection, and every own scene in which an algorithm fails, loads with nothing said that would
+// change its picture.
 
 #include <gtest/gtest.h>
 
@@ -19,24 +20,28 @@ struct Expected {
     size_t least_triangles;
 };
 
+void loads_without_a_warning(const fs::path& path, size_t least_triangles) {
+    const Result<ImportedScene> scene = import_pbrt(path.string());
+    ASSERT_TRUE(scene.ok()) << scene.status().message();
+    const SceneDescription& d = scene->description;
+    for (const std::string& warning : d.warnings) ADD_FAILURE() << warning;
+    size_t triangles = 0;
+    for (const TriangleMesh& mesh : d.meshes) triangles += mesh.indices.size() / 3;
+    EXPECT_GE(triangles + d.spheres.size(), least_triangles);
+    EXPECT_FALSE(d.emissions.empty() && d.infinite_lights.empty() && d.point_lights.empty());
+    EXPECT_EQ(scene->files.front(), path.filename().string());
+    ::testing::Test::RecordProperty("triangles", std::to_string(triangles));
+}
+
 class SharedScene : public ::testing::TestWithParam<Expected> {};
 
 TEST_P(SharedScene, LoadsWithoutAWarning) {
     const fs::path path = kScenes / GetParam().path;
     if (!fs::exists(path)) GTEST_SKIP() << "the shared scene " << GetParam().path << " is not on this machine";
     const auto begin = std::chrono::steady_clock::now();
-    const Result<ImportedScene> scene = import_pbrt(path.string());
+    loads_without_a_warning(path, GetParam().least_triangles);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    ASSERT_TRUE(scene.ok()) << scene.status().message();
-    const SceneDescription& d = scene->description;
-    for (const std::string& warning : d.warnings) ADD_FAILURE() << warning;
-    size_t triangles = 0;
-    for (const TriangleMesh& mesh : d.meshes) triangles += mesh.indices.size() / 3;
-    EXPECT_GE(triangles + d.spheres.size(), GetParam().least_triangles);
-    EXPECT_FALSE(d.emissions.empty() && d.infinite_lights.empty() && d.point_lights.empty());
-    EXPECT_EQ(scene->files.front(), path.filename().string());
     RecordProperty("seconds", std::to_string(seconds));
-    RecordProperty("triangles", std::to_string(triangles));
 }
 
 INSTANTIATE_TEST_SUITE_P(All, SharedScene,
@@ -58,6 +63,13 @@ INSTANTIATE_TEST_SUITE_P(All, SharedScene,
                                  if (!isalnum(static_cast<unsigned char>(c))) c = '_';
                              return name;
                          });
+
+TEST(OwnScene, LoadsWithoutAWarning) {
+    for (const char* name : {"ceiling-lamp", "corridor", "glossy-lamps", "one-lamp", "paperweight", "pool", "slit"}) {
+        SCOPED_TRACE(name);
+        loads_without_a_warning(fs::path(LIGHTLOOM_SOURCE_DIR) / "tests/scenes" / (std::string(name) + ".pbrt"), 400);
+    }
+}
 
 }  // namespace
 }  // namespace lightloom
