@@ -138,11 +138,17 @@ class Scene:
         self.add(f'Shape "loopsubdiv" "integer levels" {levels} "integer indices" [ {" ".join(map(str, indices))} ]'
                  f' "point3 P" [ {numbers([c for p in points for c in p])} ]')
 
-    def column(self, material, centre, radius, height):
-        """An upright cylinder on `centre` with a lid."""
-        self.add(f'AttributeBegin\n  Translate {numbers(centre)} Rotate -90 1 0 0\n  NamedMaterial "{material}"\n'
-                 f'  Shape "cylinder" "float radius" {radius:g} "float zmin" 0 "float zmax" {height:g}\n'
-                 f'  Shape "disk" "float radius" {radius:g} "float height" {height:g}\nAttributeEnd')
+    def column(self, material, centre, radius, height, sides=12):
+        """An upright prism on `centre` with a lid and no bottom."""
+        points = [(centre[0], centre[1] + height, centre[2])]
+        for i in range(2 * sides):
+            angle = 2 * math.pi * (i // 2) / sides
+            points.append((centre[0] + radius * math.cos(angle), centre[1] + height * (i % 2), centre[2] + radius * math.sin(angle)))
+        indices = []
+        for i in range(sides):
+            low, next_low = 1 + 2 * i, 1 + 2 * ((i + 1) % sides)
+            indices += [low, low + 1, next_low + 1, low, next_low + 1, next_low, 0, next_low + 1, low + 1]
+        self.mesh(material, points, indices)
 
 
 def scaled(profile, factor):
@@ -222,9 +228,9 @@ some seventy comes through the gap, so `bdpt` and the caches of light vertices m
 
 def glossy_lamps():
     scene = Scene("glossy-lamps", """
-Garlands of 144 small coloured lamps over rough metal. A point of the metal mirrors a handful of them, next event estimation aims
-at any: `path` and `bdpt` waste nearly every shadow ray, and a bounce seldom hits so small a lamp. `light` cannot
-aim at the metal's lobe at all. What helps is to learn which lamps matter to which part of the metal.""",
+Garlands of 144 small coloured lamps over rough metal. A point of the metal mirrors a handful of them: next event estimation aims
+at any, and a bounce along the metal's lobe seldom hits so small a lamp. `light` cannot aim at the lobe either: what it sees of
+the metal is rare and bright. No technique here knows lobe and lamps at once, so light sub-paths, cached or learned, gain nothing.""",
                   (0, 0.62, -2.3), (0, 0.36, 0.5), 40, 6)
     scene.matt("black", 0, 0, 0)
     scene.matt("wall", 0.12, 0.1, 0.14)
@@ -254,9 +260,10 @@ aim at the metal's lobe at all. What helps is to learn which lamps matter to whi
 
 def ceiling_lamp():
     scene = Scene("ceiling-lamp", """
-A lamp hangs a hand's breadth under the ceiling and shines at it (as in the boxes of Grittmann et al. 2021). All light comes from a
-spot of the ceiling not much wider than the lamp. `path` has to hit that spot by chance; and where a camera sub-path does, next event
-estimation is very strong and very noisy, for the distance to the lamp is so small.""",
+A lamp hangs a hand's breadth under the ceiling and shines at it (as in the boxes of Grittmann et al. 2021). All light comes from
+a spot of the ceiling not much wider than the lamp. `path` has to hit that spot by chance, and where it does, the lamp is so near
+that next event estimation gives spikes. Two vertices of a light sub-path are all that it takes: `bdpt` has them for nothing,
+learning cannot gain, and weights that trust caches less (`correlation-aware`) hand part of the image back to the spikes.""",
                   (0.1, 1.35, -2.6), (-0.1, 1.22, 2), 50, 8)
     scene.matt("black", 0, 0, 0)
     scene.matt("ceiling", 0.82, 0.8, 0.76)
@@ -296,7 +303,7 @@ estimation is very strong and very noisy, for the distance to the lamp is so sma
     scene.box("sofa", (0.9, 0.12, 1.7), (1.1, 0.6, 2.5))
     scene.box("cushion", (-0.85, 0.42, 2.05), (-0.45, 0.78, 2.2), 12)
     scene.box("teal", (0.4, 0.42, 2.05), (0.75, 0.74, 2.2), -14)
-    scene.column("white", (0, 0.36, 0.85), 0.42, 0.03)
+    scene.column("white", (0, 0.36, 0.85), 0.42, 0.03, 36)
     scene.column("brass", (0, 0.015, 0.85), 0.03, 0.345)
     scene.column("brass", (0, 0.015, 0.85), 0.2, 0.015)
     scene.turned("white", (-0.12, 0.39, 0.9), scaled(VASE, 0.6))
@@ -387,7 +394,7 @@ def one_lamp():
     scene = Scene("one-lamp", """
 A larder by candle light, and 200 brighter lamps behind its wall. Who chooses lights by power sends one shadow ray in some
 hundreds to the flame: `path` and `bdpt` waste the others, and nearly all light sub-paths start next door. A bounce finds the
-flame, which is small, no better. Only what has learned which light matters to which point aims well.""",
+flame, which is small, no better. `spcbpt` learns which light matters to which point, and still waits for sub-paths from the flame.""",
                   (0.05, 0.42, -1.4), (0.02, 0.2, 0.2), 34, 7)
     scene.matt("black", 0, 0, 0)
     scene.matt("wall", 0.62, 0.5, 0.4)
@@ -412,7 +419,7 @@ flame, which is small, no better. Only what has learned which light matters to w
     # The candle.
     c = (-0.16, 0, 0.12)
     scene.turned("pewter", c, [(0, 0), (0.09, 0), (0.1, 0.015), (0.03, 0.03), (0.02, 0.06), (0.035, 0.09), (0.036, 0.1), (0, 0.1)])
-    scene.column("wax", (c[0], 0.1, c[2]), 0.02, 0.13)
+    scene.column("wax", (c[0], 0.1, c[2]), 0.02, 0.13, 9)
     scene.lamp((c[0], 0.257, c[2]), 0.012, 1500, 900, 380)
     # What there is to eat.
     scene.turned("jug", (-0.46, 0, 0.3), scaled(VASE, 1.25))
@@ -420,11 +427,11 @@ flame, which is small, no better. Only what has learned which light matters to w
     scene.turned("pewter", (0.28, 0.006, 0.02), PLATE)
     scene.sphere("apple", (0.22, 0.062, 0.02), 0.05)
     scene.sphere("apple", (0.33, 0.06, 0.06), 0.048)
-    scene.turned("pear", (0.29, 0.014, -0.06), [(0, 0), (0.035, 0.005), (0.045, 0.04), (0.025, 0.085), (0.012, 0.105), (0, 0.11)])
+    scene.turned("pear", (0.29, 0.014, -0.06), [(0, 0), (0.035, 0.005), (0.045, 0.04), (0.025, 0.085), (0.012, 0.105), (0, 0.11)], 6)
     scene.mesh("cheese", [(-0.36, 0, -0.18), (-0.12, 0, -0.2), (-0.24, 0, -0.06), (-0.36, 0.08, -0.18), (-0.12, 0.08, -0.2),
                           (-0.24, 0.08, -0.06)], [0, 1, 2, 3, 5, 4, 0, 3, 4, 0, 4, 1, 1, 4, 5, 1, 5, 2, 2, 5, 3, 2, 3, 0])
     scene.turned("copper", (0.62, 0, 0.45), [(0, 0), (0.13, 0), (0.145, 0.2), (0.14, 0.2), (0.12, 0.02), (0, 0.01)])
-    scene.turned("bread", (0.02, 0, 0.5), [(0, 0), (0.14, 0), (0.17, 0.05), (0.12, 0.12), (0, 0.14)])
+    scene.turned("bread", (0.02, 0, 0.5), [(0, 0), (0.14, 0), (0.17, 0.05), (0.12, 0.12), (0, 0.14)], 6)
     scene.box("table", (-1.1, 0.62, 0.72), (1.1, 0.65, 0.9))
     for i, px in enumerate((-0.62, -0.34, 0.28, 0.6)):
         scene.turned(("copper", "jug", "pear", "pewter")[i], (px, 0.65, 0.8), scaled(POT, 0.7), 6)

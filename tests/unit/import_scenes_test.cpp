@@ -28,7 +28,7 @@ void loads_without_a_warning(const fs::path& path, size_t least_triangles) {
     size_t triangles = 0;
     for (const TriangleMesh& mesh : d.meshes) triangles += mesh.indices.size() / 3;
     EXPECT_GE(triangles + d.spheres.size(), least_triangles);
-    EXPECT_FALSE(d.emissions.empty() && d.infinite_lights.empty() && d.point_lights.empty());
+    EXPECT_FALSE(d.emissions.empty() && d.infinite_lights.empty() && d.point_lights.empty() && d.spot_lights.empty());
     EXPECT_EQ(scene->files.front(), path.filename().string());
     ::testing::Test::RecordProperty("triangles", std::to_string(triangles));
 }
