@@ -263,7 +263,7 @@ def ceiling_lamp():
 A lamp hangs a hand's breadth under the ceiling and shines at it (as in the boxes of Grittmann et al. 2021). All light comes from
 a spot of the ceiling not much wider than the lamp. `path` has to hit that spot by chance, and where it does, the lamp is so near
 that next event estimation gives spikes. Two vertices of a light sub-path are all that it takes: `bdpt` has them for nothing,
-learning cannot gain, and weights that trust caches less (`correlation-aware`) hand part of the image back to the spikes.""",
+and learning cannot gain.""",
                   (0.1, 1.35, -2.6), (-0.1, 1.22, 2), 50, 8)
     scene.matt("black", 0, 0, 0)
     scene.matt("ceiling", 0.82, 0.8, 0.76)
