@@ -38,7 +38,9 @@ std::string note(const JobInfo& job) {
 constexpr double kGoneSeconds = 3600;
 
 std::string work_text(const WorkerStatus& worker) {
-    if (!worker.in_work) return worker.state == WorkerState::kBusy ? "fetches or builds a scene" : "-";
+    // A heartbeat that came between two units names none; before the first unit, the worker fetches and builds the scene.
+    if (!worker.in_work && worker.state == WorkerState::kBusy) return worker.units_merged > 0 ? "between units" : "reads a scene";
+    if (!worker.in_work) return "-";
     return worker.in_work->job_id + " unit " + unit_name(worker.in_work->key);
 }
 

@@ -30,10 +30,9 @@ void add_table_cache_options(cli::App command, TableCacheOptions& options) {
     command
         .add_option("--table-cache", options.directory,
                     "Directory in which learned tables are kept for the next render, or off; it holds nothing else, no "
-                    "scene files and no images")
+                    "scene files and no images (default: lightloom/tables in $XDG_CACHE_HOME or ~/.cache)")
         ->type_name("DIR")
-        ->envname("LIGHTLOOM_TABLE_CACHE")
-        ->capture_default_str();
+        ->envname("LIGHTLOOM_TABLE_CACHE");
     add_size_option(command, options);
 }
 
@@ -43,9 +42,11 @@ void add_measured_table_cache_options(cli::App command, TableCacheOptions& optio
         .add_option("--table-cache", options.directory,
                     "Directory of learned tables, as of `lightloom render`, or off: then every run makes its tables anew, and "
                     "its preparation is measured")
+        ->type_name("DIR")
         ->capture_default_str();
     add_size_option(command, options);
 }
+
 Result<Preparation> cached_preparation(const Scene& scene, const JobSpec& spec, const TableCacheOptions& options, bool quiet,
                                        std::stop_token stop) {
     const LearningInfo* learning = spec.algorithm.info().learning;

@@ -3,7 +3,14 @@
 # are installed, so they cannot be of an older build.
 include(GNUInstallDirs)
 install(TARGETS lightloom lightloom-server lightloom-worker RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(FILES README.md LICENSE deploy/copyright DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES LICENSE deploy/copyright DESTINATION ${CMAKE_INSTALL_DOCDIR})
+# As in the tree, so that their links lead somewhere.
+foreach(document README.md client/README.md server/README.md deploy/README.md common/README.md common/path/README.md
+        common/import/README.md common/metrics/README.md tests/README.md tests/bench/README.md tests/scenes/README.md
+        tests/scenes/pictures/four-algorithms.png)
+    cmake_path(GET document PARENT_PATH folder)
+    install(FILES ${document} DESTINATION ${CMAKE_INSTALL_DOCDIR}/${folder})
+endforeach()
 install(FILES tests/scenes/quickstart.pbrt DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples)
 install(FILES deploy/systemd/lightloom-server.service deploy/systemd/lightloom-worker.service
         DESTINATION lib/systemd/system)
@@ -52,6 +59,7 @@ set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXE
     WORLD_EXECUTE)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "bash-completion, man-db")
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${CMAKE_SOURCE_DIR}/deploy/debian/postinst ${CMAKE_SOURCE_DIR}/deploy/debian/prerm)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION TRUE)

@@ -18,17 +18,19 @@ if [ ! -f build/release/build.ninja ]; then
     echo "configuring..."
     cmake --preset release -DLIGHTLOOM_TESTS=OFF -DLIGHTLOOM_UNITY=ON >/dev/null
 fi
-echo "building (the first time takes some minutes)..."
+cd - >/dev/null
+mkdir -p "$output"
+echo "building (the first time takes some minutes; CMAKE_BUILD_PARALLEL_LEVEL limits the number of compilers)..."
+build=(cmake --build "$root/build/release" --target lightloom lightloom-server lightloom-worker)
+# On a terminal one sees how far it is.
+if [ -t 1 ]; then "${build[@]}" 2>&1 | tee "$output/build.log"; else "${build[@]}" >"$output/build.log" 2>&1; fi || {
+    grep -E 'error|FAILED' "$output/build.log" | head -n 20 >&2 || true
+    echo "quickstart: the build failed; all that the compilers said is in $output/build.log" >&2
+    exit 1
+}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-if ! cmake --build --preset release --target lightloom lightloom-server lightloom-worker >"$work/build.log" 2>&1; then
-    grep -E 'error|FAILED' "$work/build.log" | head -n 20 >&2 || true
-    echo "quickstart: the build failed; see: cmake --build --preset release" >&2
-    exit 1
-fi
-cd - >/dev/null
 
-mkdir -p "$output"
 started=()
 stop_all() {
     local pid

@@ -26,7 +26,9 @@ std::string new_id(const char* prefix) {
 }
 
 Status no_job(const std::string& id) {
-    return not_found("no job " + id + "; `lightloom list` shows those that exist (the oldest that ended are forgotten)");
+    return not_found("no job has the id '" + id +
+                     "'; a name is only a label: `lightloom list` shows the ids of those that exist (the oldest that ended are "
+                     "forgotten)");
 }
 
 }  // namespace

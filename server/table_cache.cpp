@@ -24,7 +24,7 @@ constexpr const char* kTemporary = ".tables.tmp-";
 /// JSON has finite numbers only, and a null in their place would count as damage.
 double finite(double value) { return std::isfinite(value) ? value : 0; }
 
-Json to_json(const TablesInfo& info) {
+Json entry_json(const TablesInfo& info) {
     return {{"light_subspaces", info.light_subspaces},   {"eye_subspaces", info.eye_subspaces},
             {"training_samples", info.training_samples}, {"capped_by_time_limit", info.capped_by_time_limit},
             {"trace_seconds", info.trace_seconds},       {"classifier_seconds", info.classifier_seconds},
@@ -139,7 +139,7 @@ std::optional<TableCache::Entry> TableCache::find(const Digest& key, std::span<c
 void TableCache::store(const Digest& key, std::string_view bytes, const TablesInfo& info) const {
     if (directory_.empty()) return;
     // A note may quote bytes that are not UTF-8, for which dump() would throw by default.
-    std::string rest = key.hex() + "\n" + to_json(info).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+    std::string rest = key.hex() + "\n" + entry_json(info).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
     rest += bytes;
     std::string file = std::string(kMagic) + sha256(rest).hex() + "\n" + rest;
     if (file.size() > max_bytes_) return;

@@ -27,7 +27,7 @@ std::vector<std::string> options_of(const CLI::App& command) {
     return names;
 }
 
-std::vector<std::string> commands_of(const CLI::App& app) {
+std::vector<std::string> command_names_of(const CLI::App& app) {
     std::vector<std::string> names;
     for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) names.push_back(command->get_name());
     return names;
@@ -36,7 +36,7 @@ std::vector<std::string> commands_of(const CLI::App& app) {
 /// The word that stands where a command should, and is none; empty if there is no such word. A word behind an unknown option may
 /// be that option's value.
 std::string unknown_command(const CLI::App& app) {
-    if (!app.get_subcommands().empty() || commands_of(app).empty()) return {};
+    if (!app.get_subcommands().empty() || command_names_of(app).empty()) return {};
     const std::vector<std::string> rest = app.remaining();
     return rest.empty() || is_option(rest.front()) ? std::string() : rest.front();
 }
@@ -52,7 +52,8 @@ std::string mistake_text(const CLI::App& app, const CLI::ParseError& error) {
     const CLI::App& command = used.empty() ? app : *used.back();
     const std::string help = "`" + app.get_name() + (used.empty() ? "" : " " + command.get_name()) + " --help`";
     if (const std::string word = unknown_command(app); !word.empty())
-        return "there is no command '" + word + "'" + did_you_mean_one_of(word, commands_of(app)) + "; " + help + " lists them";
+        return "there is no command '" + word + "'" + did_you_mean_one_of(word, command_names_of(app)) + "; " + help +
+               " lists them";
     // CLI11 names an ExtrasError after the program, so kinds are told by their codes.
     const bool required = error.get_exit_code() == int(CLI::ExitCodes::RequiredError);
     // A word that was left over explains why something else is missing: an option's value may stand where the scene should.
@@ -69,7 +70,7 @@ std::string mistake_text(const CLI::App& app, const CLI::ParseError& error) {
                    " lists them";
         }
         if (!rest.empty()) return "'" + rest.front() + "' was not expected; see " + help;
-        if (used.empty() && !commands_of(app).empty()) return "a command is missing; " + help + " lists them";
+        if (used.empty() && !command_names_of(app).empty()) return "a command is missing; " + help + " lists them";
     }
     return std::string(error.what()) + "; see " + help;
 }
