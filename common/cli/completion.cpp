@@ -2,6 +2,9 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <iterator>
+
+#include "common/cli/log.h"
 
 namespace lightloom {
 namespace {
@@ -163,7 +166,7 @@ std::string zsh_completion(const CLI::App& app, const OptionWords& words) {
 }
 
 void add_completion_option(CLI::App& app, OptionWords words) {
-    words["--log"] = {"trace", "debug", "info", "warn", "error", "off"};
+    words["--log"].assign(std::begin(kLogLevels), std::end(kLogLevels));
     const auto print = [&app, words = std::move(words)](const std::string& shell) {
         if (shell != "bash" && shell != "zsh") throw CLI::ValidationError("--completion", "takes bash or zsh, not " + shell);
         // Like --version: CLI11 prints the text and ends with success.

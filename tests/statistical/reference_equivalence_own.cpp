@@ -6,6 +6,7 @@
 #include "common/transport/bdpt.h"
 #include "common/transport/unit_loop.h"
 #include "tests/statistical/reference_equivalence.h"
+#include "tests/support/hits_only.h"
 
 namespace lightloom::equivalence {
 namespace {
@@ -25,20 +26,9 @@ struct SplattablePaths : BdptSelection {
     OnPath on(const PathView& view) const { return OnPath{BdptSelection::on(view)}; }
 };
 
-/// Whether some vertex scatters and no technique of bdpt but the hit of the emitter (s = 0) can make the path: wherever it is
-/// cut, a Dirac vertex is next to the cut. A lamp seen in a mirror has no scattering vertex and does not count.
-bool by_hits_only(const PathView& view) {
-    bool scatters = false;
-    for (int i = 1; i < view.k; ++i) scatters |= !view.delta[i];
-    if (!scatters) return false;
-    for (int s = 1; s <= view.k; ++s)
-        if (!view.delta[s - 1] && !(s < view.k && view.delta[s])) return false;
-    return true;
-}
-
 /// A walk from the camera that counts those paths alone.
 struct HitsOnly {
-    float weight(const PathView& view, Technique) const { return by_hits_only(view) ? 1 : 0; }
+    float weight(const PathView& view, Technique) const { return testing::by_hits_only(view) ? 1 : 0; }
 
     template <class Contribute>
     void trace(SampleContext& context, Contribute&& contribute) const {

@@ -7,6 +7,7 @@
 
 #include "common/transport/rare_light.h"
 #include "tests/support/estimates.h"
+#include "tests/support/hits_only.h"
 #include "tests/support/small_scenes.h"
 
 namespace lightloom {
@@ -39,16 +40,6 @@ std::shared_ptr<const Scene> pool(Lamp lamp, bool water = true) {
     return b.build();
 }
 
-/// Whether only hitting the emitter makes the path; for `path`, which connects to lights alone, a mirror or glass at x_1 is enough.
-bool by_hits_only(const PathView& view, bool light_alone) {
-    bool scatters = false;
-    for (int i = 1; i < view.k; ++i) scatters |= !view.delta[i];
-    if (!scatters) return false;
-    for (int s = 1; s <= (light_alone ? 1 : view.k); ++s)
-        if (!view.delta[s - 1] && !(s < view.k && view.delta[s])) return false;
-    return true;
-}
-
 struct Moments {
     double mean = 0, square = 0, image = 0;  ///< Luminance per camera sample.
 };
@@ -66,7 +57,7 @@ Moments rendered(const std::shared_ptr<const Scene>& scene, const std::string& a
                 ? 1 / double(settings.algorithm.light_paths_per_iteration(scene->frame().crop.area())) * scene->frame().crop.area()
                 : 1;
         sum.image += value * scale;
-        if (c.found.technique.kind != TechniqueKind::kHit || !by_hits_only(c.view, algorithm == "path")) return;
+        if (c.found.technique.kind != TechniqueKind::kHit || !testing::by_hits_only(c.view, algorithm == "path")) return;
         sum.mean += value, sum.square += value * value;
     };
     EXPECT_TRUE((*renderer)->watch(work, seen, {}).ok());
