@@ -9,8 +9,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "client/bench_log.h"
-#include "client/bench_reference.h"
+#include "client/bench/reference_image.h"
+#include "client/bench/results_file.h"
 #include "common/core/atomic_file.h"
 
 namespace {

@@ -1,6 +1,6 @@
 // The statistics of a cross-check, and renderings that grow by groups.
 
-#include "client/cross_check.h"
+#include "client/bench/cross_check.h"
 
 #include <gtest/gtest.h>
 

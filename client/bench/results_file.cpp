@@ -1,4 +1,4 @@
-#include "client/bench_log.h"
+#include "client/bench/results_file.h"
 
 #include <sys/file.h>
 #include <sys/stat.h>

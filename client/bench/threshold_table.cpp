@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdarg>
 
-#include "client/bench_log.h"
+#include "client/bench/results_file.h"
 
 namespace lightloom::client {
 namespace {

@@ -1,4 +1,4 @@
-#include "client/bench_reference.h"
+#include "client/bench/reference_image.h"
 
 #include <cmath>
 #include <cstdio>

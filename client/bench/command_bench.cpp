@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <memory>
 
-#include "client/bench_log.h"
-#include "client/bench_reference.h"
+#include "client/bench/reference_image.h"
+#include "client/bench/results_file.h"
 #include "client/commands.h"
 #include "client/local_scene.h"
 #include "client/output_files.h"

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "client/bench/cross_check.h"
 #include "client/commands.h"
-#include "client/cross_check.h"
 #include "client/local_scene.h"
 #include "client/progress.h"
 #include "client/run_job.h"

@@ -1,4 +1,4 @@
-#include "client/cross_check.h"
+#include "client/bench/cross_check.h"
 
 #include <algorithm>
 #include <cstdio>

@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "client/error_curve.h"
+#include "client/bench/error_curve.h"
 #include "client/progressive_render.h"
 #include "common/metrics/metrics.h"
 

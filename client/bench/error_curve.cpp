@@ -1,4 +1,4 @@
-#include "client/error_curve.h"
+#include "client/bench/error_curve.h"
 
 #include <algorithm>
 #include <cmath>
