@@ -56,6 +56,8 @@ class ProgressiveRender {
 
     RgbImage image() const { return sums_.complete().develop(); }
     RgbImage variance() const { return sums_.complete().variance(); }
+    /// The image's error as its groups show it; nothing before the second.
+    std::optional<NoiseEstimate> noise() const { return sums_.complete().noise(); }
     /// The last group alone: with the other groups, independent images of the same mean.
     Result<RgbImage> last_group_image() const;
     uint32_t last_group_iterations() const { return last_iterations_; }

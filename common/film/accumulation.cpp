@@ -1,5 +1,6 @@
 #include "common/film/accumulation.h"
 
+#include <algorithm>
 #include <string>
 
 namespace lightloom {
@@ -7,6 +8,8 @@ namespace lightloom {
 namespace {
 
 constexpr double kRange = FixedSums::kRange;
+/// Values that share one brightness in the spread between groups: that of 16 pixels in a row is known sooner than that of one.
+constexpr size_t kSpreadBlock = 3 * 16;
 
 /// Rounds a bound up a little, so that sums of bounds stay bounds.
 double loosened(double bound) { return bound * (1 + 0x1p-40) + 0x1p-44; }
@@ -104,18 +107,29 @@ Status Accumulation::fold(const GroupSum& group, uint32_t iterations) {
     splat_.add(group.splat_);
     const double weight = iterations;
     const double total = double(iterations_) + weight;
-    for (size_t first = 0; first < camera_.size(); first += 3) {
-        FilmResponse::Triple x;
-        for (size_t c = 0; c < 3; ++c)
-            x[c] = pixel_value(group.camera_.value(first + c), expected, group.splat_.value(first + c), group.light_paths_);
-        x = response_.balanced(x);
-        for (size_t c = 0; c < 3; ++c) {
-            const size_t i = first + c;
-            const double delta = x[c] - mean_[i];
-            mean_[i] += delta * (weight / total);
-            moment_[i] += weight * delta * (x[c] - mean_[i]);
+    double relative = 0;
+    for (size_t block = 0; block < camera_.size(); block += kSpreadBlock) {
+        const size_t end = std::min(camera_.size(), block + kSpreadBlock);
+        double level = 0, squares = 0;
+        for (size_t first = block; first < end; first += 3) {
+            FilmResponse::Triple x;
+            for (size_t c = 0; c < 3; ++c)
+                x[c] = pixel_value(group.camera_.value(first + c), expected, group.splat_.value(first + c), group.light_paths_);
+            x = response_.balanced(x);
+            for (size_t c = 0; c < 3; ++c) {
+                const size_t i = first + c;
+                const double delta = x[c] - mean_[i];
+                level += mean_[i];
+                mean_[i] += delta * (weight / total);
+                const double square = weight * delta * (x[c] - mean_[i]);
+                moment_[i] += square;
+                squares += square;
+            }
         }
+        level /= double(end - block);
+        relative += squares / (level * level + epsilon());
     }
+    if (group_count_ > 0) spread_.add(relative / double(camera_.size()));
     for (size_t p = 0; p < camera_count_.size(); ++p) camera_count_[p] += group.camera_count_[p];
     camera_bound_ += group.camera_bound_;
     splat_bound_ += group.splat_bound_;
@@ -137,6 +151,14 @@ RgbImage Accumulation::variance() const {
     RgbImage image{frame_.crop.width(), frame_.crop.height(), std::vector<float>(camera_.size())};
     variance(0, camera_count_.size(), image.pixels.data());
     return image;
+}
+
+std::optional<NoiseEstimate> Accumulation::noise() const {
+    if (group_count_ < 2) return std::nullopt;
+    const double factor = 1 / (double(group_count_ - 1) * double(iterations_));
+    const double relmse =
+        relative_variance(mean_.data(), moment_.data(), frame_.crop.width(), frame_.crop.height(), factor, epsilon());
+    return NoiseEstimate{relmse, relmse * spread_.relative_error()};
 }
 
 void Accumulation::develop(size_t first, size_t count, float* values) const {

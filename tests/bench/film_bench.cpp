@@ -83,6 +83,7 @@ int main() {
     const double image_bytes = 512.0 * 512 * 12;
     report("Accumulation::fold", image_bytes, [&] { require(total.fold(group, 1)); });
     report("Accumulation::develop", image_bytes, [&] { total.develop(); });
+    report("Accumulation::noise", image_bytes, [&] { total.noise(); });
     ExrImage image;
     image.frame = frame;
     image.color = total.develop();

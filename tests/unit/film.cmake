@@ -1,4 +1,5 @@
 lightloom_test(film_test LINK lt_film)
+lightloom_test(noise_estimate_test LINK lt_film)
 lightloom_test(partial_exr_test LINK lt_film)
 lightloom_test(splats_only_test LINK lt_film)
 lightloom_test(image_io_test LINK lt_png)

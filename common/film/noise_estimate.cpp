@@ -1,0 +1,84 @@
+#include "common/film/noise_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace lightloom {
+namespace {
+
+constexpr int kRadius = 2;  // of the filter's window
+constexpr int kChannels = 3;
+
+/// Sums over the rows of a window, one per column and channel.
+struct ColumnSums {
+    std::vector<double> value, square, variance;
+    explicit ColumnSums(size_t values) : value(values), square(values), variance(values) {}
+
+    void clear() {
+        for (std::vector<double>* sums : {&value, &square, &variance}) std::fill(sums->begin(), sums->end(), 0.0);
+    }
+    void add(const double* mean, const double* moment, double factor) {
+        for (size_t i = 0; i < value.size(); ++i) {
+            value[i] += mean[i];
+            square[i] += mean[i] * mean[i];
+            variance[i] += moment[i] * factor;
+        }
+    }
+};
+
+}  // namespace
+
+void GroupSpread::add(double value) {
+    ++count_;
+    const double delta = value - mean_;
+    mean_ += delta / count_;
+    moment_ += delta * (value - mean_);
+}
+
+double GroupSpread::relative_error() const {
+    if (count_ == 0 || !(mean_ > 0)) return 0;
+    // The square of a normal variable has the relative standard deviation sqrt(2).
+    if (count_ + 1 < NoiseEstimate::kLeastGroups) return std::sqrt(2.0 / count_);
+    return std::sqrt(moment_ / (count_ - 1.0) / count_) / mean_;
+}
+
+double relative_variance(const double* mean, const double* moment, int width, int height, double variance_factor, double epsilon) {
+    const size_t row_values = size_t(width) * kChannels;
+    ColumnSums columns(row_values);
+    double total = 0;
+    for (int y = 0; y < height; ++y) {
+        const int top = std::max(0, y - kRadius), bottom = std::min(height - 1, y + kRadius);
+        // Running sums would keep the rounding errors of bright pixels that have left the window.
+        columns.clear();
+        for (int j = top; j <= bottom; ++j)
+            columns.add(mean + size_t(j) * row_values, moment + size_t(j) * row_values, variance_factor);
+        double row_total = 0;
+        for (int x = 0; x < width; ++x) {
+            const int left = std::max(0, x - kRadius), right = std::min(width - 1, x + kRadius);
+            const double count = double(bottom - top + 1) * double(right - left + 1);
+            for (int c = 0; c < kChannels; ++c) {
+                double value = 0, square = 0, variance = 0;
+                for (int i = left; i <= right; ++i) {
+                    const size_t column = size_t(i) * kChannels + size_t(c);
+                    value += columns.value[column];
+                    square += columns.square[column];
+                    variance += columns.variance[column];
+                }
+                const size_t index = size_t(y) * row_values + size_t(x) * kChannels + size_t(c);
+                const double own_variance = moment[index] * variance_factor;
+                const double local = value / count;
+                // The variance between the window's pixels is contrast and noise together.
+                const double spread = count > 1 ? (square - value * local) / (count - 1) : 0;
+                const double contrast = std::max(0.0, spread - variance / count);
+                const double own_share = contrast > 0 ? contrast / (contrast + own_variance) : 0;
+                const double filtered = local + own_share * (mean[index] - local);
+                row_total += own_variance / (filtered * filtered + epsilon);
+            }
+        }
+        total += row_total;
+    }
+    return total / (double(height) * double(row_values));
+}
+
+}  // namespace lightloom
