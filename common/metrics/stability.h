@@ -74,31 +74,35 @@ struct TinyBudget {
 /// Judgement over all runs of one algorithm on one scene with one budget.
 struct Stability {
     int seeds = 0;
-    SeedMean error;               ///< relMSE at the end, the reference's own share subtracted where it is known.
-    double variation = 0;         ///< Standard deviation over the seeds of that error, relative to its mean.
+    SeedMean error;               ///< relMSE at the end, less the reference's own share where that is known.
+    double variation = 0;         ///< Standard deviation over the seeds of relMSE at the end, relative to its mean.
     double spread = 1;            ///< Largest over smallest relMSE at the end; infinite where the smallest is 0.
     uint64_t worst_seed = 0;      ///< The one of the largest.
-    double worst_seed_share = 0;  ///< Its part of the sum of the errors.
-    double concentration = 0;     ///< Median over the seeds: part of the relMSE at the end in the terms that relmse_trimmed drops.
+    double worst_seed_share = 0;  ///< Its part of the sum of relMSE over the seeds.
+    /// Median over the seeds: part of relMSE at the end that lies in the terms that relmse_trimmed drops.
+    double concentration = 0;
     std::optional<SeedMean> slope;  ///< Of log RMSE over log iterations: -1/2 where the variance is finite.
     double rising = 0;              ///< Share of the steps between checkpoints at which the error rises.
     SeedMean firefly_count, firefly_energy;
-    std::vector<RatioInterval> regions;  ///< Image over reference, simultaneous at the level: the whole, then the regions.
-    size_t worst_region = 0;             ///< Of `regions`: the one whose interval lies farthest from 1, in units of its width.
+    /// Image over reference, simultaneous at the level: the whole, then the regions. The upper ends allow for outliers that have
+    /// not landed yet.
+    std::vector<RatioInterval> regions;
+    size_t worst_region = 0;           ///< Of `regions`: the one whose ratio is farthest from 1 in units of its interval's width.
+    std::optional<double> bias_bound;  ///< Largest relative bias of the whole image that its interval holds.
     TinyBudget tiny;
 
     // The findings, each of which has its clause in the verdict.
-    bool judged = false;                ///< Bias was judged: two seeds, and a reference whose variance is known.
-    bool finds_nothing = false;         ///< Less than half of the light, with certainty.
-    bool biased = false;                ///< A region's mean is wrong, and chance does not explain it.
-    bool misses_light = false;          ///< Too dark, but what is missing may be found by rare hits: chance, not proved bias.
-    bool heavy_tail = false;            ///< The error falls more slowly than n^-1/2, or one seed has most of it.
-    bool stalls = false;                ///< The error falls more slowly than n^-1/2, and no outliers explain it.
-    bool has_fireflies = false;         ///< They have at least 1 % of the light, or most of the error.
-    bool no_better_than_black = false;  ///< relMSE is at least 1, which is what a black image has at most.
+    bool judged = false;         ///< The interval of the whole image is narrow enough to say something: bias_bound is at most 1/2.
+    bool finds_nothing = false;  ///< Less than half of the light.
+    bool biased = false;         ///< A mean is wrong, and chance does not explain it.
+    bool misses_light = false;   ///< Too dark, but so much light is never found or only by rare hits: chance, or known in advance.
+    bool heavy_tail = false;     ///< Outliers: the error falls more slowly than n^-1/2, or differs far between seeds.
+    bool stalls = false;         ///< The error falls more slowly than n^-1/2, for no reason that is known.
+    bool has_fireflies = false;  ///< They have at least 1 % of the light, or are there and most of the error lies in few pixels.
+    bool no_better_than_black = false;  ///< relMSE is at least 1, which a black image stays below.
 
     bool sound() const;  ///< Judged and without any finding.
-    /// Machine-readable names of the findings: "biased", "misses-light", ...; "not-judged" where bias was not judged.
+    /// Names of the findings for programs, as "biased" or "misses-light"; "not-judged" where `judged` is false.
     std::vector<std::string> flags() const;
     /// In plain words: clauses separated by "; ", the worst one first.
     std::string verdict;

@@ -4,6 +4,7 @@ lightloom_test(partial_exr_test LINK lt_film)
 lightloom_test(splats_only_test LINK lt_film)
 lightloom_test(image_io_test LINK lt_png)
 lightloom_test(metrics_test LINK lt_metrics)
+lightloom_test(stability_test LINK lt_metrics)
 lightloom_test(flip_reference_test LINK lt_metrics)
 
 find_package(nlohmann_json REQUIRED)
