@@ -25,6 +25,7 @@ Result<BuiltJob> build_job(const JobOptions& options, uint32_t threads, const Sc
     if (!scene.ok()) return scene.status();
     built.scene = std::move(scene).value();
     built.spec.frame = built.scene->frame();
+    built.files = std::move(job->scene);
     return built;
 }
 

@@ -27,7 +27,8 @@ struct BuiltJob {
     /// Of this process as long as the object lives. Declared first, so that it outlives the scene.
     std::unique_ptr<const tbb::global_control> thread_limit;
     std::shared_ptr<const Scene> scene;
-    JobSpec spec;  ///< With the frame, and with the scene's depth where the options leave it open.
+    JobSpec spec;      ///< With the frame, and with the scene's depth where the options leave it open.
+    LocalScene files;  ///< Of the scene, for those who send it; its description has become the scene.
     FilmResponse response;
 };
 Result<BuiltJob> build_job(const JobOptions& options, uint32_t threads, const SceneCheck& check = {});

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "client/bench/cross_check.h"
+#include "client/bench/reference_maker.h"
 #include "client/commands.h"
 #include "client/local_scene.h"
 #include "client/progress.h"
@@ -15,8 +15,6 @@
 #include "client/table_options.h"
 #include "common/cli/numbers.h"
 #include "common/core/atomic_file.h"
-#include "common/work/identity.h"
-#include "server/results.h"
 
 namespace lightloom::client {
 namespace {
@@ -38,49 +36,6 @@ struct ReferenceOptions {
     uint32_t threads = 0;
     TableCacheOptions cache;
 };
-
-/// Renders until the options' bound, collecting the means of groups.
-Result<RegionMeans> render(ProgressiveRender& render, const JobSpec& spec, bool quiet) {
-    RegionMeans means(kCheckColumns, kCheckRows);
-    const uint64_t limit = spec.samples_per_pixel > 0 ? spec.samples_per_pixel : std::numeric_limits<uint64_t>::max();
-    double next_report = 10;
-    while (render.iterations() < limit && (spec.time_limit_seconds <= 0 || render.seconds() < spec.time_limit_seconds)) {
-        LL_RETURN_IF_ERROR(render.advance(limit, interrupt_token()));
-        const auto image = render.last_group_image();
-        if (!image.ok()) return image.status();
-        means.add(*image, render.last_group_iterations());
-        if (quiet || render.seconds() < next_report) continue;
-        const Estimate mean = means.estimates().front();
-        std::fprintf(stderr, "%llu spp in %s, mean luminance %.6g +- %.2g %%\n",
-                     static_cast<unsigned long long>(render.iterations()), duration_text(render.seconds()).c_str(), mean.mean,
-                     100 * mean.standard_error() / mean.mean);
-        next_report *= 2;
-    }
-    return means;
-}
-
-nlohmann::ordered_json describe(const ReferenceOptions& options, const JobSpec& spec, const ProgressiveRender& render,
-                                const Estimate& mean, const std::string& exr) {
-    const UnitCounters& counters = render.counters();
-    nlohmann::ordered_json json = {{"format", "lightloom-reference 1"},
-                                   {"sha256", sha256(exr).hex()},
-                                   {"scene", options.job.scene},
-                                   {"scene_digest", spec.scene_root.hex()}};
-    json.update(settings_json(spec));
-    json.update(nlohmann::ordered_json{{"width", spec.frame.width},
-                                       {"height", spec.frame.height},
-                                       {"samples_per_pixel", render.iterations()},
-                                       {"groups", render.groups()},
-                                       {"seconds", render.seconds()},
-                                       {"preparation_seconds", render.preparation_seconds()},
-                                       {"threads", options.threads},
-                                       {"rays", counters.rays},
-                                       {"dropped_samples", render.dropped()},
-                                       {"mean_y", mean.mean},
-                                       {"mean_y_se", mean.standard_error()},
-                                       {"build", kBuildId}});
-    return json;
-}
 
 int reference(ReferenceOptions& options) {
     (void)interrupt_token();
@@ -116,50 +71,38 @@ int reference(ReferenceOptions& options) {
         job.max_depth = of.max_depth;
         return cached_preparation(*scene, job, options.cache, options.job.quiet, interrupt_token());
     };
-    const auto preparation = tables(settings);
-    if (!preparation.ok()) return report_error(preparation.status());
-    if (!preparation->note.empty()) std::fprintf(stderr, "lightloom: warning: %s\n", preparation->note.c_str());
-    auto progressive = ProgressiveRender::start(scene, settings, *preparation);
-    if (!progressive.ok()) return report_error(progressive.status());
-    const auto means = render(*progressive, spec, options.job.quiet);
-    if (!means.ok()) return report_error(means.status());
-    const std::vector<Estimate> made = means->estimates();
-    const auto exr =
-        encode_image(spec, {progressive->image(), progressive->variance(), progressive->iterations(), progressive->groups()}, {});
-    if (!exr.ok()) return report_error(exr.status());
+    auto made = make_reference(scene, spec, options.job.scene, options.threads, tables, options.job.quiet, interrupt_token());
+    if (!made.ok()) return report_error(made.status());
+    if (!made->note.empty()) std::fprintf(stderr, "lightloom: warning: %s\n", made->note.c_str());
+    const ProgressiveRender& render = made->render;
     const std::filesystem::path output = output_path(options.job);
-    std::filesystem::path json_path = output;
-    json_path.replace_extension(".json");
-    nlohmann::ordered_json json = describe(options, spec, *progressive, made.front(), *exr);
-    if (spec.algorithm.info().learning) json["tables"] = preparation->cached ? "cached" : "made";
-    // Both files before the cross-check: what took hours is safe whatever comes.
-    Status status = write_file_atomically(output.string(), *exr);
-    if (status.ok()) status = write_file_atomically(json_path.string(), json.dump(1) + "\n");
-    if (!status.ok()) return report_error(status);
+    // Before the cross-check: what took hours is safe whatever comes.
+    if (Status s = write_reference(*made, output.string()); !s.ok()) return report_error(s);
     if (!options.job.quiet) {
         std::printf("%s  %s  %llu spp in %s  mean luminance %.6g +- %.2g\n", output.string().c_str(), spec.algorithm.name().c_str(),
-                    static_cast<unsigned long long>(progressive->iterations()), duration_text(progressive->seconds()).c_str(),
-                    made.front().mean, made.front().standard_error());
+                    static_cast<unsigned long long>(render.iterations()), duration_text(render.seconds()).c_str(),
+                    made->regions.front().mean, made->regions.front().standard_error());
         std::fflush(stdout);
     }
-    if (progressive->dropped() > 0) {
+    if (render.dropped() > 0) {
         std::fprintf(stderr, "lightloom: warning: %llu non-finite sample(s) were dropped\n",
-                     static_cast<unsigned long long>(progressive->dropped()));
+                     static_cast<unsigned long long>(render.dropped()));
     }
     if (!checker_choice) return kSuccess;
-    if (progressive->groups() < kLeastGroups) {
-        return report_error(failed_precondition(output.string() + " consists of " + std::to_string(progressive->groups()) +
+    if (render.groups() < kLeastGroups) {
+        return report_error(failed_precondition(output.string() + " consists of " + std::to_string(render.groups()) +
                                                 " groups of iterations; a cross-check needs " + std::to_string(kLeastGroups) +
                                                 " to know its error: render longer"));
     }
 
     const RenderSettings checker{checker_choice->settings, spec.seed + 1, spec.max_depth};
-    const auto check = cross_check(scene, settings, made, checker, options.cross_time, tables, interrupt_token());
+    const auto check = cross_check(scene, settings, made->regions, checker, options.cross_time, tables, interrupt_token());
     if (!check.ok()) return report_error(check.status());
+    nlohmann::ordered_json& json = made->description;
     json["cross_check"] = {
         {"algorithm", checker.algorithm.name()}, {"parameters", checker.algorithm.named_text()}, {"seed", checker.seed}};
     json["cross_check"].update(check->json());
-    if (Status s = write_file_atomically(json_path.string(), json.dump(1) + "\n"); !s.ok()) return report_error(s);
+    if (Status s = write_file_atomically(description_path(output.string()), json.dump(1) + "\n"); !s.ok()) return report_error(s);
     std::printf("cross-check by %s, %llu spp\n%s", checker_choice->label.c_str(),
                 static_cast<unsigned long long>(check->iterations), check->table().c_str());
     if (check->verdict() != Verdict::kDiffer) return kSuccess;

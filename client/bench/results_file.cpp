@@ -9,16 +9,16 @@
 #include <cstdio>
 #include <filesystem>
 #include <system_error>
+#include <vector>
 
 #include "common/core/atomic_file.h"
-#include "common/core/digest.h"
 
 namespace lightloom::client {
 namespace {
 
 /// Whether a line of a benchmark begins like this, however little of it was written.
 bool begins_a_line(std::string_view text) {
-    constexpr std::string_view kBegin = "{\"run\":\"";
+    constexpr std::string_view kBegin = "{\"type\":\"";
     const size_t common = std::min(text.size(), kBegin.size());
     return text.substr(0, common) == kBegin.substr(0, common);
 }
@@ -32,82 +32,55 @@ bool has_no_locks(int error) { return error == ENOSYS || error == EOPNOTSUPP || 
 
 }  // namespace
 
-Json BenchRun::json() const {
-    return {{"scene_digest", scene_digest},
-            {"reference_digest", reference_digest},
-            {"algorithm", algorithm.settings.name()},
-            {"parameters", algorithm.settings.named_text()},
-            {"width", width},
-            {"height", height},
-            {"max_depth", max_depth},
-            {"seed", seed},
-            {"threads", threads},
-            {"time_limit", time_limit},
-            {"iteration_limit", iteration_limit},
-            {"threshold_percent", threshold},
-            {"stop_after", stop_after},
-            {"build", build}};
-}
-
-std::string BenchRun::key() const { return sha256(json().dump()).hex().substr(0, 16); }
-
-Json checkpoint_line(Json run_line, const ProgressiveRender& render, const Metrics& metrics) {
-    const UnitCounters& counters = render.counters();
-    run_line["iterations"] = render.iterations();
-    run_line["groups"] = render.groups();
-    run_line["seconds"] = render.seconds();
-    run_line["cpu_seconds"] = render.cpu_seconds();
-    run_line["preparation_seconds"] = render.preparation_seconds();
-    run_line["mape_percent"] = metrics.mape;
-    run_line["mape_unclamped_percent"] = metrics.mape_unclamped;
-    run_line["relmse"] = metrics.relmse;
-    run_line["relmse_trimmed"] = metrics.relmse_trimmed;
-    run_line["trim_percent"] = metrics.trim_percent;
-    run_line["mean_ratio"] = metrics.mean_ratio;
-    run_line["camera_samples"] = counters.camera_samples;
-    run_line["light_paths"] = counters.light_paths;
-    run_line["rays"] = counters.rays;
-    run_line["vertices"] = counters.vertices;
-    run_line["connections"] = counters.connections;
-    run_line["dropped_samples"] = render.dropped();
-    return run_line;
-}
-
-Json done_line(Json end, std::span<const CurvePoint> curve, double threshold) {
-    end["done"] = true;
-    const auto crossing = find_crossing(curve, threshold);
-    const bool capped = !crossing || crossing->kind == Crossing::Kind::kExtrapolated;
-    end["capped"] = capped;
-    if (!crossing) return end;
-    Json where{{"iterations", crossing->iterations}, {"seconds", crossing->seconds}};
-    if (crossing->kind == Crossing::Kind::kAtMost) where["at_most"] = true;
-    if (crossing->lower_bound) where["lower_bound"] = true;
-    end[capped ? "extrapolated" : "reached"] = std::move(where);
-    return end;
-}
-
-Result<BenchHistory> parse_history(std::string_view text, const std::string& file_name, const std::set<std::string>& keys) {
+Result<BenchHistory> parse_history(std::string_view text, const std::string& file_name,
+                                   const std::function<bool(const Json&)>& again) {
+    struct Line {
+        std::string run;  ///< Key; empty for a line that belongs to none.
+        std::string_view text;
+    };
     BenchHistory history;
-    std::vector<std::pair<std::string, std::string_view>> lines;  // Key of the run and text.
+    std::vector<Line> lines;
     for (size_t begin = 0, number = 1; begin < text.size(); ++number) {
         const size_t newline = text.find('\n', begin);
         const bool whole = newline != std::string_view::npos;
         const std::string_view line = text.substr(begin, whole ? newline - begin : std::string_view::npos);
         begin += line.size() + (whole ? 1 : 0);
         if (line.empty()) continue;
+        const auto bad = [&](const char* what) {
+            return invalid_argument(file_name + ":" + std::to_string(number) + ": " + what +
+                                    "; repair the file or give another name");
+        };
         Json json = Json::parse(line, nullptr, false);
-        const auto run = json.is_object() ? json.find("run") : json.end();
-        if (!json.is_object() || run == json.end() || !run->is_string()) {
-            if (!whole && json.is_discarded() && begins_a_line(line)) break;  // what a killed benchmark was writing
-            return invalid_argument(file_name + ":" + std::to_string(number) +
-                                    ": not a line of a benchmark; repair the file or give another name");
+        if (!json.is_object() || !json.contains("type") || !json["type"].is_string()) {
+            if (!whole && json.is_discarded() && begins_a_line(line)) {  // what a killed benchmark was writing
+                history.torn = true;
+                break;
+            }
+            return bad("not a line of a benchmark");
         }
-        const std::string key = *run;
-        lines.emplace_back(key, line);
-        if (const auto done = json.find("done"); done != json.end() && *done == true) history.done[key] = std::move(json);
+        const std::string type = json["type"];
+        const auto text_of = [&](const char* key) {
+            const auto value = json.find(key);
+            return value != json.end() && value->is_string() ? value->get<std::string>() : std::string();
+        };
+        if (const auto spent = json.find("suite_seconds"); spent != json.end() && spent->is_number())
+            history.suite_seconds = std::max(history.suite_seconds, spent->get<double>());
+        if (type == "start") {
+            if (text_of("format") != kResultsFormat) return bad("written by another version of lightloom");
+            history.started = true;
+            history.suite = text_of("suite");
+        }
+        if (type == "techniques") history.shares.insert(text_of("scene") + "\n" + text_of("label"));
+        std::string key;
+        if (type == "run" || type == "checkpoint") {
+            key = text_of("run");
+            if (key.empty()) return bad("a run without a name");
+            if (type == "run" && !(again && again(json))) history.done[key] = std::move(json);
+        }
+        lines.push_back({std::move(key), line});
     }
     for (const auto& [key, line] : lines) {
-        if (!keys.contains(key) || history.done.contains(key)) history.kept.append(line) += '\n';
+        if (key.empty() || history.done.contains(key)) history.kept.append(line) += '\n';
     }
     return history;
 }

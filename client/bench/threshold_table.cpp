@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdarg>
 
-#include "client/bench/results_file.h"
+#include "client/bench/suite_table.h"
 
 namespace lightloom::client {
 namespace {
@@ -55,7 +55,7 @@ double median(std::vector<Finish> runs, Field field) {
 
 }  // namespace
 
-std::string bench_table(const std::vector<std::string>& algorithms, const std::vector<Json>& done, double threshold) {
+std::string threshold_table(const std::vector<std::string>& algorithms, const std::vector<Json>& done, double threshold) {
     size_t width = 9;
     for (const std::string& name : algorithms) width = std::max(width, name.size());
     std::string table = format("to MAPE %g %%, medians over seeds; ratios: first row / row, above 1 is better\n", threshold);

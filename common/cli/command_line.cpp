@@ -63,6 +63,7 @@ Option Option::group(const std::string& name) const {
     return *this;
 }
 size_t Option::count() const { return option_->count(); }
+std::string Option::name() const { return option_->get_name(); }
 
 App App::add_subcommand(const std::string& name, const std::string& description) const {
     return *app_->add_subcommand(name, description);

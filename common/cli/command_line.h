@@ -44,6 +44,7 @@ class Option {
     Option envname(const std::string& name) const;
     Option group(const std::string& name) const;  ///< "": help does not show it.
     size_t count() const;                         ///< How often it was given.
+    std::string name() const;                     ///< "--budget", for messages.
 
   private:
     CLI::Option* option_;

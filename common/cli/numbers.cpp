@@ -34,6 +34,23 @@ cli::Check whole_number_between(uint64_t low, uint64_t high) {
             range};
 }
 
+double duration_seconds(const std::string& text) {
+    double value = NAN;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const std::string unit(end, text.data() + text.size());
+    if (error != std::errc()) return NAN;
+    if (unit.empty() || unit == "s") return value;
+    return unit == "m" ? 60 * value : unit == "h" ? 3600 * value : NAN;
+}
+
+cli::Check duration_between(double low, double high) {
+    return {[low, high](const std::string& text) {
+                const double seconds = duration_seconds(text);
+                return seconds >= low && seconds <= high ? std::string() : "\"" + text + "\" is no time such as 90s, 40m or 1.5h";
+            },
+            "such as 90s, 40m or 1.5h"};
+}
+
 cli::Check whole_number() { return {whole_number_between(0, UINT64_MAX).find_fault, ""}; }
 
 }  // namespace lightloom

@@ -4,6 +4,7 @@
 // saturate.
 
 #include <cstdint>
+#include <string>
 
 #include "common/cli/command_line.h"
 
@@ -13,6 +14,10 @@ namespace lightloom {
 cli::Check number_between(double low, double high);
 /// A whole number of [low, high] in decimal, without sign or leading zeros.
 cli::Check whole_number_between(uint64_t low, uint64_t high);
+/// A time of [low, high] seconds: a number with s, m or h behind it, or nothing for seconds.
+cli::Check duration_between(double low, double high);
+/// Its seconds; NaN for anything else.
+double duration_seconds(const std::string& text);
 /// Any seed.
 cli::Check whole_number();
 

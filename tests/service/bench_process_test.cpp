@@ -93,28 +93,36 @@ TEST_F(Bench, RunsAreLoggedAndResumed) {
     EXPECT_NE(output().find("warning"), std::string::npos) << "the reference is bdpt's: " << output();
     const std::vector<Json> first = lines("runs.jsonl");
     std::map<std::string, std::vector<Json>> runs;
-    for (const Json& line : first) runs[line["run"]].push_back(line);
+    for (const Json& line : first) {
+        if (line.contains("run")) runs[line["run"]].push_back(line);
+    }
+    EXPECT_EQ(first[0]["type"], "start");
+    EXPECT_EQ(first[0]["format"], "lightloom-bench 2");
+    EXPECT_EQ(first[1]["type"], "scene");
+    EXPECT_EQ(first[1]["reference_regions"].size(), 10u);
+    EXPECT_GT(first[1]["reference_regions"][0]["variance"].get<double>(), 0);
     ASSERT_EQ(runs.size(), 4u);
     for (const auto& [key, run] : runs) {
         ASSERT_GE(run.size(), 3u);
         for (size_t i = 0; i + 1 < run.size(); ++i) {
-            EXPECT_FALSE(run[i].contains("done"));
+            EXPECT_EQ(run[i]["type"], "checkpoint");
             EXPECT_EQ(run[i]["width"], 32);
             EXPECT_EQ(run[i]["scene_digest"].get<std::string>().size(), 64u);
             EXPECT_GT(run[i]["rays"].get<uint64_t>(), 0u);
             if (i == 0) continue;
             EXPECT_GT(run[i]["seconds"].get<double>(), run[i - 1]["seconds"].get<double>());
         }
-        EXPECT_TRUE(run.back()["done"].get<bool>());
+        EXPECT_EQ(run.back()["type"], "run");
+        EXPECT_EQ(run.back()["region_means"].size(), 10u);
         EXPECT_TRUE(run.back().contains("reached") || run.back()["capped"].get<bool>());
         EXPECT_EQ(run.back()["iterations"], run[run.size() - 2]["iterations"]);
     }
-    // Interleaved: the first run had not ended when the last one began.
-    size_t first_done = 0;
-    while (!first[first_done].contains("done")) ++first_done;
+    // Interleaved: the first run had not ended when the last one of the same seed began.
     std::set<std::string> begun;
-    for (size_t i = 0; i < first_done; ++i) begun.insert(first[i]["run"]);
-    EXPECT_EQ(begun.size(), 4u);
+    for (size_t i = 0; first[i]["type"] != "run"; ++i) {
+        if (first[i]["type"] == "checkpoint") begun.insert(first[i]["run"]);
+    }
+    EXPECT_EQ(begun.size(), 2u);
 
     EXPECT_EQ(run(arguments), 2) << "an existing file is not overwritten";
     std::vector<std::string> resume = arguments;
@@ -122,16 +130,17 @@ TEST_F(Bench, RunsAreLoggedAndResumed) {
     const std::string whole = *read_file(path("runs.jsonl"));
     ASSERT_EQ(run(resume), 0) << output();
     EXPECT_EQ(*read_file(path("runs.jsonl")), whole) << "nothing was left to do";
+    EXPECT_TRUE(std::filesystem::exists(path("runs.images/cornell-reference.exr")));
 
     // Killed while it wrote the last line: that run starts again, the others stay.
     const std::string last_run = first.back()["run"];
     std::ofstream(path("runs.jsonl"), std::ios::trunc) << whole.substr(0, whole.size() - 20);
     ASSERT_EQ(run(resume), 0) << output();
-    EXPECT_NE(output().find("3 of 4 runs"), std::string::npos) << output();
+    EXPECT_NE(output().find("3 run(s) are in"), std::string::npos) << output();
     size_t done = 0, checkpoints_of_one = 0;
     for (const Json& line : lines("runs.jsonl")) {
-        done += line.contains("done");
-        checkpoints_of_one += line["run"] == last_run && line["iterations"] == 1 && !line.contains("done");
+        done += line["type"] == "run";
+        checkpoints_of_one += line["type"] == "checkpoint" && line["run"] == last_run && line["iterations"] == 1;
     }
     EXPECT_EQ(done, 4u);
     EXPECT_EQ(checkpoints_of_one, 1u) << "lines of the torn run are gone";
@@ -161,7 +170,7 @@ TEST_F(Bench, TablesOfTheCacheCostWhatMakingThemTook) {
         EXPECT_EQ(run(arguments), 0) << output();
         std::map<std::string, Json> ends;
         for (const Json& line : lines(name))
-            if (line.contains("done")) ends[line["algorithm"].get<std::string>() + std::to_string(line["seed"].get<int>())] = line;
+            if (line["type"] == "run") ends[line["algorithm"].get<std::string>() + std::to_string(line["seed"].get<int>())] = line;
         return ends;
     };
     const auto count = [&] { return std::distance(std::filesystem::directory_iterator(tables), {}); };

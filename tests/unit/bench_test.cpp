@@ -11,6 +11,8 @@
 
 #include "client/bench/reference_image.h"
 #include "client/bench/results_file.h"
+#include "client/bench/run_lines.h"
+#include "client/bench/suite_table.h"
 #include "common/core/atomic_file.h"
 
 namespace {
@@ -120,12 +122,12 @@ BenchRun some_run() {
     BenchRun run;
     run.scene_digest = "s", run.reference_digest = "r", run.algorithm = *parse_algorithm("bdpt:heuristic=power"),
     run.algorithm.label = "", run.build = "b";
-    run.width = 160, run.height = 90, run.max_depth = 10, run.time_limit = 60;
+    run.width = 160, run.height = 90, run.max_depth = 10, run.budget.seconds = 60;
     return run;
 }
 
 TEST(BenchRun, EveryFieldEntersTheKey) {
-    std::vector<BenchRun> runs(15, some_run());
+    std::vector<BenchRun> runs(18, some_run());
     runs[1].scene_digest = "t";
     runs[2].reference_digest = "t";
     runs[3].algorithm.settings = parse_algorithm("path:heuristic=power")->settings;
@@ -135,50 +137,63 @@ TEST(BenchRun, EveryFieldEntersTheKey) {
     runs[7].max_depth = 11;
     runs[8].seed = 1;
     runs[9].threads = 2;
-    runs[10].time_limit = 61;
-    runs[11].iteration_limit = 5;
+    runs[10].budget.seconds = 61;
+    runs[11].budget.samples = 5;
     runs[12].threshold = 10;
     runs[13].stop_after = 0;
     runs[14].build = "c";
+    runs[15].scene = "another name";
+    runs[16].tables = "shared";
+    runs[17].server = "host:1";
     std::set<std::string> keys;
     for (const BenchRun& run : runs) keys.insert(run.key());
     EXPECT_EQ(keys.size(), runs.size());
     EXPECT_EQ(some_run().key(), runs[0].key());
 }
 
+constexpr const char* kStart = "{\"type\":\"start\",\"format\":\"lightloom-bench 2\",\"suite\":\"s\",\"suite_seconds\":3}\n";
+constexpr const char* kEndOfA = "{\"type\":\"run\",\"run\":\"a\",\"iterations\":2,\"suite_seconds\":7}\n";
+
 TEST(BenchHistory, ResumeKeepsFinishedRunsAndForgetsBegunOnes) {
-    const std::string finished = "{\"run\":\"a\",\"iterations\":1}\n{\"run\":\"a\",\"iterations\":2,\"done\":true}\n";
-    const std::string begun = "{\"run\":\"b\",\"iterations\":1}\n";
-    const std::string foreign = "{\"run\":\"z\",\"iterations\":1}\n";
-    const auto history = parse_history(begun + finished + foreign, "f", {"a", "b", "c"});
+    const std::string finished = std::string("{\"type\":\"checkpoint\",\"run\":\"a\",\"iterations\":1}\n") + kEndOfA;
+    const std::string begun = "{\"type\":\"checkpoint\",\"run\":\"b\",\"iterations\":1,\"suite_seconds\":9}\n";
+    const std::string shares = "{\"type\":\"techniques\",\"scene\":\"x\",\"label\":\"bdpt\"}\n";
+    const auto history = parse_history(kStart + begun + finished + shares, "f");
     ASSERT_TRUE(history.ok()) << history.status().message();
-    EXPECT_EQ(history->kept, finished + foreign);
+    EXPECT_EQ(history->kept, kStart + finished + shares);
     ASSERT_EQ(history->done.size(), 1u);
     EXPECT_EQ(history->done.at("a")["iterations"], 2);
+    EXPECT_EQ(history->suite, "s");
+    EXPECT_EQ(history->suite_seconds, 9) << "the begun run took its time, too";
+    EXPECT_EQ(history->shares, std::set<std::string>{"x\nbdpt"});
+    const auto again = parse_history(kStart + finished, "f", [](const Json& run) { return run["iterations"] == 2; });
+    EXPECT_EQ(again->kept, kStart);
 }
 
 TEST(BenchHistory, ATornLastLineIsIgnoredWhereverItIsCut) {
-    const std::string whole = "{\"run\":\"a\",\"iterations\":2,\"done\":true}\n";
-    const std::string last = "{\"run\":\"b\",\"iterations\":7,\"done\":true}\n";
+    const std::string whole = kEndOfA;
+    const std::string last = "{\"type\":\"run\",\"run\":\"b\",\"iterations\":7}\n";
     for (size_t cut = 0; cut + 2 < last.size(); ++cut) {
-        const auto history = parse_history(whole + last.substr(0, cut), "f", {"a", "b"});
+        const auto history = parse_history(whole + last.substr(0, cut), "f");
         ASSERT_TRUE(history.ok()) << cut;
         EXPECT_EQ(history->kept, whole) << cut;
         EXPECT_EQ(history->done.size(), 1u) << cut;
+        EXPECT_EQ(history->torn, cut > 0) << cut;
     }
     // Only the newline is missing: nothing of the line is.
-    EXPECT_EQ(parse_history(whole + last.substr(0, last.size() - 1), "f", {"a", "b"})->kept, whole + last);
+    EXPECT_EQ(parse_history(whole + last.substr(0, last.size() - 1), "f")->kept, whole + last);
 }
 
 TEST(BenchHistory, AFileOfSomethingElseIsLeftAlone) {
     for (const std::string text :
-         {"my only notes\n", "my only notes", "{\"run\":\n", "{}\n", "{\"a\":1}", "{\"a\":1", "{ my notes"})
-        EXPECT_EQ(parse_history(text, "notes", {"a"}).status().code(), StatusCode::kInvalidArgument) << text;
+         {"my only notes\n", "my only notes", "{\"type\":\n", "{}\n", "{\"a\":1}", "{\"a\":1", "{ my notes"})
+        EXPECT_EQ(parse_history(text, "notes").status().code(), StatusCode::kInvalidArgument) << text;
 }
 
 TEST(BenchHistory, DamageElsewhereIsNamed) {
-    for (const std::string damaged : {"{\"run\":\"a\",", "[]", "17", "{\"done\":true}", "{\"run\":3}"}) {
-        const auto history = parse_history("{\"run\":\"a\"}\n" + damaged + "\n{\"run\":\"a\"}\n", "runs.jsonl", {"a"});
+    for (const std::string damaged : {"{\"type\":\"run\",", "[]", "17", "{\"run\":\"a\"}", "{\"type\":\"run\",\"run\":3}",
+                                      "{\"type\":\"start\",\"format\":\"lightloom-bench 9\"}"}) {
+        const auto history = parse_history(kEndOfA + damaged + "\n" + kEndOfA, "runs.jsonl");
         ASSERT_FALSE(history.ok()) << damaged;
         EXPECT_NE(history.status().message().find("runs.jsonl:2"), std::string::npos) << history.status().message();
     }
@@ -189,12 +204,12 @@ TEST(BenchWriter, LinesAreReadBack) {
     {
         auto writer = BenchWriter::open(path, false);
         ASSERT_TRUE(writer.ok()) << writer.status().message();
-        ASSERT_TRUE(writer->append({{"run", "x"}, {"done", true}}).ok());
-        EXPECT_EQ(parse_history(*writer->text(), path, {})->done.size(), 1u);
-        ASSERT_TRUE(writer->replace("{\"run\":\"a\",\"done\":true}\n").ok());
-        ASSERT_TRUE(writer->append({{"run", "b"}, {"done", true}}).ok());
+        ASSERT_TRUE(writer->append({{"type", "run"}, {"run", "x"}}).ok());
+        EXPECT_EQ(parse_history(*writer->text(), path)->done.size(), 1u);
+        ASSERT_TRUE(writer->replace(kEndOfA).ok());
+        ASSERT_TRUE(writer->append({{"type", "run"}, {"run", "b"}}).ok());
     }
-    EXPECT_EQ(parse_history(*read_file(path), path, {})->done.size(), 2u);
+    EXPECT_EQ(parse_history(*read_file(path), path)->done.size(), 2u);
     EXPECT_NE(BenchWriter::open(path, false).status().message().find("--resume"), std::string::npos);
     std::filesystem::remove(path);
     for (const bool resume : {false, true}) EXPECT_FALSE(BenchWriter::open("/no/such/directory/file", resume).ok());
@@ -238,8 +253,8 @@ TEST(BenchWriter, GoesOnUnlockedWhereThereAreNoLocks) {
         EXPECT_EQ(writer.ok(), error != EIO);
         if (writer.ok()) {
             EXPECT_TRUE(writer->replace("").ok());
-            EXPECT_TRUE(writer->append({{"run", "x"}, {"done", true}}).ok());
-            EXPECT_EQ(parse_history(*writer->text(), path, {})->done.size(), 1u);
+            EXPECT_TRUE(writer->append({{"type", "run"}, {"run", "x"}}).ok());
+            EXPECT_EQ(parse_history(*writer->text(), path)->done.size(), 1u);
         }
         const std::string warning = ::testing::internal::GetCapturedStderr();
         EXPECT_EQ(warning.find("cannot be locked") != std::string::npos, error != EIO) << warning;
@@ -250,18 +265,19 @@ TEST(BenchWriter, GoesOnUnlockedWhereThereAreNoLocks) {
 }
 
 Json finished(const std::string& label, double preparation, const std::vector<CurvePoint>& curve) {
-    return done_line({{"label", label},
-                      {"iterations", curve.back().iterations},
-                      {"seconds", curve.back().seconds},
-                      {"preparation_seconds", preparation}},
-                     curve, 12);
+    Json line{{"label", label},
+              {"iterations", curve.back().iterations},
+              {"seconds", curve.back().seconds},
+              {"preparation_seconds", preparation}};
+    add_crossing(line, curve, 12);
+    return line;
 }
 
 TEST(BenchTable, ShowsMediansPreparationAndRatios) {
     std::vector<Json> done;
     for (const double error : {48., 60., 120.}) done.push_back(finished("slow", 0, square_root_law(error, 1)));
     for (const double error : {24., 24., 36.}) done.push_back(finished("fast:m=2", 1, square_root_law(error, 1)));
-    const std::string table = bench_table({"slow", "fast:m=2"}, done, 12);
+    const std::string table = threshold_table({"slow", "fast:m=2"}, done, 12);
     // 25 iterations against 4; 25 s against 4 + 1 s.
     EXPECT_NE(table.find("slow          3      0         25.0      25.00       0.00      25.00        1.00        1.00"),
               std::string::npos)
@@ -274,10 +290,10 @@ TEST(BenchTable, ShowsMediansPreparationAndRatios) {
 
 TEST(BenchTable, MarksPreparationThatWasNotMeasured) {
     std::vector<Json> done{finished("made", 1, square_root_law(24, 1)), finished("found", 1, square_root_law(24, 1))};
-    EXPECT_EQ(bench_table({"made", "found"}, done, 12).find('*'), std::string::npos);
+    EXPECT_EQ(threshold_table({"made", "found"}, done, 12).find('*'), std::string::npos);
     done[0]["tables"] = "made";
     done[1]["tables"] = "cached";
-    const std::string table = bench_table({"made", "found"}, done, 12);
+    const std::string table = threshold_table({"made", "found"}, done, 12);
     EXPECT_NE(table.find("found         1      0          4.0       4.00      *1.00       5.00"), std::string::npos) << table;
     EXPECT_NE(table.find("made          1      0          4.0       4.00       1.00       5.00"), std::string::npos) << table;
     EXPECT_NE(table.find("* as recorded"), std::string::npos) << table;
@@ -289,7 +305,7 @@ TEST(BenchTable, MarksWhatIsExtrapolated) {
     EXPECT_TRUE(done[1]["capped"].get<bool>());
     EXPECT_FALSE(done[1].contains("reached"));
     EXPECT_DOUBLE_EQ(done[1]["extrapolated"]["iterations"].get<double>(), 400);
-    const std::string table = bench_table({"path", "none"}, done, 12);
+    const std::string table = threshold_table({"path", "none"}, done, 12);
     EXPECT_NE(table.find("~400.0"), std::string::npos) << table;
     EXPECT_NE(table.find("> 100 iterations, > 100.00 s"), std::string::npos) << table;
     EXPECT_NE(table.find("~ extrapolated"), std::string::npos) << table;
