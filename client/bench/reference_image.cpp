@@ -124,7 +124,8 @@ std::optional<double> noise_mape(const ExrImage& reference) {
 }
 
 Result<std::vector<std::string>> check_reference(const std::string& name, const ExrImage& reference, const BenchSubject& subject) {
-    LL_RETURN_IF_ERROR(check_comparable({.frame = subject.frame}, reference));
+    if (Status s = check_comparable({.frame = subject.frame}, reference); !s.ok())
+        return Status(s.code(), name + ": " + s.message());
     RgbImage black = reference.color;
     black.pixels.assign(black.pixels.size(), 0.0f);
     const auto dark = compute_pixel_metrics(black, reference.color);
