@@ -1,4 +1,5 @@
 lightloom_test(bench_test LINK lt_client)
+lightloom_test(verdicts_test LINK lt_client)
 lightloom_test(text_table_test LINK lt_client)
 lightloom_test(cross_check_test LINK lt_client)
 lightloom_test(path_report_test LINK lt_client)
