@@ -20,9 +20,9 @@ struct Judged {
     Stability stability;
 };
 
-/// One for each (scene, label, budget) with at least one finished run, in the order of the runs' first lines. Of several lines of a
-/// scene or of a run, the last one holds. Lines of other types and checkpoints of unfinished runs are passed over. kInvalidArgument
-/// names the line, counted from 1, and the field that is missing or of another type.
+/// One for each (scene, label, budget) with at least one finished run, in the order in which their first runs ended. Of several
+/// lines of a scene or of a run, the last one holds. Lines of other types and checkpoints of unfinished runs are passed over.
+/// kInvalidArgument names the line, counted from 1, and the field that is missing or of another type.
 Result<std::vector<Judged>> judge_results(std::span<const Json> lines);
 
 /// A table for a terminal, a row each; the last column is the verdict.

@@ -236,7 +236,7 @@ Result<Stability> judge_stability(std::span<const StabilityRun> runs, const Stab
     const double bound = std::max(1 - whole.low, whole.high - 1);
     if (std::isfinite(bound)) result.bias_bound = bound;
     explain_bias(runs, reference, &result);
-    if (result.biased) result.stalls = false;  // for a known reason
+    if (result.biased || result.misses_light) result.stalls = false;  // for a known reason
     // An excess or a deficit that is proved is known well enough, however wide its interval is.
     result.judged = result.biased || result.misses_light || (result.bias_bound && *result.bias_bound <= kKnownBias);
     result.verdict = verdict_of(result, runs, reference);

@@ -103,15 +103,16 @@ size_t worst_of(const Stability& result, Wanted wanted) {
     return worst;
 }
 
+/// "because 12 % of the light is never found".
 std::string reasons(const Shortfall& s, const Stability& result) {
     std::string text;
-    const auto add = [&](const std::string& reason) { text += (text.empty() ? "" : "; ") + reason; };
+    const auto add = [&](const std::string& reason) { text += (text.empty() ? "because " : " and ") + reason; };
     if (s.unreachable > 0) add(percent(s.unreachable / kRareLightError) + " of the light is never found");
     if (s.chance > 0)
         add(percent(s.chance_share) + " of the light is found by chance hits alone, of which " + number(s.expected_hits) +
             " are expected in all seeds together");
-    if (s.fireflies > 0) add("fireflies have " + percent(result.firefly_energy.mean) + " of the light, and more may be to come");
-    return text;
+    if (!text.empty()) return text;
+    return "perhaps because fireflies, which have " + percent(result.firefly_energy.mean) + " of the light, are still to come";
 }
 
 std::string slope_words(const Stability& result) { return format("error falls as n^%.2f", result.slope->mean); }
@@ -164,8 +165,7 @@ std::string verdict_of(const Stability& result, std::span<const StabilityRun> ru
     }
     if (result.biased) clauses.push_back("biased: " + deviation(worst_of(result, is_bias), result));
     if (result.misses_light)
-        clauses.push_back("misses light: " + deviation(worst_of(result, is_explained), result) +
-                          ", which proves no bias: " + reasons(shortfall, result));
+        clauses.push_back("misses light: " + deviation(worst_of(result, is_explained), result) + ", " + reasons(shortfall, result));
     if (result.heavy_tail) {
         std::string why = "errors of seeds vary by " + percent(result.variation);
         if (result.worst_seed_share > 0.5)

@@ -1,5 +1,6 @@
 lightloom_test(bench_test LINK lt_client)
 lightloom_test(suite_test LINK lt_client)
+lightloom_test(verdicts_test LINK lt_client)
 lightloom_test(text_table_test LINK lt_client)
 lightloom_test(cross_check_test LINK lt_client)
 lightloom_test(path_report_test LINK lt_client)
