@@ -7,7 +7,7 @@
 # BASE and HEAD are revisions of git; HEAD may be "." for the working tree as it is, with what is not committed. FILTER is a regular
 # expression; benchmarks are chosen by a match anywhere in their names (micro --benchmark_list_tests).
 #
-#   --rounds N        rounds of BASE HEAD HEAD BASE: two pairs of runs each (default 6)
+#   --rounds N        rounds of BASE HEAD HEAD BASE, or HEAD BASE BASE HEAD: two pairs of runs each (default 6)
 #   --min-time S      seconds for each benchmark in each run (default 0.05)
 #   --fail-above R    exit with 1 if a benchmark needs more than R times as long (1.05: five percent more), with confidence
 #                     over all the benchmarks together
@@ -142,11 +142,12 @@ measure() { # role, number
         "--benchmark_out=$work/$1-$2.json" --benchmark_out_format=json >"$work/run.log" 2>&1 ||
         fail "${1^^}: micro failed: $(tail -n 1 "$work/run.log")"
 }
-for ((round = 0; round < rounds; ++round)); do
-    echo "compare: round $((round + 1)) of $rounds" >&2
-    measure base $((2 * round))
-    measure head $((2 * round))
-    measure head $((2 * round + 1))
-    measure base $((2 * round + 1))
+# Every second round begins with HEAD, so that neither is always between two runs of the other.
+for ((pair = 0; pair < 2 * rounds; ++pair)); do
+    if ((pair % 2 == 0)); then echo "compare: round $((pair / 2 + 1)) of $rounds" >&2; fi
+    case $((pair % 4)) in
+    0 | 3) measure base $pair && measure head $pair ;;
+    *) measure head $pair && measure base $pair ;;
+    esac
 done
 run python3 "$tools/compare.py" "$work" $((2 * rounds)) ${fail_above:+--fail-above "$fail_above"}
