@@ -2,7 +2,7 @@
 # Installs the packages of a set that this host lacks, from Debian 12. Silent when nothing is missing.
 #
 #   deploy/install-deps.sh render      to build the three programs, and to pack them (deploy/package.sh)
-#   deploy/install-deps.sh [develop]   also the tests, the fuzz targets and the format check
+#   deploy/install-deps.sh [develop]   also the tests, the benchmarks, the fuzz targets and the format check
 set -euo pipefail
 
 packages=(
@@ -13,7 +13,7 @@ packages=(
 )
 case ${1:-develop} in
     render) ;;
-    develop) packages+=(ccache libgtest-dev clang-14 libclang-rt-14-dev clang-format-14 curl) ;;
+    develop) packages+=(ccache libgtest-dev libbenchmark-dev clang-14 libclang-rt-14-dev clang-format-14 curl python3) ;;
     *)
         echo "install-deps: there are the sets render and develop, not $1" >&2
         exit 2
