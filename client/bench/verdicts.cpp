@@ -10,7 +10,7 @@
 namespace lightloom::client {
 namespace {
 
-/// A field that is missing or wrong. Only read_line() throws it, and only judge_results() catches it.
+/// A field that is missing or wrong. Reading a line throws it, and judge_results() alone catches it.
 struct BadField {
     std::string what;
 };
@@ -61,8 +61,13 @@ StabilityReference reference_of(const Json& line) {
 }
 
 StabilityCheckpoint checkpoint_of(const Json& line) {
-    return {number(line, "iterations"), number(line, "relmse"), number(line, "relmse_trimmed"),
-            number_if_there(line, "mean_ratio")};
+    StabilityCheckpoint checkpoint{number(line, "iterations"), number(line, "relmse"), number(line, "relmse_trimmed"), {}};
+    // The ratio to a black reference is infinite, which JSON has no number for.
+    if (const auto ratio = line.find("mean_ratio"); ratio != line.end() && !ratio->is_null()) {
+        const double value = number(line, "mean_ratio");
+        if (std::isfinite(value)) checkpoint.mean_ratio = value;
+    }
+    return checkpoint;
 }
 
 /// All of a run but its checkpoints.

@@ -129,9 +129,14 @@ bool is_above(const SeedMean& mean, double bound, double level) {
 
 /// Interval of a region's ratio. Means of seeds have long upper tails: as long as the outliers have not landed, the mean is too
 /// dark and its variance too small. Its upper end therefore allows for outliers that the runs lack.
-RatioInterval interval_of(const std::vector<double>& means, const Estimate& reference, double level) {
+RatioInterval interval_of(const std::vector<double>& means, Estimate reference, double level) {
     WeightedMean mean;
-    for (const double m : means) mean.add(m, 1);
+    // A variance from few seeds, small by chance, would otherwise borrow the certainty of the reference's.
+    reference.degrees = std::min(reference.degrees, std::max(1.0, double(means.size()) - 1));
+    if (int(means.size()) >= kSeedsForBias)
+        for (const double m : means) mean.add(m, 1);
+    else
+        mean.add(mean_of(means).mean, 1);  // of unknown variance
     RatioInterval interval = ratio_interval(mean.estimate(), reference, level);
     if (reference.mean > 0) {
         const double outlier = *std::max_element(means.begin(), means.end()) - median(means);

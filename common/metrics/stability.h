@@ -112,6 +112,9 @@ struct Stability {
 /// heavy tail.
 inline constexpr double kStabilityLevel = 1e-3;
 
+/// Fewer seeds do not tell their own scatter well enough to convict anything of bias.
+inline constexpr int kSeedsForBias = 5;
+
 /// Judges at least one run; from one run alone nothing follows but its errors. kInvalidArgument names what is wrong: no runs, a run
 /// without checkpoints or with a number that is not finite, iterations that do not ascend, numbers of regions that differ, a seed
 /// that occurs twice.

@@ -118,7 +118,8 @@ std::string reasons(const Shortfall& s, const Stability& result) {
 std::string slope_words(const Stability& result) { return format("error falls as n^%.2f", result.slope->mean); }
 
 std::string not_judged(const Stability& result, const StabilityReference& reference) {
-    if (result.seeds < 2) return "bias not judged: one seed alone";
+    if (result.seeds < kSeedsForBias)
+        return "bias not judged: that takes " + std::to_string(kSeedsForBias) + " seeds, not " + std::to_string(result.seeds);
     if (std::isinf(reference.regions[0].variance)) return "bias not judged: nobody knows the reference's own error";
     if (!result.bias_bound) return "bias not judged: the reference is black";
     return "bias not judged: " + std::to_string(result.seeds) + " seeds tell the mean only within " + percent(*result.bias_bound);

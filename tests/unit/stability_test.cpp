@@ -180,9 +180,13 @@ TEST(Stability, WhatIsNotKnownIsNotJudged) {
     EXPECT_EQ(s.flags(), std::vector<std::string>{"not-judged"});
 
     const Stability one = *judge_stability(std::span(runs).first(1), exact_reference(image));
-    EXPECT_EQ(one.verdict, "bias not judged: one seed alone");
-    const Stability two = *judge_stability(std::span(runs).first(2), exact_reference(image));
-    EXPECT_NE(two.verdict.find("bias not judged: 2 seeds tell the mean only within"), std::string::npos) << two.verdict;
+    EXPECT_EQ(one.verdict, "bias not judged: that takes 5 seeds, not 1");
+    const Stability four = *judge_stability(std::span(runs).first(4), exact_reference(image));
+    EXPECT_NE(four.verdict.find("bias not judged: that takes 5 seeds, not 4"), std::string::npos) << four.verdict;
+    EXPECT_FALSE(four.biased);
+    const auto noisy = testing::synthetic_runs(1, testing::normal_draw(30), image);
+    const Stability vague = *judge_stability(std::span(noisy).first(5), exact_reference(image));
+    EXPECT_NE(vague.verdict.find("bias not judged: 5 seeds tell the mean only within"), std::string::npos) << vague.verdict;
 }
 
 TEST(Stability, BlackScenesAreSound) {

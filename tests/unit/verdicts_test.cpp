@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
 #include <random>
 
@@ -116,11 +118,14 @@ TEST(Verdicts, LightOfChanceAndAReferenceWithoutVariance) {
             if (line["scene"] == "slit")
                 for (Json& region : line["reference_regions"]) region.erase("variance");
         }
+        if (line.contains("mean_ratio")) line["mean_ratio"] = Json(HUGE_VAL);
+        if (line["type"] == "run") line["mean_ratio"] = nullptr;
         if (line["type"] == "run") line["rare_light"] = {{"share", 0.8}, {"unreachable_share", 0.0}, {"expected_hits", 1e-3}};
     }
     const auto judged = judge_results(lines);
     ASSERT_TRUE(judged.ok()) << judged.status().message();
     EXPECT_EQ((*judged)[1].stability.flags(), std::vector<std::string>{"not-judged"});
+    EXPECT_EQ((*judged)[1].stability.tiny.mean_ratio.count, 0);
     EXPECT_TRUE((*judged)[2].stability.misses_light);
     EXPECT_FALSE((*judged)[2].stability.biased);
 }
