@@ -118,7 +118,7 @@ std::string replaced(std::string text, std::string_view from, std::string_view t
     return text;
 }
 
-/// Markers by colours: gnuplot writes "rgb( 10,   0,   1)" and "#FEFEFE".
+/// Markers by colours: gnuplot writes "rgb( 10,   0,   1)", "#FEFEFE" and, of the ground, "#fefefe".
 template <typename Show>
 std::string painted(const std::string& svg, const Show& show) {
     std::string out;
@@ -132,7 +132,7 @@ std::string painted(const std::string& svg, const Show& show) {
         out += colour ? show(*colour) : svg.substr(found, 4);
         at = found + (colour ? size_t(used) : 4);
     }
-    return replaced(std::move(out), "#FEFEFE", show(kColours[0]));
+    return replaced(replaced(std::move(out), "#FEFEFE", show(kColours[0])), "#fefefe", show(kColours[0]));
 }
 
 std::vector<std::string> lines_of(std::string_view text) {

@@ -52,7 +52,7 @@ td b{font-weight:600}
 figure{margin:0;min-width:0}
 .charts svg{display:block;width:100%;height:auto;max-width:560px;background:var(--ground)}
 figcaption{font-size:.85rem;line-height:1.4;padding:.3rem .2rem 0}
-.strip{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(46%,190px),1fr));gap:1rem .8rem}
+.strip{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(46%,215px),1fr));gap:1rem .8rem}
 .strip figure{max-width:400px}
 .strip img{display:block;width:100%;height:auto;background:#000;image-rendering:pixelated}
 .strip img+img{margin-top:3px}

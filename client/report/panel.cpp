@@ -95,7 +95,7 @@ std::vector<std::string> marks_of(const Series& series) {
         marks.push_back("cut to " + formatted("%.3g s", median(std::move(given))) + of_all(cut, runs.size()));
     }
     if (const size_t capped = count([](const Run& run) { return run.capped; }); capped > 0)
-        marks.push_back("capped" + of_all(capped, runs.size()));
+        marks.push_back(formatted("%g %% MAPE not reached", runs.front()->threshold.value_or(0)) + of_all(capped, runs.size()));
     if (series.near_floor) marks.emplace_back("near the reference’s noise");
     if (count([](const Run& run) { return run.cached_tables; }) > 0) marks.emplace_back("tables from a cache");
     double dropped = 0;

@@ -77,7 +77,7 @@ class Fields {
 Budget budget_of(const Json& json, Fields* line) {
     Fields fields(json, "\"budget\"");
     Budget budget{fields.maybe("seconds").value_or(0), fields.maybe("samples").value_or(0)};
-    if ((budget.seconds > 0) == (budget.samples > 0)) fields.refuse("a budget has \"seconds\" or \"samples\"");
+    if (budget.seconds <= 0 && budget.samples <= 0) fields.refuse("a budget has \"seconds\" or \"samples\"");
     if (!fields.fault().empty()) line->refuse(fields.fault());
     return budget;
 }
@@ -145,6 +145,7 @@ Run run_of(Fields& fields) {
     run.label = fields.text("label");
     run.seed = uint64_t(fields.number("seed"));
     run.budget = budget_of(fields.inside("budget", false), &fields);
+    run.threshold = fields.maybe("threshold_percent");
     run.capped = fields.flag("capped");
     run.cached_tables = fields.maybe_text("tables") == "cached";
     run.dropped_samples = fields.maybe("dropped_samples").value_or(0);
@@ -301,8 +302,10 @@ class Reader {
 }  // namespace
 
 std::string Budget::text() const {
-    if (seconds > 0) return shortest(seconds) + " s";
-    return shortest(samples) + (samples == 1 ? " sample per pixel" : " samples per pixel");
+    const std::string time = shortest(seconds) + " s";
+    if (samples <= 0) return time;
+    const std::string count = shortest(samples) + (samples == 1 ? " sample per pixel" : " samples per pixel");
+    return seconds > 0 ? time + " or " + count : count;
 }
 
 const SceneInfo* Results::scene(std::string_view name) const {

@@ -25,12 +25,12 @@ struct Start {
     std::optional<double> budget_seconds;
 };
 
-/// What a run may spend: seconds or samples per pixel; the other is 0.
+/// What a run may spend: seconds, samples per pixel, or both, whichever ends first; 0: no bound.
 struct Budget {
     double seconds = 0, samples = 0;
 
     bool operator==(const Budget&) const = default;
-    std::string text() const;  ///< "20 s", "64 samples per pixel"
+    std::string text() const;  ///< "20 s", "64 samples per pixel", "20 s or 64 samples per pixel"
 };
 
 struct SceneInfo {
@@ -55,8 +55,9 @@ struct Run {
     std::string id, scene, label;
     Budget budget;  ///< As the suite asks for it.
     uint64_t seed = 0;
-    std::vector<Checkpoint> curve;  ///< Ascending in iterations; the last one is the end of the run.
-    bool capped = false;
+    std::vector<Checkpoint> curve;        ///< Ascending in iterations; the last one is the end of the run.
+    std::optional<double> threshold;      ///< MAPE in percent that the run asks for.
+    bool capped = false;                  ///< It ended above the threshold.
     std::optional<double> given_seconds;  ///< Time that a cut left it.
     bool cached_tables = false;
     double dropped_samples = 0;
