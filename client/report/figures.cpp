@@ -54,8 +54,8 @@ Reached reach(std::span<const TimedRun> runs, double error) {
     return out;
 }
 
-void set_interval(SpeedUp* out, double degrees) {
-    const double reach = *out->log_error * student_quantile(kOutside, degrees);
+void set_interval(SpeedUp* out) {
+    const double reach = *out->log_error * student_quantile(kOutside, out->degrees);
     out->low = out->factor * std::exp(-reach);
     out->high = out->factor * std::exp(reach);
 }
@@ -189,26 +189,30 @@ std::optional<SpeedUp> speed_up(std::span<const TimedRun> base, std::span<const 
         return out;
     }
     const auto square_over = [](const LogTime& time) { return time.variance * time.variance / (time.count - 1); };
-    set_interval(&out, variance * variance / (square_over(base_time) + square_over(other_time)));  // Welch
+    out.degrees = variance * variance / (square_over(base_time) + square_over(other_time));  // Welch and Satterthwaite
+    set_interval(&out);
     return out;
 }
 
 std::optional<SpeedUp> geometric_mean(std::span<const SpeedUp> factors) {
     if (factors.empty()) return std::nullopt;
     SpeedUp out;
-    double sum = 0, variance = 0;
+    double sum = 0, variance = 0, squares = 0;
     bool known = true;
     for (const SpeedUp& factor : factors) {
         sum += std::log(factor.factor);
         known &= factor.log_error.has_value();
-        variance += factor.log_error.value_or(0) * factor.log_error.value_or(0);
+        const double own = factor.log_error.value_or(0) * factor.log_error.value_or(0);
+        variance += own;
+        if (own > 0) squares += own * own / factor.degrees;
         out.at_least |= factor.at_least, out.at_most |= factor.at_most, out.extrapolated |= factor.extrapolated;
     }
     const double count = double(factors.size());
     out.factor = std::exp(sum / count);
     if (!known) return out;
     out.log_error = std::sqrt(variance) / count;
-    set_interval(&out, std::numeric_limits<double>::infinity());
+    out.degrees = squares > 0 ? variance * variance / squares : std::numeric_limits<double>::infinity();
+    set_interval(&out);
     return out;
 }
 

@@ -53,6 +53,7 @@ struct TimedRun {
 struct SpeedUp {
     double factor = 1;                ///< Time of the base over time of the other, geometric means over the seeds.
     std::optional<double> log_error;  ///< Standard error of the factor's logarithm: a jackknife over the seeds.
+    double degrees = 0;               ///< Degrees of freedom of that error.
     std::optional<double> low, high;  ///< 95 % interval by Student's t on the logarithm.
     bool at_least = false;            ///< A run lay at the error from its first point on.
     bool at_most = false;             ///< The same of the base; or a run's error does not fall as n^-1/2 yet.

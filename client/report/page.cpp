@@ -42,6 +42,7 @@ td b{font-weight:600}
 .up{background:rgb(var(--faster)/var(--a))}
 .down{background:rgb(var(--slower)/var(--a))}
 .key{font-size:.9em}
+.verdicts .t{white-space:nowrap}
 .group th{padding-top:1.1rem;font-weight:600;white-space:normal;border-bottom-color:var(--axis)}
 .group small{font-weight:400;white-space:normal;margin-left:.5em}
 .words{min-width:19rem;max-width:34rem}
@@ -107,7 +108,7 @@ it is beaten by another at every time.</dd>
 <dt>Speed-up</dt><dd>How many times sooner an algorithm comes to the error with which the first one ends, as the ratio of
 the geometric means over the seeds. Interval: 95 %, Student’s t on the logarithm with a jackknife over the seeds.
 ≥: its first checkpoint was better already. ≤: its error does not fall as n<sup>−1/2</sup> yet. ~: extrapolated by that law to more
-than twice the run. In the summary the tint is left out where the interval holds 1; the interval of a geometric mean says what the seeds leave
+than twice the run. ?: bounds of both kinds. In the summary the tint is left out where the interval holds 1; the interval of a geometric mean says what the seeds leave
 open, not what other scenes would give.</dd>
 <dt>Estimated error</dt><dd>What a run says of its own relMSE, from its independent groups and without a reference. “Within 1.5×” counts
 checkpoints of the last three octaves of samples, all seeds, away from the reference’s noise.</dd>

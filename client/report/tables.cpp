@@ -31,9 +31,15 @@ std::string percent(double share) {
     return formatted(share < 0.0995 ? "%.1f %%" : "%.0f %%", 100 * share);
 }
 
+std::string factor_text(double factor) {
+    if (factor < 0.001) return "&lt; 0.001";
+    if (factor >= 1000) return "&gt; 1000";
+    return formatted(factor < 99.5 ? "%.2g" : "%.0f", factor);
+}
+
 std::string interval_html(const SpeedUp& speed_up) {
     if (!speed_up.low) return "";
-    return "<small>" + formatted("%.2g", *speed_up.low) + " – " + formatted("%.2g", *speed_up.high) + "</small>";
+    return "<small>" + factor_text(*speed_up.low) + " – " + factor_text(*speed_up.high) + "</small>";
 }
 
 /// A cell tinted by how much faster or slower.
@@ -46,18 +52,24 @@ std::string factor_cell(const SpeedUp& speed_up, const std::string& below) {
            "</b>" + (below.empty() ? "" : "<br>") + below + "</td>";
 }
 
+constexpr double kShown = 1e-3;  ///< Seconds of preparation that are worth a column.
+
 struct Chip {
-    const char *kind, *symbol;
-    std::string word;
+    const char *kind, *symbol, *word;
+    bool needs_notice = true;  ///< Also in the summary.
 };
 
-Chip chip_of(const Stability& stability) {
-    std::string word = stability.sound() ? "sound" : joined(stability.flags(), ", ");
-    std::replace(word.begin(), word.end(), '-', ' ');
-    if (stability.sound()) return {"good", "✓", word};
-    if (stability.biased || stability.finds_nothing || stability.no_better_than_black) return {"bad", "✗", word};
-    if (stability.misses_light || stability.heavy_tail || stability.stalls || stability.has_fireflies) return {"warn", "▲", word};
-    return {"none", "–", word.empty() ? "not judged" : word};
+/// The gravest finding; the verdict's words have them all.
+Chip chip_of(const Stability& s) {
+    if (s.biased) return {"bad", "✗", "biased"};
+    if (s.finds_nothing) return {"bad", "✗", "finds almost nothing"};
+    if (s.no_better_than_black) return {"bad", "✗", "no better than black"};
+    if (s.heavy_tail) return {"warn", "▲", "heavy tail"};
+    if (s.misses_light) return {"warn", "▲", "misses light"};
+    if (s.stalls) return {"warn", "▲", "stalls"};
+    if (s.has_fireflies) return {"warn", "▲", "fireflies"};
+    if (!s.judged) return {"none", "–", "not judged", false};
+    return {"good", "✓", "sound", false};
 }
 
 std::string chip_html(const Stability& stability) {
@@ -92,8 +104,8 @@ std::string region_html(const Stability& stability) {
     const auto change = [](double ratio) {
         return std::isfinite(ratio) ? std::string(ratio >= 1 ? "+" : "−") + formatted("%.2g %%", 100 * std::fabs(ratio - 1)) : "?";
     };
-    return escaped_html(region_name(stability.worst_region, stability.regions.size())) + " " + change(interval.ratio) +
-           "<br><small>" + change(interval.low) + " … " + change(interval.high) + "</small>";
+    return escaped_html(region_name(stability.worst_region, stability.regions.size())) + "<br>" + change(interval.ratio) +
+           " <small>" + change(interval.low) + " … " + change(interval.high) + "</small>";
 }
 
 std::string verdict_row(const Report& report, const Judged& judged) {
@@ -149,7 +161,7 @@ std::string summary_table(const Report& report) {
                 continue;
             }
             std::string below = "<small>" + number_html(series->error) + "</small>";
-            if (const Judged* judged = judged_of(report, panel, series->label); judged && !judged->stability.sound()) {
+            if (const Judged* judged = judged_of(report, panel, series->label); judged && chip_of(judged->stability).needs_notice) {
                 const Chip chip = chip_of(judged->stability);
                 below += " <span class=\"mark " + std::string(chip.kind) + "\" title=\"" + escaped_html(chip.word) + "\">" +
                          chip.symbol + "</span>";
@@ -173,7 +185,7 @@ std::string summary_table(const Report& report) {
 std::string scene_table(const Report& report, const Panel& panel) {
     bool prepared = false, tracked = false, judged_any = false, marked = false;
     for (const Series& series : panel.series) {
-        prepared |= series.preparation > 0;
+        prepared |= series.preparation >= kShown;
         tracked |= series.tracking.checkpoints > 0;
         judged_any |= judged_of(report, panel, series.label) != nullptr;
         marked |= !series.marks.empty();
@@ -195,7 +207,7 @@ std::string scene_table(const Report& report, const Panel& panel) {
                          ? " <small>± " + number_html(std::stod(formatted("%.2g", *series.error_uncertainty))) + "</small>"
                          : ""));
         out += cell(seconds_text(series.seconds));
-        if (prepared) out += cell(series.preparation > 0 ? seconds_text(series.preparation) : "–");
+        if (prepared) out += cell(series.preparation >= kShown ? seconds_text(series.preparation) : "–");
         out += cell(number_html(std::round(series.samples)));
         out += series.speed_up ? factor_cell(*series.speed_up, "") + cell(interval_html(*series.speed_up)) : cell("–") + cell("");
         if (tracked) {
