@@ -115,7 +115,10 @@ int run(ReportOptions options) {
     Result<std::vector<Drawn>> drawn = draw(*results, comparison, &files);
     if (!drawn.ok()) return refuse(drawn.status());
     Result<std::vector<Judged>> judged = judge_results(results->lines);
-    if (!judged.ok()) return refuse(judged.status());
+    if (!judged.ok()) {
+        const std::string source = options.results.size() == 1 ? options.results.front() : "the files together";
+        return refuse(invalid_argument(source + ": " + judged.status().message()));
+    }
     const Report report{*results, comparison, *std::move(drawn), *std::move(judged), options.results};
     if (const Status s = write_all(options, report_page(report), files); !s.ok()) return refuse(s);
     for (const std::string& note : results->notes) std::fprintf(stderr, "lightloom: note: %s\n", note.c_str());

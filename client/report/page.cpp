@@ -70,6 +70,7 @@ dl{display:block}dt{margin-top:.6rem}
 .charts{gap:1rem}
 }
 @media print{
+:root{--page:#fff}
 @page{size:A4 portrait;margin:12mm}
 body{max-width:none;padding:0;font-size:9.5pt;print-color-adjust:exact;-webkit-print-color-adjust:exact}
 h1{font-size:17pt}h2{font-size:13pt}

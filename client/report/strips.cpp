@@ -69,7 +69,11 @@ Strip make_strip(const Panel& panel) {
     Strip strip;
     RgbImage reference;
     bool known = false;
-    const auto note = [&](const Status& status) { strip.notes.push_back("a picture is left out: " + status.message()); };
+    int left_out = 0;
+    std::string why;
+    const auto note = [&](const Status& status) {
+        if (++left_out == 1) why = status.message();
+    };
     if (!panel.scene->reference_image.empty()) {
         Result<RgbImage> image = read(panel.scene->reference_image);
         if (image.ok()) {
@@ -88,6 +92,10 @@ Strip make_strip(const Panel& panel) {
         if (!run) continue;
         const Status added = add(series, *run, *panel.scene, known ? &reference : nullptr, &strip);
         if (!added.ok()) note(added);
+    }
+    if (left_out > 0) {
+        const std::string count = left_out == 1 ? "a picture is" : std::to_string(left_out) + " pictures are";
+        strip.notes.push_back(panel.title + ": " + count + " left out: " + why + (left_out > 1 ? "; and so on" : ""));
     }
     return strip;
 }
