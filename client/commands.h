@@ -24,5 +24,6 @@ void add_algorithms_command(cli::App app, int* exit_code);
 void add_replay_command(cli::App app, int* exit_code);
 void add_bench_command(cli::App app, int* exit_code);
 void add_reference_command(cli::App app, int* exit_code);
+void add_report_command(cli::App app, int* exit_code);
 
 }  // namespace lightloom::client

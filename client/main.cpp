@@ -53,6 +53,7 @@ int main(int argc, char** argv) {
     add_replay_command(app, &exit_code);
     add_bench_command(app, &exit_code);
     add_reference_command(app, &exit_code);
+    add_report_command(app, &exit_code);
     app.footer(kFooter);  // now, so that commands without one of their own do not show it
     // Before the command and behind it.
     lightloom::add_log_option(app, level);

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "client/output_files.h"
+#include "client/thumbnail.h"
 #include "common/core/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "common/film/png.h"
@@ -16,8 +17,6 @@ namespace fs = std::filesystem;
 
 constexpr size_t kSums = 6;
 constexpr int kThumbnailWidth = 480;
-/// Mean luminance that pictures are brightened to, by whole stops.
-constexpr double kShownMean = 0.25;
 constexpr const char *kPage = "index.html", *kDescription = "pyramid.json", *kImage = "image";
 
 bool finite(const Rgb& c) { return std::isfinite(c.r) && std::isfinite(c.g) && std::isfinite(c.b); }
@@ -25,37 +24,6 @@ bool finite(const Rgb& c) { return std::isfinite(c.r) && std::isfinite(c.g) && s
 double luminance(const FilmResponse::Triple& rgb) { return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; }
 double luminance(const RgbImage& image, size_t pixel) {
     return luminance({double(image.pixels[3 * pixel]), double(image.pixels[3 * pixel + 1]), double(image.pixels[3 * pixel + 2])});
-}
-
-double mean_luminance(const RgbImage& image) {
-    double sum = 0;
-    const size_t pixels = image.pixels.size() / 3;
-    for (size_t i = 0; i < pixels; ++i) sum += luminance(image, i);
-    return sum / double(pixels);
-}
-
-int stops_for(double mean) { return mean > 0 ? std::clamp(int(std::lround(std::log2(kShownMean / mean))), -10, 20) : 0; }
-
-/// At most kThumbnailWidth wide. Every pixel is a mean over a block, so that the few bright pixels of a sparse picture stay.
-RgbImage thumbnail(const RgbImage& image) {
-    const int side = (image.width + kThumbnailWidth - 1) / kThumbnailWidth;
-    if (side <= 1) return image;
-    RgbImage small{std::max(1, image.width / side), std::max(1, image.height / side), {}};
-    small.pixels.resize(size_t(3) * size_t(small.width) * size_t(small.height));
-    const int rows = std::min(side, image.height);
-    for (int y = 0; y < small.height; ++y) {
-        for (int x = 0; x < small.width; ++x) {
-            for (int c = 0; c < 3; ++c) {
-                double sum = 0;
-                for (int j = 0; j < rows; ++j)
-                    for (int i = 0; i < side; ++i)
-                        sum += double(
-                            image.pixels[3 * (size_t(y * side + j) * size_t(image.width) + size_t(x * side + i)) + size_t(c)]);
-                small.pixels[3 * (size_t(y) * size_t(small.width) + size_t(x)) + size_t(c)] = float(sum / (rows * side));
-            }
-        }
-    }
-    return small;
 }
 
 /// Whether write_pyramid() may have made the file.
@@ -259,7 +227,7 @@ Status write_pyramid(const std::string& directory, const Pyramid& pyramid, const
     const auto write = [&](const std::string& name, const RgbImage& picture, int stops) -> Status {
         LL_RETURN_IF_ERROR(
             write_exr((path / (name + ".exr")).string(), {.frame = frame, .color = picture, .layers = {}, .attributes = {}}));
-        return write_png((path / (name + ".png")).string(), thumbnail(picture), stops);
+        return write_png((path / (name + ".png")).string(), thumbnail(picture, kThumbnailWidth), stops);
     };
     LL_RETURN_IF_ERROR(write(kImage, image, page.stops));
     auto key = keys.begin();

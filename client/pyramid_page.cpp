@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "client/html.h"
+
 namespace lightloom::client {
 namespace {
 
@@ -63,20 +65,6 @@ constexpr const char* kScript = R"(
 for(const button of document.querySelectorAll('.switch button'))button.onclick=()=>{
 document.body.classList.toggle('unweighted',button.value==='unweighted');
 for(const other of document.querySelectorAll('.switch button'))other.setAttribute('aria-pressed',other===button)})";
-
-std::string escaped(const std::string& text) {
-    std::string out;
-    for (const char c : text) {
-        switch (c) {
-            case '&': out += "&amp;"; break;
-            case '<': out += "&lt;"; break;
-            case '>': out += "&gt;"; break;
-            case '"': out += "&quot;"; break;
-            default: out += c;
-        }
-    }
-    return out;
-}
 
 std::string formatted(const char* format, double value) {
     char text[64];
@@ -167,15 +155,16 @@ std::string pyramid_html(const PyramidPage& page) {
     size_t columns = 1;
     for (const PyramidRow& row : page.rows)
         for (const PyramidPicture& p : row.pictures) columns = std::max(columns, size_t(p.s) + 1);
-    const std::string title = escaped(page.scene) + ", " + escaped(page.algorithm) + ", by technique";
+    const std::string title = escaped_html(page.scene) + ", " + escaped_html(page.algorithm) + ", by technique";
     std::string out = "<!doctype html>\n<html lang=en><head><meta charset=utf-8>";
     out += "<meta name=viewport content=\"width=device-width,initial-scale=1\">\n<title>" + title + "</title>\n<style>";
     out += kStyle;
     out += "\n</style></head>\n<body>\n<header><div><h1>" + title + "</h1>\n<p class=facts>";
     out += std::to_string(page.samples_per_pixel) + (page.samples_per_pixel == 1 ? " sample" : " samples") + " per pixel, ";
     out += std::to_string(page.width) + " × " + std::to_string(page.height) + ", paths of at most ";
-    out += std::to_string(page.max_depth + 1) + " edges, seed " + std::to_string(page.seed) + ", lightloom " + escaped(page.build);
-    for (const auto& [key, value] : page.parameters) out += ", " + escaped(key) + "=" + escaped(value);
+    out += std::to_string(page.max_depth + 1) + " edges, seed " + std::to_string(page.seed) + ", lightloom " +
+           escaped_html(page.build);
+    for (const auto& [key, value] : page.parameters) out += ", " + escaped_html(key) + "=" + escaped_html(value);
     out += "</p>\n";
     out += kSwitch;
     out += kLegend;

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Installs the packages of a set that this host lacks, from Debian 12. Silent when nothing is missing.
 #
-#   deploy/install-deps.sh render      to build the three programs, and to pack them (deploy/package.sh)
+#   deploy/install-deps.sh render      to build the three programs, to pack them (deploy/package.sh), and for charts
 #   deploy/install-deps.sh [develop]   also the tests, the benchmarks, the fuzz targets and the format check
 set -euo pipefail
 
 packages=(
-    build-essential cmake ninja-build pkg-config help2man
+    build-essential cmake ninja-build pkg-config help2man gnuplot-nox
     libembree-dev libopenexr-dev libtbb-dev libpng-dev zlib1g-dev libstb-dev
     libgrpc++-dev protobuf-compiler protobuf-compiler-grpc libprotobuf-dev libssl-dev
     libspdlog-dev nlohmann-json3-dev libcli11-dev libboost-dev

@@ -64,11 +64,15 @@ Status write_png(const std::string& path, const RgbImage& image, double exposure
     return write_file_atomically(path, *bytes);
 }
 
-Status write_png8(const std::string& path, int width, int height, const std::vector<uint8_t>& rgb) {
+Result<std::string> encode_png8(int width, int height, const std::vector<uint8_t>& rgb) {
     if (width < 1 || height < 1 || rgb.size() != size_t(width) * size_t(height) * 3) {
-        return invalid_argument(path + ": the image is empty or its size does not fit its pixels");
+        return invalid_argument("PNG: the image is empty or its size does not fit its pixels");
     }
-    Result<std::string> bytes = encode(width, height, rgb.data());
+    return encode(width, height, rgb.data());
+}
+
+Status write_png8(const std::string& path, int width, int height, const std::vector<uint8_t>& rgb) {
+    Result<std::string> bytes = encode_png8(width, height, rgb);
     if (!bytes.ok()) return {bytes.status().code(), path + ": " + bytes.status().message()};
     return write_file_atomically(path, *bytes);
 }

@@ -20,7 +20,9 @@ uint8_t srgb_code(float linear);
 Result<std::string> encode_png(const RgbImage& image, double exposure = 0);
 /// Writes encode_png()'s bytes to a file that appears whole or not at all.
 Status write_png(const std::string& path, const RgbImage& image, double exposure = 0);
-/// Does the same for 8-bit sRGB values, 3 * width * height.
+/// The PNG file's bytes for 8-bit sRGB values, 3 * width * height.
+Result<std::string> encode_png8(int width, int height, const std::vector<uint8_t>& rgb);
+/// Writes encode_png8()'s bytes to a file that appears whole or not at all.
 Status write_png8(const std::string& path, int width, int height, const std::vector<uint8_t>& rgb);
 
 }  // namespace lightloom
