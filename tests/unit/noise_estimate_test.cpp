@@ -127,7 +127,9 @@ TEST(NoiseEstimate, IsThatOfTheDevelopedPixels) {
     EXPECT_NEAR(a->relmse / b->relmse, 1, 1e-9);
     EXPECT_NEAR(a->error / b->error, 1, 1e-9);
     exposed.exposure = 0;
-    EXPECT_EQ(render(16, 3, half, exposed).noise(), NoiseEstimate());
+    const auto dark = render(16, 3, half, exposed).noise();
+    EXPECT_EQ(dark->relmse, 0);
+    EXPECT_EQ(dark->error, 0);
 }
 
 TEST(NoiseEstimate, NeedsTwoGroups) {
@@ -145,7 +147,24 @@ TEST(NoiseEstimate, EqualGroupsHaveNoNoise) {
     ASSERT_TRUE(noise.has_value());
     EXPECT_NEAR(noise->relmse, 0, 1e-20);
     EXPECT_NEAR(noise->error, 0, 1e-20);
-    EXPECT_EQ(render(12, 1, [](size_t, double, Rng&) { return 0.0; }).noise(), NoiseEstimate());
+    const auto black = render(12, 1, [](size_t, double, Rng&) { return 0.0; }).noise();
+    EXPECT_EQ(black->relmse, 0);
+    EXPECT_EQ(black->error, 0);
+}
+
+TEST(NoiseEstimate, ReachesATargetWithItsStandardErrorAndEightGroups) {
+    NoiseEstimate noise{.relmse = 0.009, .error = 0.0009, .groups = 8};
+    EXPECT_TRUE(noise.reaches(0.01));
+    noise.error = 0.0011;
+    EXPECT_FALSE(noise.reaches(0.01));
+    EXPECT_FALSE((NoiseEstimate{.relmse = 0, .error = 0, .groups = 7}.reaches(0.01)));
+}
+
+TEST(NoiseEstimate, IsMadeAtNumbersOfGroupsThatThePlanGives) {
+    std::vector<uint32_t> numbers;
+    for (uint32_t g = NoiseEstimate::next_groups(0); g < 40; g = NoiseEstimate::next_groups(g)) numbers.push_back(g);
+    EXPECT_EQ(numbers,
+              (std::vector<uint32_t>{2, 4, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 22, 24, 26, 28, 30, 33, 36, 39}));
 }
 
 TEST(NoiseEstimate, FramesSmallerThanTheWindow) {
