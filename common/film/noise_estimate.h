@@ -50,7 +50,7 @@ class GroupSpread {
 /// the variance of a mean, and r what is known of the true value. The mean itself would not do as r: where few samples have found
 /// the light, mean and V are large in the same pixels, and their ratio is at most about 1, whatever the error is. So r is the
 /// mean after a local Wiener filter (5 x 5 pixels), which takes a pixel's neighbours into account as far as its own noise exceeds
-/// the contrast around it [Lee 1980].
+/// the contrast around it [Lee 1980], or what the pixel shows by itself beyond three standard deviations, if that is more.
 double relative_variance(const double* mean, const double* moment, int width, int height, double variance_factor, double epsilon);
 
 }  // namespace lightloom

@@ -117,6 +117,26 @@ TEST(NoiseEstimate, PixelsThatFewSamplesLightAreNotTakenForDarkOrCertain) {
     EXPECT_LT(naive, 0.7 * truth);
 }
 
+TEST(NoiseEstimate, ASpikeOfOneSampleCountsInFullAndTheConfidenceSaysThatItIsOne) {
+    // One sample of one pixel in the last but one group is a thousand times as bright as all others.
+    const Accumulation sums = render(24, 4, [n = 0](size_t, double, Rng& rng) mutable {
+        return (++n == 40 * 48 * 32 * 3 + 2000 ? 1000.0 : 1.0) * (0.9 + 0.2 * rng.uniform_double());
+    });
+    const auto noise = sums.noise();
+    ASSERT_TRUE(noise.has_value());
+    const double truth = true_relmse(sums.develop(), [](size_t) { return 1.0; });
+    EXPECT_NEAR(noise->relmse / truth, 1, 0.35);
+    EXPECT_GT(noise->error, 0.9 * noise->relmse);
+}
+
+TEST(NoiseEstimate, ASmallLampInTheDarkIsNotTakenForASpike) {
+    const auto lamp = [](size_t k) { return k / 3 == 700 ? 1000.0 : 0.01; };
+    const Accumulation sums = render(24, 5, [&](size_t k, double, Rng& rng) { return lamp(k) * (0.5 + rng.uniform_double()); });
+    const auto noise = sums.noise();
+    ASSERT_TRUE(noise.has_value());
+    EXPECT_NEAR(noise->relmse / true_relmse(sums.develop(), lamp), 1, 0.5);
+}
+
 TEST(NoiseEstimate, IsThatOfTheDevelopedPixels) {
     const auto half = [](size_t k, double, Rng& rng) { return scene(k) * rng.uniform_double(); };
     const auto twice = [](size_t k, double, Rng& rng) { return 4 * scene(k) * rng.uniform_double(); };
