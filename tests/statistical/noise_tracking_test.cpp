@@ -24,9 +24,9 @@ TEST(NoiseTracking, WithinAFactorOfOneAndAHalf) {
         const auto reference = testing::make_tracked_reference(*scene, "bdpt:rr-start=5", 1024);
         ASSERT_TRUE(reference.ok()) << reference.status().message();
         for (const std::string& algorithm : c.algorithms) {
-            const auto track = testing::track_noise(*scene, *reference, algorithm, 7, c.iterations, 3);
+            const auto track = testing::track_noise(*scene, *reference, algorithm, 7, c.iterations, 2);
             ASSERT_TRUE(track.ok()) << track.status().message();
-            ASSERT_EQ(track->size(), 3u);
+            ASSERT_EQ(track->size(), 2u);
             for (const testing::TrackedPoint& point : *track) {
                 SCOPED_TRACE(std::string(c.scene) + ", " + algorithm + ", " + std::to_string(point.iterations) + " iterations");
                 EXPECT_GT(point.ratio(), 1 / 1.5);
