@@ -105,16 +105,23 @@ void add_output_settings(cli::App command, JobOptions& options) {
         ->type_name("FILE");
     add_image_settings(command, options);
     command.add_flag("--layers", options.layers, "Also store albedo, normal and depth of what the camera sees first");
-    const auto spp =
-        command.add_option("--spp", options.samples_per_pixel, "Samples per pixel (default: the scene's, unless --time is given)")
-            ->type_name("N")
-            ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
+    const auto spp = command
+                         .add_option("--spp", options.samples_per_pixel,
+                                     "Samples per pixel (default: the scene's, unless --time or --noise is given)")
+                         ->type_name("N")
+                         ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     command
         .add_option("--time", options.time_seconds,
                     "Stop after so many seconds of rendering, at a number of samples that --spp can reproduce")
         ->type_name("SECONDS")
         ->check(number_between(0.001, 30 * 86400.0))
         ->excludes(spp);
+    command
+        .add_option("--noise", options.noise_target,
+                    "Stop when the image's relMSE, as its own groups of iterations show it, is not above this; with --spp or "
+                    "--time, whichever comes first")
+        ->type_name("RELMSE")
+        ->check(number_between(JobSpec::kMinNoiseTarget, JobSpec::kMaxNoiseTarget));
     command.add_option("--json", options.json, "Also write statistics: seconds of every phase, samples, rays")->type_name("FILE");
     command.add_flag("-q,--quiet", options.quiet, "Print errors only");
     command.add_flag("--strict", options.strict,
@@ -177,7 +184,11 @@ Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
     spec.seed = options.seed;
     spec.time_limit_seconds = options.time_seconds;
     spec.samples_per_pixel = options.samples_per_pixel;
-    if (spec.samples_per_pixel == 0 && spec.time_limit_seconds == 0)
+    spec.noise_target = options.noise_target;
+    if (spec.noise_target > 0 && spec.samples_per_pixel > 0 && spec.samples_per_pixel < NoiseEstimate::kLeastGroups)
+        return invalid_argument("--noise needs --spp " + std::to_string(NoiseEstimate::kLeastGroups) +
+                                " at least: noise is estimated from as many groups of iterations");
+    if (spec.samples_per_pixel == 0 && spec.time_limit_seconds == 0 && spec.noise_target == 0)
         spec.samples_per_pixel = uint32_t(
             std::clamp<int64_t>(scene.imported.description.samples_per_pixel, 1, int64_t(JobSpec::kMaxSamplesPerPixel) + 1));
     spec.max_depth = options.max_depth;

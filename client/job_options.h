@@ -28,8 +28,9 @@ struct JobOptions {
     std::string png;                 ///< Empty: none.
     double exposure = 0;             ///< Of the PNG, in stops.
     std::string algorithm;           ///< Empty: what the scene asks for, see default_algorithm().
-    uint32_t samples_per_pixel = 0;  ///< 0: the scene's (unless there is a time limit).
+    uint32_t samples_per_pixel = 0;  ///< 0: the scene's (unless there is another bound).
     double time_seconds = 0;
+    double noise_target = 0;  ///< 0: none.
     int max_depth = -1;
     std::string resolution;  ///< "WxH" or empty.
     std::string crop;        ///< "X0,X1,Y0,Y1" or empty.

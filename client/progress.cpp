@@ -1,5 +1,6 @@
 #include "client/progress.h"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -32,8 +33,19 @@ std::string line_of(const JobInfo& job, int percent) {
                       job.worker_count, job.worker_count == 1 ? "" : "s");
         line += text;
     }
+    if (job.noise) line += "  " + noise_text(*job.noise);
+    if (job.spec.noise_target > 0 && !is_terminal(job.state)) {
+        std::snprintf(text, sizeof text, job.noise && job.noise->light_missing ? " (%.3g, but light is missing)" : " (until %.3g)",
+                      job.spec.noise_target);
+        line += text;
+    }
     if (job.eta_seconds >= 0 && !is_terminal(job.state)) line += "  ETA " + duration_text(job.eta_seconds);
     return line;
+}
+
+size_t terminal_columns() {
+    winsize size{};
+    return ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col : 80;
 }
 
 /// "tracing training paths 65536/200000  ETA 12 s", "learning the tables 40 %  ETA 2 s"
@@ -95,6 +107,13 @@ std::string tables_line(const TablesInfo& tables) {
     return tables.note.empty() ? line : line + "; " + tables.note;
 }
 
+std::string noise_text(const NoiseReport& noise) {
+    char text[64];
+    const double relmse = noise.estimate.relmse;
+    std::snprintf(text, sizeof text, "relMSE %.3g +- %.0f %%", relmse, relmse > 0 ? 100 * noise.estimate.error / relmse : 0.0);
+    return text;
+}
+
 Progress::Progress(bool quiet) : quiet_(quiet), terminal_(::isatty(STDERR_FILENO) == 1) {
     if (!quiet_ && !terminal_) silence_breaker_ = std::jthread([this](std::stop_token stop) { break_silence(stop); });
 }
@@ -139,8 +158,11 @@ void Progress::show(const JobInfo& job) {
         if (!new_state && !new_phase && Clock::now() - last_ < kRedrawInterval) return;
         last_ = Clock::now();
         const int filled = percent * kBarWidth / 100;
-        const std::string bar = std::string(size_t(filled), '=') + std::string(size_t(kBarWidth - filled), ' ');
-        std::fprintf(stderr, "\r\033[K[%s] %s", bar.c_str(), line_.c_str());
+        const std::string bar = '[' + std::string(size_t(filled), '=') + std::string(size_t(kBarWidth - filled), ' ') + "] ";
+        // A line that wraps could not be redrawn.
+        const size_t room = terminal_columns() - 1;
+        const bool bar_fits = bar.size() + line_.size() <= room;
+        std::fprintf(stderr, "\r\033[K%s%s", bar_fits ? bar.c_str() : "", line_.substr(0, room).c_str());
         std::fflush(stderr);
         open_ = true;
     } else if (preparing ? new_phase

@@ -40,6 +40,8 @@ class Progress {
 
 /// "tables of 700 x 1000 subspaces from 200000 training samples, 2.1 s traced, 1.3 s learned".
 std::string tables_line(const TablesInfo& tables);
+/// "relMSE 0.0123 +- 4 %", from the image's own groups.
+std::string noise_text(const NoiseReport& noise);
 /// "48 s", "3 min 05 s", "2 h 10 min".
 std::string duration_text(double seconds);
 /// The same, and from two days on "3 d 04 h".

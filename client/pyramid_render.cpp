@@ -124,7 +124,7 @@ void add_pyramid_options(cli::App command, PyramidOptions& options) {
         ->check(whole_number_between(1, 64))
         ->capture_default_str()
         ->needs(pyramid);
-    for (const char* other : {"--half", "--png", "--layers", "--time", "--json", "--workers"})
+    for (const char* other : {"--half", "--png", "--layers", "--time", "--noise", "--json", "--workers"})
         pyramid->excludes(command.get_option(other));
 }
 

@@ -65,6 +65,7 @@ Status write_statistics(const std::string& path, const JobInfo& job, const Diges
                  {"duplicates_same", job.duplicates_same},
                  {"duplicates_different", job.duplicates_different}};
     if (job.rare_light != RareLightReport{}) json["rare_light"] = to_json(job.rare_light);
+    if (job.noise) json["noise"] = to_json(job.noise, job.spec.noise_target);
     if (job.tables.asset.size_bytes > 0) json["tables"] = to_json(job.tables);
     return write_file_atomically(path, json.dump(1) + "\n");
 }
@@ -99,6 +100,18 @@ void warn_of_rare_light(const JobInfo& job) {
             "and `%s` cannot find it; a small sphere in place of a point light can be hit\n",
             100 * rare.unreachable_share, job.algorithm.c_str());
     }
+}
+
+/// Why a job with a noise target ended above it.
+void tell_of_missed_target(const JobInfo& job) {
+    if (!(job.spec.noise_target > 0) || (job.noise && job.noise->reached)) return;
+    std::string why = "its noise is known from " + std::to_string(NoiseEstimate::kLeastGroups) + " groups of iterations on";
+    if (job.noise && job.noise->light_missing) {
+        why = "light that only chance finds may be missing from the image";
+    } else if (job.noise && job.noise->estimate.groups >= NoiseEstimate::kLeastGroups) {
+        why = noise_text(*job.noise);
+    }
+    std::fprintf(stderr, "lightloom: the job ended before --noise %.3g was reached: %s\n", job.spec.noise_target, why.c_str());
 }
 
 /// An image as it is written: the EXR, its manifest, and the EXR's digest, which the manifest names.
@@ -261,6 +274,7 @@ int fetch(JobPort& port, const JobInfo& job, const JobOptions& options, ClientTi
                     files.digest.hex().c_str());
         if (!options.png.empty()) std::printf("%s\n", options.png.c_str());
     }
+    if (!options.quiet) tell_of_missed_target(job);
     if (!options.quiet) warn_of_rare_light(job);
     if (job.dropped_samples > 0) {
         report_dropped(job, files.manifest);

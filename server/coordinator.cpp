@@ -86,8 +86,15 @@ Result<JobSpec> Coordinator::canonical_spec(const JobSpec& spec) const {
     JobSpec out = spec;
     out.frame = {};
     out.algorithm = spec.algorithm.completed();
-    if ((spec.samples_per_pixel > 0) == (spec.time_limit_seconds > 0))
-        return invalid_argument("a job needs either a number of samples per pixel or a time limit");
+    if (spec.samples_per_pixel > 0 && spec.time_limit_seconds > 0)
+        return invalid_argument("a job has a number of samples per pixel or a time limit, not both");
+    if (spec.samples_per_pixel == 0 && spec.time_limit_seconds == 0 && spec.noise_target == 0)
+        return invalid_argument("a job needs a number of samples per pixel, a time limit or a noise target");
+    if (spec.noise_target != 0 && !(spec.noise_target >= JobSpec::kMinNoiseTarget && spec.noise_target <= JobSpec::kMaxNoiseTarget))
+        return invalid_argument("the noise target is a relMSE between 1e-9 and 1");
+    if (spec.noise_target > 0 && spec.samples_per_pixel > 0 && spec.samples_per_pixel < NoiseEstimate::kLeastGroups)
+        return invalid_argument("a noise target needs " + std::to_string(NoiseEstimate::kLeastGroups) +
+                                " samples per pixel at least, from as many groups of which the noise is estimated");
     if (spec.samples_per_pixel > JobSpec::kMaxSamplesPerPixel)
         return invalid_argument("at most " + std::to_string(JobSpec::kMaxSamplesPerPixel) + " samples per pixel");
     if (!(spec.time_limit_seconds >= 0 && spec.time_limit_seconds <= 30 * 86400.0))

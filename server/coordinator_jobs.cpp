@@ -86,8 +86,10 @@ void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, Tab
     const double unit_light_paths =
         double(spec.algorithm.light_paths_per_iteration(frame.crop.area())) * plan.max_group_iterations() / plan.tile_count();
     std::optional<UnitTable> units;
-    units.emplace(plan, spec.samples_per_pixel, 1, options_.shuffle_seed);
-    auto reducer = std::make_shared<Reducer>(frame, plan.tile_count(), facts.response);
+    // A noise target alone may be out of reach.
+    const uint64_t iterations = only_noise_bounds(spec) ? JobSpec::kMaxSamplesPerPixel : spec.samples_per_pixel;
+    units.emplace(plan, iterations, 1, options_.shuffle_seed);
+    auto reducer = std::make_shared<Reducer>(frame, plan.tile_count(), facts.response, spec.noise_target);
 
     const std::lock_guard lock(mutex_);
     if (job.state != JobState::kPreparing) return;
@@ -146,6 +148,7 @@ Status Coordinator::write_results(JobRecord& job) {
     reducer->freeze();
     auto developed = reducer->developed(true);
     if (!developed.ok()) return developed.status();
+    const std::optional<NoiseReport> noise = reducer->final_noise();
     const RareLightReport rare_light_report = reducer->rare_light_report(mean_luminance(developed->color));
     const auto image = encode_image(spec, *std::move(developed), std::move(layers));
     if (!image.ok()) return image.status();
@@ -166,6 +169,7 @@ Status Coordinator::write_results(JobRecord& job) {
         job.counters = reducer->counters();
         job.dropped = reducer->dropped();
         job.rare_light_report = rare_light_report;
+        job.noise = noise;
         manifest.job = job.info(options_.clock());
         manifest.identity = options_.identity;
         manifest.created_at = job.created_at;

@@ -274,6 +274,10 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
         job->merged_iterations = reducer->iterations();
         job->units->advance(groups);
     }
+    if (const auto noise = reducer->noise()) {
+        job->noise = noise;
+        job->closed = job->closed || noise->reached;
+    }
     changed(*job);
     work_changed_.notify_all();
     finish_if_complete(*job);

@@ -23,8 +23,12 @@ void tell_rendering(const JobRecord& job, TimePoint now, JobInfo* info) {
         info->eta_seconds = 0;
     } else if (job.spec.time_limit_seconds > 0) {
         info->eta_seconds = std::max(0.0, job.spec.time_limit_seconds - info->render_seconds);
-    } else if (const auto left = seconds_left(info->render_seconds, info->unit_done, info->unit_total)) {
-        info->eta_seconds = *left;
+    } else if (info->unit_total > 0) {
+        info->eta_seconds = seconds_left(info->render_seconds, info->unit_done, info->unit_total).value_or(info->eta_seconds);
+    }
+    if (const auto share = noise_share(*info); share && !over) {
+        const double left = info->render_seconds * (1 - *share) / *share;
+        info->eta_seconds = info->eta_seconds < 0 ? left : std::min(info->eta_seconds, left);
     }
 }
 
@@ -65,7 +69,7 @@ JobInfo JobRecord::info(TimePoint now) const {
     info.algorithm = spec.algorithm.name();
     info.message = message;
     info.revision = revision;
-    info.unit_total = units ? units->unit_total() : ended_units.total;
+    info.unit_total = only_noise_bounds(spec) ? 0 : units ? units->unit_total() : ended_units.total;
     info.unit_done = units ? units->done_count() : ended_units.done;
     info.unit_leased = units ? units->leased_count() : 0;
     info.samples_per_pixel_done = merged_iterations;
@@ -80,6 +84,7 @@ JobInfo JobRecord::info(TimePoint now) const {
     info.duplicates_different = duplicates_different;
     info.tables = tables;
     info.rare_light = rare_light_report;
+    info.noise = noise;
     info.label = label;
     info.scene = scene;
     info.age_seconds = seconds_between(created, now);

@@ -29,7 +29,7 @@ struct JobRecord {
     uint64_t revision = 1;
     TimePoint created, prepared, first_render, finishing, ended;
     bool rendering = false;          ///< Whether first_render is set.
-    bool closed = false;             ///< Whether the time limit has passed.
+    bool closed = false;             ///< Whether the time limit has passed or the noise target is reached.
     std::string created_at;          ///< UTC, for the manifest only.
     std::vector<ImageLayer> layers;  ///< First-hit layers, until the image is written.
     std::optional<UnitTable> units;  ///< Until the job ends; after that `ended_units` holds the counts.
@@ -46,6 +46,7 @@ struct JobRecord {
     UnitCounters counters;
     uint64_t dropped = 0;
     RareLightReport rare_light_report;  ///< About the finished image.
+    std::optional<NoiseReport> noise;   ///< About the groups merged at its time, in the end about the finished image.
     uint64_t duplicates_same = 0, duplicates_different = 0, expired_leases = 0, rejected = 0;
     Digest image_digest;
     uint64_t image_size = 0;
@@ -82,6 +83,9 @@ struct JobRecord {
     /// the next.
     UnitTable* open_units(const UnitKey& unit);
 };
+
+/// True for a job that neither samples nor time bound: how many units it has turns out while it runs.
+inline bool only_noise_bounds(const JobSpec& spec) { return spec.samples_per_pixel == 0 && spec.time_limit_seconds == 0; }
 
 /// The job itself, or the job at the end of the chain of those that it waits for. There is no circle: a job that waits
 /// makes no tables, and only jobs that make tables are waited for.

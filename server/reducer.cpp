@@ -14,10 +14,18 @@ constexpr int kDevelopAttempts = 4;
 
 }  // namespace
 
-Reducer::Reducer(const FrameLayout& frame, uint32_t tile_count, const FilmResponse& response)
+double mean_luminance(const RgbImage& image) {
+    double sum = 0;
+    const std::vector<float>& pixels = image.pixels;
+    for (size_t i = 0; i + 2 < pixels.size(); i += 3) sum += double(Rgb(pixels[i], pixels[i + 1], pixels[i + 2]).luminance());
+    return pixels.empty() ? 0 : 3 * sum / double(pixels.size());
+}
+
+Reducer::Reducer(const FrameLayout& frame, uint32_t tile_count, const FilmResponse& response, double noise_target)
     : frame_(frame),
       tile_count_(tile_count),
-      response_(response) {}
+      response_(response),
+      noise_target_(noise_target) {}
 
 Result<std::vector<Reducer::Refusal>> Reducer::add(const WorkUnit& unit, Partial partial) {
     const std::lock_guard lock(mutex_);
@@ -31,6 +39,7 @@ Result<std::vector<Reducer::Refusal>> Reducer::add(const WorkUnit& unit, Partial
 
 Result<std::vector<Reducer::Refusal>> Reducer::add_locked(const WorkUnit& unit, Partial partial) {
     if (frozen_) return Status(StatusCode::kCancelled, "the image is being finished");
+    if (noise_ && noise_->reached) return std::vector<Refusal>();
     if (!sums_) sums_ = std::make_unique<GroupedSum>(frame_, response_);
     std::vector<Refusal> refused;
     if (unit.key.group < group_count()) {
@@ -69,7 +78,36 @@ Status Reducer::add_to_current(const WorkUnit& unit, const Partial& partial, std
     if (unit.key == UnitKey{}) rare_light_ = partial.rare_light;
     for (const DroppedSample& sample : partial.dropped)
         if (dropped_.size() < kMaxDropped) dropped_.push_back({unit.key, sample});
-    return sums_->current_units() < tile_count_ ? Status() : sums_->fold(unit.render.iteration_count).status();
+    if (sums_->current_units() < tile_count_) return {};
+    LL_RETURN_IF_ERROR(sums_->fold(unit.render.iteration_count).status());
+    if (group_count() < next_noise_groups_) return {};
+    next_noise_groups_ = NoiseEstimate::next_groups(group_count());
+    noise_ = estimate_noise();
+    if (noise_->reached) waiting_.clear();
+    return {};
+}
+
+std::optional<NoiseReport> Reducer::estimate_noise() const {
+    const auto estimate = sums_ ? sums_->complete().noise() : std::nullopt;
+    if (!estimate) return std::nullopt;
+    NoiseReport report{*estimate};
+    if (!(noise_target_ > 0) || !estimate->reaches(noise_target_)) return report;
+    // The groups agree also as long as none of them has found anything, or nothing of what only chance finds.
+    const double mean = mean_luminance(sums_->complete().develop());
+    const double rare_error = rare_light_of(mean).mean_error;
+    report.light_missing = !(mean > 0) || rare_error * rare_error > noise_target_;
+    report.reached = !report.light_missing;
+    return report;
+}
+
+std::optional<NoiseReport> Reducer::noise() const {
+    const std::lock_guard lock(mutex_);
+    return noise_;
+}
+
+std::optional<NoiseReport> Reducer::final_noise() const {
+    const std::lock_guard lock(mutex_);
+    return noise_ && noise_->estimate.groups == group_count() ? noise_ : estimate_noise();
 }
 
 void Reducer::freeze() {
@@ -133,6 +171,10 @@ Result<DevelopedImage> Reducer::developed(bool with_variance, const std::functio
 
 RareLightReport Reducer::rare_light_report(double image_mean) const {
     const std::lock_guard lock(mutex_);
+    return rare_light_of(image_mean);
+}
+
+RareLightReport Reducer::rare_light_of(double image_mean) const {
     if (!sums_) return {};
     const FilmResponse::Triple grey = response_.of(Rgb(1.0f));
     const double exposure = double(Rgb(float(grey[0]), float(grey[1]), float(grey[2])).luminance());

@@ -84,6 +84,17 @@ Json to_json(const RareLightReport& report) {
             {"mean_error", report.mean_error}};
 }
 
+Json to_json(const std::optional<NoiseReport>& noise, double target) {
+    if (!noise) return nullptr;
+    return {{"relmse", noise->estimate.relmse},
+            {"standard_error", noise->estimate.error},
+            {"groups", noise->estimate.groups},
+            {"samples_per_pixel", noise->estimate.iterations},
+            {"target", target > 0 ? Json(target) : Json(nullptr)},
+            {"reached", target > 0 ? Json(noise->reached) : Json(nullptr)},
+            {"light_missing", noise->light_missing}};
+}
+
 Json to_json(const TablesInfo& t) {
     return {{"sha256", t.asset.digest.hex()},
             {"size_bytes", t.asset.size_bytes},
@@ -160,6 +171,7 @@ std::string to_json(const Manifest& m) {
                     {"duplicates_same", m.job.duplicates_same},
                     {"duplicates_different", m.job.duplicates_different}};
     if (m.job.rare_light != RareLightReport{}) json["rare_light"] = to_json(m.job.rare_light);
+    if (m.job.noise) json["noise"] = to_json(m.job.noise, spec.noise_target);
     Json dropped = Json::array();
     for (const Reducer::Dropped& d : m.dropped) {
         dropped.push_back({{"unit", {d.unit.group, d.unit.tile}},
@@ -183,13 +195,6 @@ std::string to_json(const Manifest& m) {
     }
     json["workers"] = std::move(workers);
     return json.dump(1) + "\n";
-}
-
-double mean_luminance(const RgbImage& image) {
-    double sum = 0;
-    const std::vector<float>& pixels = image.pixels;
-    for (size_t i = 0; i + 2 < pixels.size(); i += 3) sum += double(Rgb(pixels[i], pixels[i + 1], pixels[i + 2]).luminance());
-    return pixels.empty() ? 0 : 3 * sum / double(pixels.size());
 }
 
 Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers) {

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,13 +46,13 @@ std::string replay_command(const JobSpec& spec, const std::string& scene, const 
 nlohmann::ordered_json settings_json(const JobSpec& spec);
 /// Light that may not have been found, as manifests, statistics and the status endpoint show it.
 nlohmann::ordered_json to_json(const RareLightReport& report);
+/// The estimated error of an image in the same places; null where it is not known. `target` is that of the job, or 0.
+nlohmann::ordered_json to_json(const std::optional<NoiseReport>& noise, double target);
 /// Tables as manifests and statistics show them.
 nlohmann::ordered_json to_json(const TablesInfo& tables);
 /// The manifest as JSON text.
 std::string to_json(const Manifest& manifest);
 
-/// Rec.709, over all pixels; 0 for an empty image.
-double mean_luminance(const RgbImage& image);
 /// The EXR's bytes: colour, its variance where that is known, and `layers`. They do not depend on who rendered it, and
 /// how.
 Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers);

@@ -24,6 +24,7 @@ Json status_json(const JobInfo& j) {
             {"height", positive(framed ? j.spec.frame.crop.height() : j.spec.height)},
             {"samples_per_pixel", positive(j.spec.samples_per_pixel)},
             {"time_limit_seconds", positive(j.spec.time_limit_seconds)},
+            {"noise_target", positive(j.spec.noise_target)},
             {"state", to_string(j.state)},
             {"message", j.message},
             {"phase", j.state == JobState::kPreparing ? Json(phase_text(j)) : Json(nullptr)},
@@ -40,6 +41,7 @@ Json status_json(const JobInfo& j) {
             {"age_seconds", j.age_seconds},
             {"dropped_samples", j.dropped_samples},
             {"rare_light", to_json(j.rare_light)},
+            {"noise", to_json(j.noise, j.spec.noise_target)},
             {"workers", j.worker_count},
             {"duplicates_different", j.duplicates_different}};
 }

@@ -158,7 +158,7 @@ std::optional<NoiseEstimate> Accumulation::noise() const {
     const double factor = 1 / (double(group_count_ - 1) * double(iterations_));
     const double relmse =
         relative_variance(mean_.data(), moment_.data(), frame_.crop.width(), frame_.crop.height(), factor, epsilon());
-    return NoiseEstimate{relmse, relmse * spread_.relative_error()};
+    return NoiseEstimate{relmse, relmse * spread_.relative_error(), group_count_, iterations_};
 }
 
 void Accumulation::develop(size_t first, size_t count, float* values) const {

@@ -27,6 +27,28 @@ struct ColumnSums {
     }
 };
 
+/// Sums over the neighbours of a value.
+struct Neighbours {
+    double value, square, variance, count;
+};
+
+/// Square of the value that the filter gives: between the pixel's own and its neighbours' mean, without a pixel in its own
+/// background, so that a single spike stands out.
+double filtered_square(double own, double own_variance, const Neighbours& others) {
+    if (others.count < 1) return own * own;
+    const double local = others.value / others.count;
+    // The variance between pixels is contrast and noise together.
+    const double spread = others.count > 1 ? (others.square - others.value * local) / (others.count - 1) : 0;
+    const double contrast = std::max(0.0, spread - others.variance / others.count);
+    const double own_share = contrast > 0 ? contrast / (contrast + own_variance) : 0;
+    const double filtered = local + own_share * (own - local);
+    return filtered * filtered;
+}
+
+/// Square of what a pixel shows for certain, however different its neighbours are. Light that some nine groups have found counts;
+/// a spike of a single sample has a variance of its square.
+double known_square(double own_square, double own_variance) { return own_square - 9 * own_variance; }
+
 }  // namespace
 
 void GroupSpread::add(double value) {
@@ -66,14 +88,12 @@ double relative_variance(const double* mean, const double* moment, int width, in
                     variance += columns.variance[column];
                 }
                 const size_t index = size_t(y) * row_values + size_t(x) * kChannels + size_t(c);
-                const double own_variance = moment[index] * variance_factor;
-                const double local = value / count;
-                // The variance between the window's pixels is contrast and noise together.
-                const double spread = count > 1 ? (square - value * local) / (count - 1) : 0;
-                const double contrast = std::max(0.0, spread - variance / count);
-                const double own_share = contrast > 0 ? contrast / (contrast + own_variance) : 0;
-                const double filtered = local + own_share * (mean[index] - local);
-                row_total += own_variance / (filtered * filtered + epsilon);
+                const double own = mean[index], own_square = own * own, own_variance = moment[index] * variance_factor;
+                row_total += own_variance /
+                             (std::max(known_square(own_square, own_variance),
+                                       filtered_square(own, own_variance,
+                                                       {value - own, square - own_square, variance - own_variance, count - 1})) +
+                              epsilon);
             }
         }
         total += row_total;

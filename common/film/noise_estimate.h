@@ -14,9 +14,20 @@ struct NoiseEstimate {
     /// Standard error of `relmse`, from the spread between groups; every correlation between pixels is in it. For fewer than
     /// `kLeastGroups` groups it is what it would be if all pixels were wrong together and normally distributed.
     double error = 0;
+    uint32_t groups = 0;      ///< From which the estimate was made.
+    uint64_t iterations = 0;  ///< Of these groups.
 
     /// With fewer groups the spread between groups is itself noise.
     static constexpr uint32_t kLeastGroups = 8;
+    /// Whether the image's error can be taken for no larger than `target`. The standard error is added, because the estimate is
+    /// asked again and again and the first low one would be believed.
+    bool reaches(double target) const { return groups >= kLeastGroups && relmse + error <= target; }
+    /// The number of groups with which the estimate is made for the next time after `groups`, while an image grows: 2, 4, 8, then
+    /// with each group or each tenth more of them. So decisions follow from the plan alone, and their cost stays small.
+    static constexpr uint32_t next_groups(uint32_t groups) {
+        if (groups < kLeastGroups) return groups < 2 ? 2 : groups < 4 ? 4 : kLeastGroups;
+        return groups + (groups < 20 ? 1 : groups / 10);
+    }
     /// Added to the square of a pixel's value, as Metrics::relmse does.
     static constexpr double kEpsilon = 0.01;
 
@@ -39,7 +50,7 @@ class GroupSpread {
 /// the variance of a mean, and r what is known of the true value. The mean itself would not do as r: where few samples have found
 /// the light, mean and V are large in the same pixels, and their ratio is at most about 1, whatever the error is. So r is the
 /// mean after a local Wiener filter (5 x 5 pixels), which takes a pixel's neighbours into account as far as its own noise exceeds
-/// the contrast around it [Lee 1980].
+/// the contrast around it [Lee 1980], or what the pixel shows by itself beyond three standard deviations, if that is more.
 double relative_variance(const double* mean, const double* moment, int width, int height, double variance_factor, double epsilon);
 
 }  // namespace lightloom

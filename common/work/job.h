@@ -21,17 +21,22 @@ struct SceneOptions;
 /// A new field must be entered in common/work/job_fields.h, which says what it decides; it does not compile otherwise.
 struct JobSpec {
     static constexpr uint32_t kMaxSamplesPerPixel = 1u << 24;
+    /// Bounds of `noise_target`. A black image has a relMSE below 1, so that a larger target says nothing.
+    static constexpr double kMinNoiseTarget = 1e-9, kMaxNoiseTarget = 1;
 
     AlgorithmSettings algorithm;  ///< As chosen by the user; with every default written down once the job is accepted.
     uint64_t seed = 0;
     uint32_t samples_per_pixel = 0;  ///< Iterations; 0 when time-limited.
-    double time_limit_seconds = 0;   ///< 0 when bounded by samples. Exactly one of the two is set.
-    int32_t max_depth = -1;          ///< Bounces; -1: the scene's.
-    int32_t width = 0, height = 0;   ///< 0: the scene's.
-    Rect crop;                       ///< Window of the frame, in its pixels; all zeros: the scene's.
-    Digest scene_root;               ///< Digest of the scene's file list (asset manifest).
-    FrameLayout frame;               ///< Filled from the scene when the job is accepted.
-    bool first_hit_layers = false;   ///< Also write albedo, normal and depth of the first hit.
+    double time_limit_seconds = 0;   ///< 0 when there is none. At most one of the two is set.
+    /// Estimated relMSE (NoiseEstimate) at which the job ends; with another bound, whichever comes first. 0: none, and then one of
+    /// the two others is set.
+    double noise_target = 0;
+    int32_t max_depth = -1;         ///< Bounces; -1: the scene's.
+    int32_t width = 0, height = 0;  ///< 0: the scene's.
+    Rect crop;                      ///< Window of the frame, in its pixels; all zeros: the scene's.
+    Digest scene_root;              ///< Digest of the scene's file list (asset manifest).
+    FrameLayout frame;              ///< Filled from the scene when the job is accepted.
+    bool first_hit_layers = false;  ///< Also write albedo, normal and depth of the first hit.
 
     /// Digest of everything that decides the bytes of the image except how many iterations are rendered.
     Digest spec_digest() const;

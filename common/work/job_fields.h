@@ -44,9 +44,10 @@ inline constexpr auto kJobFields = [] {
         job_field<kSetting>("algorithm", &JobSpec::algorithm),
         job_field<kSetting>("seed", &JobSpec::seed),
         job_field<kSetting>("max_depth", &JobSpec::max_depth),
-        // A replay needs no time limit: a job that it ended has a number of samples.
+        // A replay needs no time limit and no noise target: a job that one of them ended has a number of samples.
         job_field<kBound | kReplay>("requested_samples_per_pixel", &JobSpec::samples_per_pixel),
         job_field<kBound>("time_limit_seconds", &JobSpec::time_limit_seconds),
+        job_field<kBound>("noise_target", &JobSpec::noise_target),
         // The frame results from these three and the scene.
         job_field<kRequest | kReplay>("width", &JobSpec::width),
         job_field<kRequest | kReplay>("height", &JobSpec::height),

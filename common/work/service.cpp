@@ -64,11 +64,20 @@ Status check_label(const JobLabel& label) {
     return {};
 }
 
+std::optional<double> noise_share(const JobInfo& job) {
+    if (!(job.spec.noise_target > 0) || !job.noise || job.noise->light_missing) return std::nullopt;
+    const NoiseEstimate& noise = job.noise->estimate;
+    const double done = double(job.samples_per_pixel_done);
+    // The error falls as the reciprocal of the number of samples.
+    return done / std::max(done, double(noise.iterations) * (noise.relmse + noise.error) / job.spec.noise_target);
+}
+
 double rendered_share(const JobInfo& job) {
     if (job.state == JobState::kSucceeded || job.state == JobState::kFinishing) return 1;
     double done = 0;
     if (job.unit_total > 0) done = double(job.unit_done) / double(job.unit_total);
     if (job.spec.time_limit_seconds > 0) done = job.render_seconds / job.spec.time_limit_seconds;
+    done = std::max(done, noise_share(job).value_or(0));
     return std::clamp(done, 0.0, 1.0);
 }
 

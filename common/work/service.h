@@ -12,6 +12,7 @@
 
 #include "common/core/digest.h"
 #include "common/core/result.h"
+#include "common/film/noise_estimate.h"
 #include "common/film/partial.h"
 #include "common/work/asset.h"
 #include "common/work/job.h"
@@ -102,6 +103,13 @@ struct JobLabel {
 /// kInvalidArgument for a text that is too long, or that a terminal does not show as one line.
 Status check_label(const JobLabel& label);
 
+/// The estimated error of a job's image, and what it decides; see the message NoiseSummary.
+struct NoiseReport {
+    NoiseEstimate estimate;
+    bool reached = false, light_missing = false;
+    friend bool operator==(const NoiseReport&, const NoiseReport&) = default;
+};
+
 /// A snapshot of a job; see the message Job in proto/lightloom/v1/job_service.proto for units and meaning.
 struct JobInfo {
     std::string job_id;
@@ -126,12 +134,17 @@ struct JobInfo {
     std::string waits_for;                             ///< The job that makes the tables, in kWaitingForTables.
     TablesInfo tables;
     RareLightReport rare_light;  ///< Set for a finished job.
+    std::optional<NoiseReport> noise;
     JobLabel label;
     std::string scene;       ///< Path of the scene file in its file list.
     double age_seconds = 0;  ///< Time since the submission.
 };
-/// Share of the image that is rendered, from 0 to 1: the share of its units, or of its time limit.
+/// Share of the image that is rendered, from 0 to 1: the share of its units, of its time limit, or of the samples with which its
+/// noise target will be reached, whichever is largest.
 double rendered_share(const JobInfo& job);
+/// Share of the samples with which the job's noise target will be reached, as the present estimate promises; nothing where it
+/// promises nothing.
+std::optional<double> noise_share(const JobInfo& job);
 /// Text for people, for example "waiting for the tables of job-0123".
 std::string phase_text(const JobInfo& job);
 

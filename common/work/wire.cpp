@@ -148,6 +148,7 @@ void put(const JobSpec& in, v1::JobSpec* out) {
     out->set_seed(in.seed);
     out->set_samples_per_pixel(in.samples_per_pixel);
     out->set_time_limit_seconds(in.time_limit_seconds);
+    out->set_noise_target(in.noise_target);
     out->set_max_depth(in.max_depth);
     out->set_width(in.width);
     out->set_height(in.height);
@@ -168,6 +169,8 @@ Result<JobSpec> get_rest(const v1::JobSpec& in) {
     spec.samples_per_pixel = in.samples_per_pixel();
     spec.time_limit_seconds = in.time_limit_seconds();
     if (!std::isfinite(spec.time_limit_seconds)) return invalid_argument("time_limit_seconds is not a finite number");
+    spec.noise_target = in.noise_target();
+    if (!std::isfinite(spec.noise_target)) return invalid_argument("noise_target is not a finite number");
     spec.max_depth = in.max_depth();
     spec.width = in.width();
     spec.height = in.height();
@@ -225,6 +228,15 @@ void put(const JobInfo& in, v1::Job* out) {
         rare->set_expected_hit_count(in.rare_light.expected_hits);
         rare->set_mean_error(in.rare_light.mean_error);
     }
+    if (in.noise) {
+        v1::NoiseSummary* noise = out->mutable_noise();
+        noise->set_relmse(in.noise->estimate.relmse);
+        noise->set_standard_error(in.noise->estimate.error);
+        noise->set_group_count(in.noise->estimate.groups);
+        noise->set_samples_per_pixel(in.noise->estimate.iterations);
+        noise->set_target_reached(in.noise->reached);
+        noise->set_light_missing(in.noise->light_missing);
+    }
     put(in.label, out->mutable_label());
     out->set_scene(clipped_utf8(in.scene, kMaxMessageBytes));
     out->set_age_seconds(in.age_seconds);
@@ -265,6 +277,12 @@ Result<JobInfo> get(const v1::Job& in) {
                        .unreachable_share = in.rare_light().unreachable_share(),
                        .expected_hits = in.rare_light().expected_hit_count(),
                        .mean_error = in.rare_light().mean_error()};
+    if (in.has_noise()) {
+        const v1::NoiseSummary& noise = in.noise();
+        info.noise = NoiseReport{{noise.relmse(), noise.standard_error(), noise.group_count(), noise.samples_per_pixel()},
+                                 noise.target_reached(),
+                                 noise.light_missing()};
+    }
     info.worker_count = in.worker_count();
     if (info.state == JobState::kSucceeded) {
         auto digest = get(in.image_digest());

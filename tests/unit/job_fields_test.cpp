@@ -30,6 +30,7 @@ JobSpec full_spec() {
     spec.seed = ~0ull;
     spec.samples_per_pixel = 7;
     spec.time_limit_seconds = 1.5;
+    spec.noise_target = 0.25;
     spec.max_depth = 9;
     spec.width = 64;
     spec.height = 48;
@@ -152,7 +153,7 @@ TEST(JobFields, TextsAreThoseOfEarlierVersions) {
         manifest_spec(spec),
         R"({"algorithm":"lvcbpt","parameters":{"cache":"500","connections":"3","heuristic":"balance","light-paths":"0.3",)"
         R"("next-event":"1","rr-min":"0.25","rr-start":"4","training-paths":"20000"},"seed":18446744073709551615,"max_depth":9,)"
-        R"("requested_samples_per_pixel":7,"time_limit_seconds":1.5,"layers":true,"scene":"room.pbrt",)"
+        R"("requested_samples_per_pixel":7,"time_limit_seconds":1.5,"noise_target":0.25,"layers":true,"scene":"room.pbrt",)"
         R"("scene_root":"4f48f7207cebf92638debb5694e4a8677350cf88a9e98e73c6c466b6b1d43890",)"
         R"("frame":{"width":64,"height":48,"crop":[1,2,33,44]}})");
     EXPECT_EQ(

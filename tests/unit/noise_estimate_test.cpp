@@ -117,6 +117,26 @@ TEST(NoiseEstimate, PixelsThatFewSamplesLightAreNotTakenForDarkOrCertain) {
     EXPECT_LT(naive, 0.7 * truth);
 }
 
+TEST(NoiseEstimate, ASpikeOfOneSampleCountsInFullAndTheConfidenceSaysThatItIsOne) {
+    // One sample of one pixel in the last but one group is a thousand times as bright as all others.
+    const Accumulation sums = render(24, 4, [n = 0](size_t, double, Rng& rng) mutable {
+        return (++n == 40 * 48 * 32 * 3 + 2000 ? 1000.0 : 1.0) * (0.9 + 0.2 * rng.uniform_double());
+    });
+    const auto noise = sums.noise();
+    ASSERT_TRUE(noise.has_value());
+    const double truth = true_relmse(sums.develop(), [](size_t) { return 1.0; });
+    EXPECT_NEAR(noise->relmse / truth, 1, 0.35);
+    EXPECT_GT(noise->error, 0.9 * noise->relmse);
+}
+
+TEST(NoiseEstimate, ASmallLampInTheDarkIsNotTakenForASpike) {
+    const auto lamp = [](size_t k) { return k / 3 == 700 ? 1000.0 : 0.01; };
+    const Accumulation sums = render(24, 5, [&](size_t k, double, Rng& rng) { return lamp(k) * (0.5 + rng.uniform_double()); });
+    const auto noise = sums.noise();
+    ASSERT_TRUE(noise.has_value());
+    EXPECT_NEAR(noise->relmse / true_relmse(sums.develop(), lamp), 1, 0.5);
+}
+
 TEST(NoiseEstimate, IsThatOfTheDevelopedPixels) {
     const auto half = [](size_t k, double, Rng& rng) { return scene(k) * rng.uniform_double(); };
     const auto twice = [](size_t k, double, Rng& rng) { return 4 * scene(k) * rng.uniform_double(); };
@@ -127,7 +147,9 @@ TEST(NoiseEstimate, IsThatOfTheDevelopedPixels) {
     EXPECT_NEAR(a->relmse / b->relmse, 1, 1e-9);
     EXPECT_NEAR(a->error / b->error, 1, 1e-9);
     exposed.exposure = 0;
-    EXPECT_EQ(render(16, 3, half, exposed).noise(), NoiseEstimate());
+    const auto dark = render(16, 3, half, exposed).noise();
+    EXPECT_EQ(dark->relmse, 0);
+    EXPECT_EQ(dark->error, 0);
 }
 
 TEST(NoiseEstimate, NeedsTwoGroups) {
@@ -145,7 +167,24 @@ TEST(NoiseEstimate, EqualGroupsHaveNoNoise) {
     ASSERT_TRUE(noise.has_value());
     EXPECT_NEAR(noise->relmse, 0, 1e-20);
     EXPECT_NEAR(noise->error, 0, 1e-20);
-    EXPECT_EQ(render(12, 1, [](size_t, double, Rng&) { return 0.0; }).noise(), NoiseEstimate());
+    const auto black = render(12, 1, [](size_t, double, Rng&) { return 0.0; }).noise();
+    EXPECT_EQ(black->relmse, 0);
+    EXPECT_EQ(black->error, 0);
+}
+
+TEST(NoiseEstimate, ReachesATargetWithItsStandardErrorAndEightGroups) {
+    NoiseEstimate noise{.relmse = 0.009, .error = 0.0009, .groups = 8};
+    EXPECT_TRUE(noise.reaches(0.01));
+    noise.error = 0.0011;
+    EXPECT_FALSE(noise.reaches(0.01));
+    EXPECT_FALSE((NoiseEstimate{.relmse = 0, .error = 0, .groups = 7}.reaches(0.01)));
+}
+
+TEST(NoiseEstimate, IsMadeAtNumbersOfGroupsThatThePlanGives) {
+    std::vector<uint32_t> numbers;
+    for (uint32_t g = NoiseEstimate::next_groups(0); g < 40; g = NoiseEstimate::next_groups(g)) numbers.push_back(g);
+    EXPECT_EQ(numbers,
+              (std::vector<uint32_t>{2, 4, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 22, 24, 26, 28, 30, 33, 36, 39}));
 }
 
 TEST(NoiseEstimate, FramesSmallerThanTheWindow) {

@@ -160,5 +160,19 @@ TEST(Wire, RareLightSurvivesTheRoundTrip) {
     EXPECT_EQ(shown->rare_light, job.rare_light);
 }
 
+TEST(Wire, TheNoiseOfAJobTravelsWhereItIsKnown) {
+    JobInfo job;
+    v1::Job message;
+    wire::put(job, &message);
+    EXPECT_FALSE(message.has_noise());
+    EXPECT_FALSE(wire::get(message)->noise.has_value());
+    job.noise = NoiseReport{{0.012, 0.001, 31, 44}, true, false};
+    wire::put(job, &message);
+    EXPECT_EQ(wire::get(message)->noise, job.noise);
+    job.noise = NoiseReport{{0.012, 0.001, 31, 44}, false, true};
+    wire::put(job, &message);
+    EXPECT_EQ(wire::get(message)->noise, job.noise);
+}
+
 }  // namespace
 }  // namespace lightloom
