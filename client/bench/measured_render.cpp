@@ -4,7 +4,6 @@ namespace lightloom::client {
 
 RenderCost LocalRender::cost() const {
     const UnitCounters& counters = render_.counters();
-    const std::optional<NoiseEstimate> noise = render_.noise();
     return {.iterations = render_.iterations(),
             .seconds = render_.seconds(),
             .preparation_seconds = render_.preparation_seconds(),
@@ -16,9 +15,7 @@ RenderCost LocalRender::cost() const {
             .camera_samples = counters.camera_samples,
             .light_paths = counters.light_paths,
             .rays = counters.rays,
-            .dropped = render_.dropped(),
-            .estimated_relmse = noise ? std::optional(noise->relmse) : std::nullopt,
-            .estimated_relmse_error = noise ? std::optional(noise->error) : std::nullopt};
+            .dropped = render_.dropped()};
 }
 
 std::optional<RareLightReport> LocalRender::rare_light(double image_mean) const {

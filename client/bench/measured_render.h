@@ -22,7 +22,6 @@ struct RenderCost {
     std::optional<uint64_t> vertices, connections;
     std::string tables;  ///< "made", "shared" or "cached"; empty where there are none, or nobody knows.
     uint64_t camera_samples = 0, light_paths = 0, rays = 0, dropped = 0;
-    std::optional<double> estimated_relmse, estimated_relmse_error;  ///< From its own groups, with a standard error.
 
     double together() const { return seconds + preparation_seconds; }
 };
@@ -37,6 +36,8 @@ class MeasuredRender {
     virtual RenderCost cost() const = 0;
     /// Of all iterations so far.
     virtual RgbImage image() const = 0;
+    /// What its own groups say of that image's error; nothing where they are too few. Takes a pass over the image.
+    virtual std::optional<NoiseEstimate> noise() const = 0;
     /// Of that image; nothing where no light depends on chance or nothing is known.
     virtual std::optional<RareLightReport> rare_light(double image_mean) const = 0;
 };
@@ -54,6 +55,7 @@ class LocalRender final : public MeasuredRender {
     bool ended() const override { return false; }
     RenderCost cost() const override;
     RgbImage image() const override { return render_.image(); }
+    std::optional<NoiseEstimate> noise() const override { return render_.noise(); }
     std::optional<RareLightReport> rare_light(double image_mean) const override;
 
   private:

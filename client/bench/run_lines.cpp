@@ -140,8 +140,10 @@ Json checkpoint_line(const BenchRun& run, const MeasuredRender& render, const Me
         line["relmse_own"] = metrics.relmse - *reference.noise_relmse;
         if (metrics.relmse < kNearFloor * *reference.noise_relmse) line["near_floor"] = true;
     }
-    set(line, "estimated_relmse", cost.estimated_relmse);
-    set(line, "estimated_relmse_error", cost.estimated_relmse_error);
+    if (const auto noise = render.noise()) {
+        line["estimated_relmse"] = noise->relmse;
+        line["estimated_relmse_error"] = noise->error;
+    }
     line["camera_samples"] = cost.camera_samples;
     line["light_paths"] = cost.light_paths;
     line["rays"] = cost.rays;

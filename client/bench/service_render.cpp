@@ -59,8 +59,11 @@ RenderCost ServiceRender::cost() const {
     cost.light_paths = job_.light_paths;
     cost.rays = job_.rays;
     cost.dropped = job_.dropped_samples;
-    if (job_.noise) cost.estimated_relmse = job_.noise->estimate.relmse, cost.estimated_relmse_error = job_.noise->estimate.error;
     return cost;
+}
+
+std::optional<NoiseEstimate> ServiceRender::noise() const {
+    return job_.noise ? std::optional(job_.noise->estimate) : std::nullopt;
 }
 
 std::optional<RareLightReport> ServiceRender::rare_light(double /*image_mean*/) const {

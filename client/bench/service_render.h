@@ -21,6 +21,7 @@ class ServiceRender final : public MeasuredRender {
     bool ended() const override { return is_terminal(job_.state); }
     RenderCost cost() const override;
     RgbImage image() const override { return image_; }
+    std::optional<NoiseEstimate> noise() const override;
     std::optional<RareLightReport> rare_light(double image_mean) const override;
 
   private:
