@@ -140,9 +140,13 @@ int bench(BenchOptions& options) {
                                                            results.status().message() + "); is lightloom-server running there?"});
     }
     if (!results.ok()) return report_error(results.status());
-    const auto good = report(*suite, *results);
-    if (!good.ok()) return report_error(good.status());
-    return *good ? kSuccess : kFailure;
+    try {
+        const auto good = report(*suite, *results);
+        if (!good.ok()) return report_error(good.status());
+        return *good ? kSuccess : kFailure;
+    } catch (const Json::exception& error) {  // of lines that somebody has edited
+        return report_error(invalid_argument(options.suite.out + ": a line has a field of another kind (" + error.what() + ")"));
+    }
 }
 
 /// Options that speak of one scene; a suite says these things itself.

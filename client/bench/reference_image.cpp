@@ -51,7 +51,7 @@ std::vector<Estimate> region_estimates(const ExrImage& reference) {
 }
 
 /// Takes the region means of a description over, whose errors come from independent groups.
-Status read_description(const std::string& path, Reference& reference) {
+Status read_description(const std::string& path, Reference& reference) try {
     const auto text = read_file(path);
     if (text.status().code() == StatusCode::kNotFound) return {};
     if (!text.ok()) return text.status();
@@ -68,6 +68,8 @@ Status read_description(const std::string& path, Reference& reference) {
         if (error >= 0) reference.regions[i] = {region.value("mean", reference.regions[i].mean), error * error};
     }
     return {};
+} catch (const nlohmann::json::exception&) {
+    return invalid_argument(path + " is damaged; make it and its image again by `lightloom reference`");
 }
 
 }  // namespace

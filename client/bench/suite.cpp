@@ -216,6 +216,8 @@ SuiteScene read_scene(const Json& json, const Common& inherited, const std::file
     scene.job.scene = resolved(file);
     scene.name = std::filesystem::path(file).stem().string();
     reader.read("name", scene.name);
+    if (scene.name.empty() || scene.name.find_first_of("/\\\n\t") != std::string::npos || scene.name.front() == '.')
+        reader.fail("name", "is a part of file names: no slashes or line breaks, and no dot at its beginning");
     reader.read("claim", scene.claim);
     reader.read("optional", scene.optional);
     reader.read("root", scene.job.reading.root);

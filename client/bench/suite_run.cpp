@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <set>
 
 #include "client/bench/measured_run.h"
 #include "client/bench/suite_clock.h"
@@ -56,7 +57,14 @@ class SuiteRun {
 
     Status begin();
     Status run_scene(const SuiteScene& scene, double later_weight);
-    SuiteResults results() && { return std::move(results_); }
+    /// Without the runs that the file holds of something else.
+    SuiteResults results() && {
+        std::erase_if(results_.lines, [&](const Json& line) {
+            const auto key = line.find("run");
+            return key != line.end() && !keys_.contains(key->get<std::string>());
+        });
+        return std::move(results_);
+    }
 
   private:
     /// What one seed of a scene may take, by the wall clock and by each run's own.
@@ -67,6 +75,8 @@ class SuiteRun {
     Status append(const Json& line);
     /// Appends a line that says what follows: only once something follows, so that a file without work to do stays as it is.
     void announce(Json line) { announced_.push_back(std::move(line)); }
+    /// kFailedPrecondition where the file holds a run of the same name that something else decided.
+    Status check_history(const BenchRun& run) const;
     Status run_seed(SceneBench& bench, uint64_t seed, const RunBudget& budget, const Deadline& deadline);
     Status finish(SceneBench& bench, MeasuredRun& run);
     Result<std::string> keep_image(const std::string& name, const RgbImage& image);
@@ -82,6 +92,7 @@ class SuiteRun {
     SuiteClock clock_;
     SuiteResults results_;
     std::vector<Json> announced_;
+    std::set<std::string> keys_;  ///< Of all runs that the suite asks for.
     size_t runs_total_ = 0, runs_done_ = 0;
 };
 
@@ -162,6 +173,22 @@ Status SuiteRun::run_scene(const SuiteScene& scene, double later_weight) {
     return suite_.share_iterations > 0 && options_.server.empty() ? measure_shares(bench) : Status();
 }
 
+Status SuiteRun::check_history(const BenchRun& run) const {
+    const Json wanted = run.line("run");
+    for (const auto& [key, line] : history_.done) {
+        const auto same = [&](const char* field) { return line.contains(field) && line[field] == wanted[field]; };
+        if (!same("scene") || !same("label") || !same("seed") || !same("budget")) continue;
+        for (const char* field : {"build", "threads", "server", "scene_digest", "reference_digest", "max_depth", "width", "height",
+                                  "parameters", "threshold_percent", "stop_after"}) {
+            const bool here = wanted.contains(field);
+            if (here == line.contains(field) && (!here || same(field))) continue;
+            return failed_precondition(options_.out + " holds " + run.algorithm.label + " seed " + std::to_string(run.seed) +
+                                       " with another " + field + "; give another name, so that no two kinds are mixed");
+        }
+    }
+    return {};
+}
+
 Status SuiteRun::run_seed(SceneBench& bench, uint64_t seed, const RunBudget& budget, const Deadline& deadline) {
     const std::function<bool()> out_of_time = [&] { return clock_.elapsed() >= deadline.wall; };
     const MeasuredRun::Append append_line = [&](const Json& line) { return append(line); };
@@ -186,10 +213,12 @@ Status SuiteRun::run_seed(SceneBench& bench, uint64_t seed, const RunBudget& bud
     };
     for (const AlgorithmChoice& algorithm : bench.scene().algorithms) {
         const BenchRun run = bench.run_of(algorithm, seed, budget);
+        keys_.insert(run.key());
         if (history_.done.contains(run.key())) {
             ++runs_done_;
             continue;
         }
+        LL_RETURN_IF_ERROR(check_history(run));
         auto render = bench.start(run, stop_);
         if (!render.ok()) return of_run(run, render.status());
         alive.push_back(std::make_unique<MeasuredRun>(run, *std::move(render), bench.reference()));

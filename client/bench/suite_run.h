@@ -12,7 +12,7 @@
 namespace lightloom::client {
 
 struct SuiteResults {
-    std::vector<Json> lines;           ///< All of the file that belong to finished runs, scenes and shares.
+    std::vector<Json> lines;           ///< All of the file but those of runs that the suite does not ask for.
     std::vector<std::string> skipped;  ///< Optional scenes that are not there.
 };
 

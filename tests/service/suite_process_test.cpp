@@ -109,6 +109,10 @@ TEST_F(SuiteProcess, KeepsToItsBudgetAndSaysWhatItCut) {
     arguments.push_back("--resume");
     ASSERT_EQ(run(arguments), 0) << output();
     EXPECT_EQ(count("r.jsonl", "run"), 12u);
+    std::vector<std::string> two_threads = arguments;
+    two_threads[5] = "2";
+    EXPECT_EQ(run(two_threads), 1) << output();
+    EXPECT_NE(output().find("holds path seed 1 with another threads"), std::string::npos) << output();
     std::string other = *read_file(path("suite.json"));
     other.replace(other.find("kill"), 4, "else");
     std::ofstream(path("suite.json"), std::ios::trunc) << other;

@@ -86,6 +86,7 @@ TEST(Suite, MistakesAreNamedInOneLine) {
         {with("\"path\", \"bdpt:heuristic=power\"", "\"path\", \"path:heuristic=balance\""), "twice"},
         {with("\"file\": \"rooms/a.pbrt\", ", ""), "scene 1 needs \"file\""},
         {with("\"name\": \"b\"", "\"name\": \"a\""), "two of the name a"},
+        {with("\"name\": \"b\"", "\"name\": \"../b\""), "part of file names"},
         {with("\"over\": \"bdpt:heuristic=power\"", "\"over\": \"bdpt\""), "speaks of bdpt"},
         {with(", \"at_least\": 3", ""), "needs \"at_least\" or \"at_most\""},
         {with("\"is_not\": \"biased\"", "\"is_not\": \"odd\""), "has to be one of"},
