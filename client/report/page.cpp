@@ -34,7 +34,8 @@ th,td{padding:.32rem .75rem;text-align:left;vertical-align:baseline;font-weight:
 th small,td small{white-space:nowrap}
 td.words small{white-space:normal}
 thead th{color:var(--soft);font-size:.85rem;line-height:1.25;vertical-align:bottom;border-bottom:1px solid var(--axis)}
-tbody th,tfoot th{white-space:nowrap}
+tbody th,tfoot th{overflow-wrap:anywhere;min-width:7.5rem;max-width:17rem}
+thead th{max-width:11rem;overflow-wrap:anywhere}
 tfoot>tr>*{border-top:1px solid var(--axis);border-bottom:0}
 tfoot th{font-weight:600}
 .n{text-align:right;white-space:nowrap}
@@ -53,7 +54,7 @@ td b{font-weight:600}
 figure{margin:0;min-width:0}
 .charts svg{display:block;width:100%;height:auto;max-width:560px;background:var(--ground)}
 figcaption{font-size:.85rem;line-height:1.4;padding:.3rem .2rem 0}
-.strip{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(46%,215px),1fr));gap:1rem .8rem}
+.strip{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(46%,180px),1fr));gap:1rem .8rem}
 .strip figure{max-width:400px}
 .strip img{display:block;width:100%;height:auto;background:#000;image-rendering:pixelated}
 .strip img+img{margin-top:3px}

@@ -72,6 +72,9 @@ Chip chip_of(const Stability& s) {
     return {"good", "✓", "sound", false};
 }
 
+/// False for a few seeds without any finding, of which a scene's table does not speak.
+bool says_something(const Stability& stability) { return stability.judged || chip_of(stability).needs_notice; }
+
 std::string chip_html(const Stability& stability) {
     const Chip chip = chip_of(stability);
     return "<span class=\"chip " + std::string(chip.kind) + "\">" + chip.symbol + " " + escaped_html(chip.word) + "</span>";
@@ -187,7 +190,8 @@ std::string scene_table(const Report& report, const Panel& panel) {
     for (const Series& series : panel.series) {
         prepared |= series.preparation >= kShown;
         tracked |= series.tracking.checkpoints > 0;
-        judged_any |= judged_of(report, panel, series.label) != nullptr;
+        const Judged* judged = judged_of(report, panel, series.label);
+        judged_any |= judged && says_something(judged->stability);
         marked |= !series.marks.empty();
     }
     std::string out =
@@ -219,7 +223,7 @@ std::string scene_table(const Report& report, const Panel& panel) {
         out += cell(std::to_string(series.runs.size()));
         if (judged_any) {
             const Judged* judged = judged_of(report, panel, series.label);
-            out += cell(judged ? chip_html(judged->stability) : "", "t");
+            out += cell(judged && says_something(judged->stability) ? chip_html(judged->stability) : "", "t");
         }
         if (marked) out += cell(escaped_html(joined(series.marks, "; ")), "t");
         out += "</tr>\n";
