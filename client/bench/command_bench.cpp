@@ -134,13 +134,14 @@ int bench(BenchOptions& options) {
         service.emplace(open_channel(options.suite.server), GrpcJobPortOptions{.stop = stop});
         options.suite.service = &*service;
     }
-    const auto results = run_suite(*suite, options.suite, stop);
-    if (service && results.status().code() == StatusCode::kUnavailable) {
-        return report_error({StatusCode::kUnavailable, "no answer from " + options.suite.server + " (" +
-                                                           results.status().message() + "); is lightloom-server running there?"});
-    }
-    if (!results.ok()) return report_error(results.status());
     try {
+        const auto results = run_suite(*suite, options.suite, stop);
+        if (service && results.status().code() == StatusCode::kUnavailable) {
+            return report_error({StatusCode::kUnavailable, "no answer from " + options.suite.server + " (" +
+                                                               results.status().message() +
+                                                               "); is lightloom-server running there?"});
+        }
+        if (!results.ok()) return report_error(results.status());
         const auto good = report(*suite, *results);
         if (!good.ok()) return report_error(good.status());
         return *good ? kSuccess : kFailure;

@@ -4,7 +4,9 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include "client/bench/measured_run.h"
 #include "client/bench/suite_clock.h"
@@ -33,16 +35,9 @@ Status of_scene(const SuiteScene& scene, const Status& status) {
     return {status.code(), "scene " + scene.name + ": " + status.message()};
 }
 
-double seconds_of_one_seed(const SuiteScene& scene) {
-    double sum = 0;
-    for (const RunBudget& budget : scene.budgets) sum += asked_seconds(budget, kTypicalSeconds);
-    return sum * double(scene.algorithms.size());
-}
-
-/// What a scene asks for, in seconds; weighs scenes against one another.
-double weight_of(const SuiteScene& scene) {
-    const double reference = scene.recipe && scene.reference.empty() ? asked_seconds(scene.recipe->budget, kTypicalSeconds) : 0;
-    return seconds_of_one_seed(scene) * scene.seeds + reference;
+/// What makes two lines speak of the same run of a suite, whatever else decides it.
+std::string name_of(const std::string& scene, const std::string& label, uint64_t seed, const Json& budget) {
+    return Json{scene, label, seed, budget}.dump();
 }
 
 class SuiteRun {
@@ -57,6 +52,8 @@ class SuiteRun {
 
     Status begin();
     Status run_scene(const SuiteScene& scene, double later_weight);
+    /// What is left to do of a scene, in seconds as they were asked for; weighs scenes against one another.
+    double weight_of(const SuiteScene& scene) const;
     /// Without the runs that the file holds of something else.
     SuiteResults results() && {
         std::erase_if(results_.lines, [&](const Json& line) {
@@ -78,6 +75,12 @@ class SuiteRun {
     /// kFailedPrecondition where the file holds a run of the same name that something else decided.
     Status check_history(const BenchRun& run) const;
     Status run_seed(SceneBench& bench, uint64_t seed, const RunBudget& budget, const Deadline& deadline);
+    /// Algorithms whose run with this seed and budget has not ended.
+    size_t unfinished(const SuiteScene& scene, uint64_t seed, const RunBudget& budget) const;
+    /// Seconds that seeds from number `first` up to `end` still need, the first one from budget number `first_budget` on.
+    double seconds_left(const SuiteScene& scene, uint32_t first, uint32_t end, size_t first_budget) const;
+    /// Within `end` of the suite's clock.
+    Deadline deadline_of(const SuiteScene& scene, uint32_t seeds, uint32_t seed, size_t budget, double end) const;
     Status finish(SceneBench& bench, MeasuredRun& run);
     Result<std::string> keep_image(const std::string& name, const RgbImage& image);
     Result<std::string> keep_reference(const SceneBench& bench);
@@ -91,8 +94,11 @@ class SuiteRun {
     std::stop_token stop_;
     SuiteClock clock_;
     SuiteResults results_;
+    std::optional<Json> start_;  ///< The line of this process, before anything else is appended.
     std::vector<Json> announced_;
-    std::set<std::string> keys_;  ///< Of all runs that the suite asks for.
+    std::set<std::string> keys_;      ///< Of all runs that the suite asks for.
+    std::set<std::string> finished_;  ///< Names of the runs that the file held at first,
+    std::set<std::string> begun_;     ///< and of their scenes.
     size_t runs_total_ = 0, runs_done_ = 0;
 };
 
@@ -103,30 +109,74 @@ Status SuiteRun::begin() {
         results_.lines.push_back(Json::parse(std::string_view(history_.kept).substr(begin, end - begin)));
         begin = end + 1;
     }
+    for (const auto& [key, line] : history_.done) {
+        const std::string scene = line.value("scene", std::string());
+        begun_.insert(scene);
+        finished_.insert(name_of(scene, line.value("label", std::string()), line.value("seed", uint64_t(0)),
+                                 line.value("budget", Json::object())));
+    }
     for (const SuiteScene& scene : suite_.scenes) runs_total_ += scene.seeds * scene.algorithms.size() * scene.budgets.size();
-    announce(start_line(suite_, {history_.suite_seconds, options_.budget, options_.threads, options_.server, kBuildId}));
+    start_ = start_line(suite_, {history_.suite_seconds, options_.budget, options_.threads, options_.server, kBuildId});
     return {};
 }
 
 Status SuiteRun::append(const Json& line) {
-    for (const Json& before : announced_) {
-        results_.lines.push_back(before);
-        LL_RETURN_IF_ERROR(writer_.append(before));
+    std::vector<Json> lines;
+    if (start_) lines.push_back(*std::exchange(start_, std::nullopt));
+    for (Json& before : std::exchange(announced_, {})) lines.push_back(std::move(before));
+    lines.push_back(line);
+    for (const Json& next : lines) {
+        results_.lines.push_back(next);
+        LL_RETURN_IF_ERROR(writer_.append(next));
     }
-    announced_.clear();
-    results_.lines.push_back(line);
-    return writer_.append(line);
+    return {};
+}
+
+size_t SuiteRun::unfinished(const SuiteScene& scene, uint64_t seed, const RunBudget& budget) const {
+    return size_t(std::count_if(scene.algorithms.begin(), scene.algorithms.end(), [&](const AlgorithmChoice& algorithm) {
+        return !finished_.contains(name_of(scene.name, algorithm.label, seed, budget.json()));
+    }));
+}
+
+double SuiteRun::seconds_left(const SuiteScene& scene, uint32_t first, uint32_t end, size_t first_budget) const {
+    double sum = 0;
+    for (uint32_t i = first; i < end; ++i) {
+        for (size_t b = i == first ? first_budget : 0; b < scene.budgets.size(); ++b)
+            sum +=
+                double(unfinished(scene, scene.job.seed + i, scene.budgets[b])) * asked_seconds(scene.budgets[b], kTypicalSeconds);
+    }
+    return sum;
+}
+
+double SuiteRun::weight_of(const SuiteScene& scene) const {
+    if (scene.optional && is_missing(scene.job.scene)) return 0;
+    const double runs = seconds_left(scene, 0, scene.seeds, 0);
+    // A scene that was begun has its reference.
+    const bool makes_reference = scene.recipe && scene.reference.empty() && !begun_.contains(scene.name);
+    return runs + (makes_reference ? asked_seconds(scene.recipe->budget, kTypicalSeconds) : 0);
+}
+
+SuiteRun::Deadline SuiteRun::deadline_of(const SuiteScene& scene, uint32_t seeds, uint32_t seed, size_t budget, double end) const {
+    Deadline deadline{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+    const size_t runs = unfinished(scene, scene.job.seed + seed, scene.budgets[budget]);
+    if (!clock_.limited() || runs == 0) return deadline;
+    // Each seed gets its part of what is left: what one saves, the next ones have.
+    const double asked = asked_seconds(scene.budgets[budget], kTypicalSeconds) * double(runs);
+    const double wall = std::max(0.0, end - clock_.elapsed()) * asked / seconds_left(scene, seed, seeds, budget);
+    return {clock_.elapsed() + wall, wall * kRenderShare / double(runs)};
 }
 
 Status SuiteRun::run_scene(const SuiteScene& scene, double later_weight) {
+    const size_t runs_of_one_seed = scene.algorithms.size() * scene.budgets.size();
     if (scene.optional && is_missing(scene.job.scene)) {
         results_.skipped.push_back(scene.name);
         if (!options_.quiet) std::fprintf(stderr, "%s: skipped, %s is not there\n", scene.name.c_str(), scene.job.scene.c_str());
-        runs_total_ -= scene.seeds * scene.algorithms.size() * scene.budgets.size();
+        runs_total_ -= scene.seeds * runs_of_one_seed;
         return {};
     }
+    announced_.clear();  // of a scene in which nothing was left to do
     const double weight = weight_of(scene);
-    const double share = clock_.left() * weight / (weight + later_weight);
+    const double share = weight > 0 ? clock_.left() * weight / (weight + later_weight) : 0;
     const double end = clock_.elapsed() + share;
     auto opened = SceneBench::open(scene, suite_, options_, share * kReferenceShare, stop_);
     if (!opened.ok()) return opened.status();
@@ -138,34 +188,24 @@ Status SuiteRun::run_scene(const SuiteScene& scene, double later_weight) {
     if (!bench.cut_of_reference().empty()) announce(cut_line(scene.name, bench.cut_of_reference()));
 
     uint32_t seeds = scene.seeds;
-    if (clock_.limited()) {
+    if (clock_.limited() && weight > 0) {
         const double left = std::max(0.0, end - clock_.elapsed()) * kRenderShare;
-        seeds = seeds_within(left, scene.seeds, seconds_of_one_seed(scene), suite_.stability);
+        seeds = seeds_within(left, scene.seeds, seconds_left(scene, 0, scene.seeds, 0) / scene.seeds, suite_.stability);
         if (seeds < scene.seeds) {
-            runs_total_ -= (scene.seeds - seeds) * scene.algorithms.size() * scene.budgets.size();
-            LL_RETURN_IF_ERROR(
-                append(cut_line(scene.name, "seeds " + std::to_string(scene.seeds) + " -> " + std::to_string(seeds))));
+            runs_total_ -= (scene.seeds - seeds) * runs_of_one_seed;
+            announce(cut_line(scene.name, "seeds " + std::to_string(scene.seeds) + " -> " + std::to_string(seeds)));
         }
     }
     bool said = false;
     for (uint32_t i = 0; i < seeds; ++i) {
         for (size_t b = 0; b < scene.budgets.size(); ++b) {
             const RunBudget& budget = scene.budgets[b];
-            Deadline deadline{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
-            if (clock_.limited()) {
-                // Each seed gets its part of what is left: what one saves, the next ones have.
-                double ahead = 0;
-                for (size_t later = b; later < scene.budgets.size(); ++later)
-                    ahead += asked_seconds(scene.budgets[later], kTypicalSeconds);
-                ahead += double(seeds - i - 1) * seconds_of_one_seed(scene) / double(scene.algorithms.size());
-                const double wall = std::max(0.0, end - clock_.elapsed()) * asked_seconds(budget, kTypicalSeconds) / ahead;
-                deadline = {clock_.elapsed() + wall, wall * kRenderShare / double(scene.algorithms.size())};
-                if (!said && budget.seconds > deadline.cap) {
-                    char text[96];
-                    std::snprintf(text, sizeof text, "time of each run %.4g -> %.3g s", budget.seconds, deadline.cap);
-                    announce(cut_line(scene.name, text));
-                    said = true;
-                }
+            const Deadline deadline = deadline_of(scene, seeds, i, b, end);
+            if (!said && budget.seconds > deadline.cap) {
+                char text[96];
+                std::snprintf(text, sizeof text, "time of each run %.4g -> %.3g s", budget.seconds, deadline.cap);
+                announce(cut_line(scene.name, text));
+                said = true;
             }
             LL_RETURN_IF_ERROR(run_seed(bench, scene.job.seed + i, budget, deadline));
         }
@@ -317,9 +357,9 @@ Result<SuiteResults> measure(const Suite& suite, const SuiteOptions& options, Be
     SuiteRun run(suite, options, std::move(writer), *std::move(history), stop);
     LL_RETURN_IF_ERROR(run.begin());
     double later = 0;
-    for (const SuiteScene& scene : suite.scenes) later += weight_of(scene);
+    for (const SuiteScene& scene : suite.scenes) later += run.weight_of(scene);
     for (const SuiteScene& scene : suite.scenes) {
-        later -= weight_of(scene);
+        later -= run.weight_of(scene);
         const Status status = run.run_scene(scene, std::max(0.0, later));
         if (status.code() == StatusCode::kCancelled)
             return Status(StatusCode::kCancelled,

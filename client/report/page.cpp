@@ -85,7 +85,7 @@ thead th{font-size:7.5pt}
 tbody th{white-space:normal}
 .words{min-width:0;max-width:none}
 .charts{grid-template-columns:1fr 1fr;gap:4mm 5mm}
-.strip{grid-template-columns:repeat(5,1fr);gap:3mm}
+.strip{grid-template-columns:repeat(6,1fr);gap:2.5mm}
 figcaption{font-size:8pt}
 figure,tr{break-inside:avoid}
 h2,h3{break-after:avoid}

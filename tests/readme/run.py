@@ -41,7 +41,7 @@ RULES = [
     (r"--time [\d.]+", "--time 0.5", "half a second instead of minutes"),
     (r"--cross-time [\d.]+", "--cross-time 0.5", "the same for a cross-check"),
     (r"--spp \d+", "--spp 1", "one sample per pixel"),
-    (r"^(?!.*--(?:spp|time|pyramid|help)\b)((?:.*[( ])?(?:\S+/)?lightloom (?:render|submit)\b)", r"\1 --spp 1",
+    (r"^(?!.*--(?:spp|time|pyramid|noise|help)\b)((?:.*[( ])?(?:\S+/)?lightloom (?:render|submit)\b)", r"\1 --spp 1",
      "also where the scene asks for more"),
     (r"(lightloom reference\b.*)--time 0\.5\b", r"\1--spp 20", "as many samples as a cross-check needs at least"),
     (r"--seeds \d+", "--seeds 1", "one run of each algorithm"),
