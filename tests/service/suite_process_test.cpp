@@ -32,7 +32,7 @@ class SuiteProcess : public ::testing::Test {
         const std::string scenes = std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/";
         std::ofstream(path("suite.json"))
             << R"({"suite": "kill", "resolution": "24x18", "seeds": 3, "share_iterations": 1, "budgets": )" << budgets
-            << R"(, "algorithms": ["path", "spcbpt:training-paths=1000"], "tables": "shared",
+            << R"(, "algorithms": ["path", "spcbpt:training-paths=1000:cache=500"], "tables": "shared",
                    "reference": {"algorithm": "bdpt", "samples": 64}, "scenes": [{"file": ")"
             << scenes << R"(cornell.pbrt")" << more << R"(}, {"file": ")" << scenes
             << R"(ceiling-lamp.pbrt"}, {"file": "not-there.pbrt", "optional": true}]})";
