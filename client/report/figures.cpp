@@ -62,6 +62,12 @@ void set_interval(SpeedUp* out) {
 
 }  // namespace
 
+std::string formatted(const char* format, double value) {
+    char text[64];
+    std::snprintf(text, sizeof text, format, value);
+    return text;
+}
+
 double median(std::vector<double> values) {
     if (values.empty()) return kNaN;
     const size_t half = values.size() / 2;

@@ -10,12 +10,6 @@ namespace {
 constexpr double kNearFloor = 4;  ///< As the bench marks checkpoints: relMSE below so many times the reference's noise.
 constexpr double kTracked = 1.5, kOctaves = 3;
 
-std::string formatted(const char* format, double value) {
-    char text[64];
-    std::snprintf(text, sizeof text, format, value);
-    return text;
-}
-
 Curve curve_of(const Run& run, const SceneInfo& scene, bool time) {
     Curve curve;
     for (const Checkpoint& point : run.curve) {

@@ -27,12 +27,6 @@ constexpr std::array<Style, 8> kStyles{{{7, "1", "●"},
                                         {6, "(6,2,2,2,2,2)", "○"},
                                         {4, "(1,3)", "□"}}};
 
-std::string formatted(const char* format, double value) {
-    char text[64];
-    std::snprintf(text, sizeof text, format, value);
-    return text;
-}
-
 constexpr size_t kNameLength = 13;  ///< Characters that stand beside a chart.
 
 /// Whether a name takes two lines.
