@@ -5,6 +5,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "client/bench/numbers.h"
 #include "common/core/atomic_file.h"
 #include "common/core/digest.h"
 #include "common/metrics/metrics.h"
@@ -12,11 +13,7 @@
 namespace lightloom::client {
 namespace {
 
-std::string percent(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.3g %%", value);
-    return text;
-}
+std::string percent(double value) { return formatted("%.3g %%", value); }
 
 /// The variance layer where there is one that fits.
 const std::vector<float>* variance_of(const ExrImage& reference) {

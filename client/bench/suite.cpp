@@ -5,18 +5,13 @@
 #include <set>
 #include <span>
 
+#include "client/bench/numbers.h"
 #include "common/core/atomic_file.h"
 #include "common/core/digest.h"
 #include "common/core/nearest.h"
 
 namespace lightloom::client {
 namespace {
-
-std::string number_text(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.4g", value);
-    return text;
-}
 
 /// An object of the file, which names itself in errors and refuses what nobody reads.
 class Reader {
@@ -46,7 +41,7 @@ class Reader {
         const Json* value = find(key);
         if (!value) return;
         if (!value->is_number() || !(value->get<double>() >= low && value->get<double>() <= high))
-            return fail(key, "has to be a number from " + number_text(low) + " to " + number_text(high));
+            return fail(key, "has to be a number from " + formatted("%.4g", low) + " to " + formatted("%.4g", high));
         out = value->get<double>();
     }
     template <class Integer>
@@ -261,7 +256,7 @@ Json RunBudget::json() const {
 
 std::string RunBudget::text() const {
     std::string text = samples > 0 ? std::to_string(samples) + " spp" : "";
-    if (seconds > 0) text.append(text.empty() ? "" : ", ").append(number_text(seconds)).append(" s");
+    if (seconds > 0) text.append(text.empty() ? "" : ", ").append(formatted("%.4g", seconds)).append(" s");
     return text;
 }
 
@@ -269,8 +264,8 @@ std::string Expectation::text() const {
     if (kind == Kind::kVerdict) return "verdict of " + algorithm + (negated ? " is not \"" : " is \"") + word + "\"";
     std::string text = kind == Kind::kMeanRatio ? "mean of " + algorithm + " over the reference's"
                                                 : "relMSE of " + algorithm + (other.empty() ? "" : " over that of " + other);
-    if (low > -HUGE_VAL) text += " is at least " + number_text(low);
-    if (high < HUGE_VAL) text += (low > -HUGE_VAL ? " and at most " : " is at most ") + number_text(high);
+    if (low > -HUGE_VAL) text += " is at least " + formatted("%.4g", low);
+    if (high < HUGE_VAL) text += (low > -HUGE_VAL ? " and at most " : " is at most ") + formatted("%.4g", high);
     return text;
 }
 

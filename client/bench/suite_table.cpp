@@ -4,23 +4,12 @@
 #include <cmath>
 #include <map>
 
+#include "client/bench/numbers.h"
 #include "client/bench/verdicts.h"
 #include "client/text_table.h"
 
 namespace lightloom::client {
 namespace {
-
-std::string number_text(const char* format, double value) {
-    char text[48];
-    std::snprintf(text, sizeof text, format, value);
-    return text;
-}
-
-double median(std::vector<double> values) {
-    std::sort(values.begin(), values.end());
-    const size_t middle = values.size() / 2;
-    return values.size() % 2 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
-}
 
 /// Values of a field over the runs of (scene, label, budget), in the order in which these appear.
 struct Runs {
@@ -107,7 +96,7 @@ Outcome judge(const Expectation& e, const std::string& scene, const std::vector<
     const double value = value_of(e.algorithm) / (e.other.empty() ? 1 : value_of(e.other));
     if (!std::isfinite(value)) return outcome;
     outcome.kind = value >= e.low && value <= e.high ? Outcome::Kind::kHolds : Outcome::Kind::kFails;
-    outcome.found = number_text("%.4g", value);
+    outcome.found = formatted("%.4g", value);
     return outcome;
 }
 
@@ -122,9 +111,9 @@ std::string suite_table(std::span<const Json> lines) {
         if (runs.any("near_floor")) note = "as small as the reference's own error";
         if (runs.any("cut")) note.append(note.empty() ? "" : "; ").append("cut by --budget");
         rows.push_back({runs.scene, runs.label, runs.budget.text(), std::to_string(runs.lines.size()),
-                        number_text("%.0f", median(runs.of("iterations"))), number_text("%.2f", median(runs.of("seconds"))),
-                        number_text("%.2f", median(runs.of("preparation_seconds"))), number_text("%.4g", median(errors)),
-                        errors.size() < 2 ? "" : number_text("%.2g", standard_error(errors)), note});
+                        formatted("%.0f", median(runs.of("iterations"))), formatted("%.2f", median(runs.of("seconds"))),
+                        formatted("%.2f", median(runs.of("preparation_seconds"))), formatted("%.4g", median(errors)),
+                        errors.size() < 2 ? "" : formatted("%.2g", standard_error(errors)), note});
     }
     return text_table(rows);
 }

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "client/bench/numbers.h"
 #include "client/text_table.h"
 
 namespace lightloom::client {
@@ -140,17 +141,12 @@ Status judge_row(const std::vector<StabilityRun>& runs, const Results& results, 
     return {};
 }
 
-std::string format(const char* pattern, double value) {
-    char buffer[64];
-    std::snprintf(buffer, sizeof buffer, pattern, value);
-    return buffer;
-}
-std::string percent(double share) { return format("%.3g %%", 100 * share); }
+std::string share_text(double share) { return formatted("%.3g %%", 100 * share); }
 
 std::string budget_text(const Json& budget) {
     std::string words;
     for (const auto& [unit, amount] : budget.items())
-        words += (words.empty() ? "" : ", ") + (amount.is_number() ? format("%g", amount) : amount.dump()) + " " + unit;
+        words += (words.empty() ? "" : ", ") + (amount.is_number() ? formatted("%g", amount) : amount.dump()) + " " + unit;
     return words;
 }
 
@@ -193,9 +189,9 @@ std::string verdict_table(std::span<const Judged> judged) {
         const Stability& s = row.stability;
         const double light = s.regions[0].ratio;
         rows.push_back({cell(row.scene, 24), cell(row.label, 32), budget_text(row.budget), std::to_string(s.seeds),
-                        format("%.3g", s.error.mean), s.seeds > 1 ? percent(s.variation) : "-",
-                        s.slope ? format("%.2f", s.slope->mean) : "-", percent(s.rising), format("%.3g", s.firefly_count.mean),
-                        std::isfinite(light) ? percent(light) : "-", s.verdict});
+                        formatted("%.3g", s.error.mean), s.seeds > 1 ? share_text(s.variation) : "-",
+                        s.slope ? formatted("%.2f", s.slope->mean) : "-", share_text(s.rising),
+                        formatted("%.3g", s.firefly_count.mean), std::isfinite(light) ? share_text(light) : "-", s.verdict});
     }
     return text_table(rows);
 }

@@ -62,21 +62,6 @@ void set_interval(SpeedUp* out) {
 
 }  // namespace
 
-std::string formatted(const char* format, double value) {
-    char text[64];
-    std::snprintf(text, sizeof text, format, value);
-    return text;
-}
-
-double median(std::vector<double> values) {
-    if (values.empty()) return kNaN;
-    const size_t half = values.size() / 2;
-    std::nth_element(values.begin(), values.begin() + ptrdiff_t(half), values.end());
-    const double upper = values[half];
-    if (values.size() % 2 == 1) return upper;
-    return (*std::max_element(values.begin(), values.begin() + ptrdiff_t(half)) + upper) / 2;
-}
-
 std::optional<double> median_error(const std::vector<double>& values) {
     if (values.size() < 2) return std::nullopt;
     constexpr int kDraws = 2000;

@@ -8,14 +8,10 @@
 #include <vector>
 
 #include "client/bench/error_curve.h"
+#include "client/bench/numbers.h"
 
 namespace lightloom::client::report {
 
-/// The number as printf() writes it.
-std::string formatted(const char* format, double value);
-
-/// The middle of the values in order, or the mean of the middle two; NaN of none.
-double median(std::vector<double> values);
 /// Standard deviation of the median of as many values drawn from these with replacement (2000 draws that are the same every time);
 /// nothing for fewer than two values.
 std::optional<double> median_error(const std::vector<double>& values);
