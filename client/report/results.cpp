@@ -199,6 +199,7 @@ class Reader {
                 break;
             }
             if (json.is_discarded() || !json.is_object()) return refuse("this is no line of JSON: remove it, or measure again");
+            tell_apart(json);
             LL_RETURN_IF_ERROR(add(json));
             results_->lines.push_back(std::move(json));
         }
@@ -213,6 +214,24 @@ class Reader {
     }
     void note(const std::string& what) { results_->notes.push_back(name_ + ":" + what); }
     std::string image(const std::string& file) const { return file.empty() ? "" : (images_ / file).string(); }
+
+    /// Two suites may measure a scene of one name by different references. The later one's has the suite's name behind it then.
+    void tell_apart(Json& json) {
+        const auto text = [&](const char* key) {
+            const auto found = json.find(key);
+            return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
+        };
+        if (text("type") == "start") suite_ = text("suite");
+        const std::string scene = text("scene");
+        if (scene.empty()) return;
+        if (text("type") == "scene" && !here_.contains(scene) && !renamed_.contains(scene)) {
+            const SceneInfo* known = results_->scene(scene);
+            const bool same =
+                !known || (known->digest == text("scene_digest") && known->reference_digest == text("reference_digest"));
+            if (!same && !suite_.empty()) renamed_[scene] = scene + " (" + suite_ + ")";
+        }
+        if (const auto found = renamed_.find(scene); found != renamed_.end()) json["scene"] = found->second;
+    }
 
     Status add(const Json& json) {
         Fields fields(json, "this line");
@@ -297,6 +316,8 @@ class Reader {
     std::set<std::string> earlier_, here_;  ///< Finished runs; scenes of this file.
     std::map<std::string, std::vector<Checkpoint>> open_;
     std::map<std::string, std::string> unfinished_;
+    std::string suite_;                           ///< Of the last "start" line.
+    std::map<std::string, std::string> renamed_;  ///< Scenes of this file, see tell_apart().
 };
 
 }  // namespace

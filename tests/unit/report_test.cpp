@@ -287,7 +287,12 @@ TEST(Results, OfSeveralFilesBelongToTheSameScenes) {
               std::string::npos);
     BenchLine other = scene_line("slit", 0);
     other["scene_digest"] = "another";
-    EXPECT_NE(add_results(file(MadeRun{"slit", "light"}, other), "c.jsonl", &results).message().find("c.jsonl:2: scene \"slit\""),
+    ASSERT_TRUE(add_results(file(MadeRun{"slit", "light"}, other), "c.jsonl", &results).ok());
+    ASSERT_EQ(results.scenes.size(), 2u) << "another scene of the same name";
+    EXPECT_EQ(results.scenes[1].name, "slit (made-up)");
+    EXPECT_EQ(results.runs.back().scene, "slit (made-up)");
+    other["scene_digest"] = "a third";
+    EXPECT_NE(add_results(file(MadeRun{"slit", "lvcbpt"}, other), "d.jsonl", &results).message().find("d.jsonl:2: scene \"slit"),
               std::string::npos);
     EXPECT_FALSE(read_results(std::vector<std::string>{"/nowhere.jsonl"}).ok());
 }
