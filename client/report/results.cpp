@@ -260,9 +260,10 @@ class Reader {
             results_->techniques.push_back(std::move(techniques));
         } else if (type == "cut") {
             Cut cut{fields.maybe_text("scene"), fields.text("what")};
-            const bool known = std::any_of(results_->cuts.begin(), results_->cuts.end(),
-                                           [&](const Cut& other) { return other.scene == cut.scene && other.what == cut.what; });
-            if (!known) results_->cuts.push_back(std::move(cut));
+            // A process that goes on with a suite cuts the same again by another amount, which holds for what was left to do.
+            const auto thing = [](const Cut& of) { return of.scene + "\n" + of.what.substr(0, of.what.find("->")); };
+            std::erase_if(results_->cuts, [&](const Cut& other) { return thing(other) == thing(cut); });
+            results_->cuts.push_back(std::move(cut));
         }  // Types that a later program adds do not change what these say.
         return fields.fault().empty() ? Status::ok_status() : refuse(fields.fault());
     }
