@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 
 #include "client/bench/reference_maker.h"
 #include "client/bench/service_render.h"
-#include "client/bench/suite_clock.h"
 #include "client/bench/technique_shares.h"
 #include "client/output_files.h"
 #include "client/run_job.h"
@@ -112,12 +112,13 @@ Status SceneBench::make_missing_reference(const std::string& path, double second
     spec.seed = recipe.seed;
     spec.samples_per_pixel = uint32_t(recipe.budget.samples);
     spec.time_limit_seconds = recipe.budget.seconds;
-    const double asked = asked_seconds(recipe.budget, seconds);
-    if (asked > seconds) {
-        spec.time_limit_seconds = seconds;
+    // Even where nothing is left of the budget there has to be a bound, and something to measure by.
+    const double most = std::max(seconds, 0.2);
+    if (std::isfinite(most) && (recipe.budget.seconds <= 0 || recipe.budget.seconds > most)) {
+        spec.time_limit_seconds = most;
         char text[96];
-        std::snprintf(text, sizeof text, "time of the reference %.4g -> %.3g s", asked, seconds);
-        cut_of_reference_ = text;
+        std::snprintf(text, sizeof text, "time of the reference %.4g -> %.3g s", recipe.budget.seconds, most);
+        if (recipe.budget.seconds > 0) cut_of_reference_ = text;
     }
     if (!options_.quiet) {
         std::fprintf(stderr, "%s: makes a reference by %s, %s\n", scene_.name.c_str(), recipe.algorithm.label.c_str(),
@@ -129,7 +130,10 @@ Status SceneBench::make_missing_reference(const std::string& path, double second
         return cached_preparation(*built_.scene, job, options_.cache, true, stop);
     };
     const auto made = make_reference(built_.scene, spec, scene_.job.scene, options_.threads, tables, true, stop);
-    return made.ok() ? write_reference(*made, path) : made.status();
+    if (!made.ok()) return made.status();
+    if (const uint64_t samples = made->render.iterations(); samples < recipe.budget.samples)
+        cut_of_reference_ = "samples of the reference " + std::to_string(recipe.budget.samples) + " -> " + std::to_string(samples);
+    return write_reference(*made, path);
 }
 
 std::string SceneBench::tables_word(const AlgorithmChoice& algorithm) const {

@@ -288,7 +288,7 @@ TEST_F(CommandLine, ChoicesHaveNamesInManifestsAndNumbersInImages) {
 TEST_F(CommandLine, HelpIsThereForEveryCommand) {
     const std::string all = run({"--help"}).output;
     for (const char* command : {"render", "submit", "watch", "fetch", "cancel", "list", "inspect", "compare", "algorithms",
-                                "replay", "bench", "reference"}) {
+                                "replay", "bench", "report", "reference"}) {
         EXPECT_NE(all.find(std::string("\n  ").append(command)), std::string::npos) << all;
         const Run help = run({command, "--help"});
         EXPECT_EQ(help.exit_code, 0);

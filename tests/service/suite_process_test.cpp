@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -120,6 +121,17 @@ TEST_F(SuiteProcess, KeepsToItsBudgetAndSaysWhatItCut) {
     EXPECT_NE(output().find("holds results of the suite kill"), std::string::npos) << output();
 }
 
+TEST_F(SuiteProcess, EndsWhereTheBudgetIsGoneBeforeAReferenceIsMade) {
+    write_suite(R"({"seconds": 1})");
+    std::string suite = *read_file(path("suite.json"));
+    suite.replace(suite.find("\"samples\": 64"), 13, "\"seconds\": 900");
+    std::ofstream(path("suite.json"), std::ios::trunc) << suite;
+    const std::vector<std::string> arguments{"bench", path("suite.json"), "-o", path("r.jsonl"), "-t", "1", "--budget", "1s"};
+    ASSERT_EQ(run(arguments), 0) << output();
+    EXPECT_EQ(count("r.jsonl", "run"), 12u);
+    EXPECT_NE(output().find("ceiling-lamp: time of the reference 900 -> 0.2"), std::string::npos) << output();
+}
+
 TEST_F(SuiteProcess, ExpectationsDecideTheExitCode) {
     write_suite(R"({"samples": 8})", R"(, "expect": [{"error": "path", "at_most": 100}])");
     ASSERT_EQ(run({"bench", path("suite.json"), "-o", path("a.jsonl"), "-q"}), 0) << output();
@@ -151,6 +163,31 @@ TEST_F(SuiteProcess, StabilityGivesVerdicts) {
     EXPECT_EQ(count("r.jsonl", "run"), 80u) << "20 seeds";
     EXPECT_NE(output().find("VERDICT"), std::string::npos) << output();
     EXPECT_NE(output().find("holds: cornell: verdict of path is not \"biased\""), std::string::npos) << output();
+}
+
+TEST_F(SuiteProcess, ResultsBecomeOnePage) {
+    write_suite(R"({"samples": 4})");
+    ASSERT_EQ(run({"bench", path("suite.json"), "-o", path("r.jsonl"), "-q"}), 0) << output();
+    const std::string old_path = std::getenv("PATH");
+    ::setenv("PATH", "/no/such/folder", 1);
+    EXPECT_EQ(run({"report", path("r.jsonl"), "-o", path("r.html")}), 2) << output();
+    ::setenv("PATH", old_path.c_str(), 1);
+    EXPECT_NE(output().find("gnuplot"), std::string::npos) << output();
+    EXPECT_EQ(std::ranges::count(output(), '\n'), 1) << output();
+    EXPECT_FALSE(std::filesystem::exists(path("r.html")));
+    if (run({"report", path("r.jsonl"), "-o", path("r.html"), "--svg", path("charts")}) != 0) {
+        ASSERT_NE(output().find("gnuplot"), std::string::npos) << output();
+        GTEST_SKIP() << output();
+    }
+    EXPECT_NE(read_file(path("r.html"))->find("<svg"), std::string::npos);
+    EXPECT_TRUE(std::filesystem::exists(path("charts/cornell-error-time.svg")));
+    // Half a line in the middle is an error, at the end it is what a kill left.
+    std::ofstream(path("r.jsonl"), std::ios::app) << "{\"type\":\"che";
+    EXPECT_EQ(run({"report", path("r.jsonl"), "-o", path("torn.html")}), 0) << output();
+    std::ofstream(path("r.jsonl"), std::ios::app) << "\n{\"type\":\"start\"}\n";
+    EXPECT_EQ(run({"report", path("r.jsonl"), "-o", path("bad.html")}), 2) << output();
+    EXPECT_NE(output().find("r.jsonl:"), std::string::npos) << output();
+    EXPECT_FALSE(std::filesystem::exists(path("bad.html")));
 }
 
 TEST_F(SuiteProcess, BadInputIsOneClearLine) {
