@@ -171,7 +171,9 @@ std::vector<cli::Option> add_single_scene_options(cli::App command, BenchOptions
                       ->type_name("N")
                       ->capture_default_str()
                       ->check(whole_number_between(1, 1000)));
-    own.push_back(command->add_option("--seed", options.scene.seed, "Seed of the first run; the others have the next ones")
+    own.push_back(command
+                      ->add_option("--seed", options.scene.seed,
+                                   "Seed of the first run; the others have the next ones. None may be the reference's")
                       ->type_name("N")
                       ->capture_default_str()
                       ->check(whole_number()));
@@ -202,6 +204,7 @@ std::vector<cli::Option> add_single_scene_options(cli::App command, BenchOptions
 
 void add_bench_command(cli::App app, int* exit_code) {
     auto options = std::make_shared<BenchOptions>();
+    options->scene.seed = 1;  // that of a reference is 0, and both must not have the same random numbers
     SuiteOptions& suite = options->suite;
     const cli::App command = app.add_subcommand("bench", "Measure error against time, of a suite or a scene, and judge stability");
     command->footer(kFooter);

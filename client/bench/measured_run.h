@@ -31,6 +31,8 @@ class MeasuredRun {
     };
     Status advance(const Turn& turn);
     bool ended() const { return ended_; }
+    /// Whether the suite ended it, and not its own bounds.
+    bool was_cut() const { return cut_; }
 
     const BenchRun& run() const { return run_; }
     RenderCost cost() const { return render_->cost(); }

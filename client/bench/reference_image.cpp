@@ -140,8 +140,14 @@ Result<std::vector<std::string>> check_reference(const std::string& name, const 
     }
     std::vector<std::string> warnings;
     const std::string digest = reference.attribute(exr_attribute::kScene), maker = reference.attribute(exr_attribute::kAlgorithm);
-    if (!digest.empty() && digest != subject.scene_digest)
+    if (!digest.empty() && digest != subject.scene_digest) {
+        if (subject.found) {
+            return invalid_argument(name +
+                                    " was made from another version of the scene's files; make it again, or name it to use "
+                                    "it all the same");
+        }
         warnings.push_back(name + " was made from another version of the scene's files");
+    }
     for (const AlgorithmChoice& algorithm : subject.algorithms) {
         if (algorithm.settings.info().name != maker) continue;
         warnings.push_back(name + " was made by \"" + maker + "\", which is also tested: a bias that it has does not show");

@@ -38,6 +38,7 @@ struct BenchSubject {
     std::string scene_digest;
     std::vector<AlgorithmChoice> algorithms;
     double threshold = 0;  ///< MAPE in percent; 0: none.
+    bool found = false;    ///< Nobody has named the reference: it lay beside the scene.
 };
 
 /// Refuses a reference that the runs cannot converge to (other frame, other path lengths, not finite), and a threshold that

@@ -32,14 +32,16 @@ bool has_no_locks(int error) { return error == ENOSYS || error == EOPNOTSUPP || 
 
 }  // namespace
 
-Result<BenchHistory> parse_history(std::string_view text, const std::string& file_name,
-                                   const std::function<bool(const Json&)>& again) {
+Result<BenchHistory> parse_history(std::string_view text, const std::string& file_name) {
     struct Line {
         std::string run;  ///< Key; empty for a line that belongs to none.
+        int before = 0;   ///< Last lines of that key before this one.
         std::string_view text;
     };
     BenchHistory history;
     std::vector<Line> lines;
+    std::map<std::string, int> ends;            ///< Last lines by key.
+    std::map<std::string, std::string> key_of;  ///< Key of the last run that has ended, by its name.
     for (size_t begin = 0, number = 1; begin < text.size(); ++number) {
         const size_t newline = text.find('\n', begin);
         const bool whole = newline != std::string_view::npos;
@@ -75,15 +77,28 @@ Result<BenchHistory> parse_history(std::string_view text, const std::string& fil
         if (type == "run" || type == "checkpoint") {
             key = text_of("run");
             if (key.empty()) return bad("a run without a name");
-            if (type == "run" && !(again && again(json))) history.done[key] = std::move(json);
         }
-        lines.push_back({std::move(key), line});
+        lines.push_back({key, ends[key], line});
+        if (type != "run") continue;
+        ++ends[key];
+        key_of[name_of_run(json)] = key;
+        history.done[key] = std::move(json);
     }
-    for (const auto& [key, line] : lines) {
-        if (key.empty() || history.done.contains(key)) history.kept.append(line) += '\n';
+    std::erase_if(history.done, [&](const auto& run) { return key_of[name_of_run(run.second)] != run.first; });
+    for (const Line& line : lines) {
+        const bool last = history.done.contains(line.run) && line.before == ends[line.run] - 1;
+        if (line.run.empty() || last) history.kept.append(line.text) += '\n';
     }
     return history;
 }
+
+std::string name_of_run(const Json& line) {
+    Json name = Json::array();
+    for (const char* key : {"scene", "label", "seed", "budget"}) name.push_back(line.contains(key) ? line[key] : Json());
+    return line_text(name);
+}
+
+std::string line_text(const Json& line) { return line.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"; }
 
 Status exists_already(const std::string& path) {
     return invalid_argument(path + " exists; go on with it by --resume or give another name");
@@ -137,7 +152,7 @@ Status BenchWriter::replace(std::string_view content) {
 }
 
 Status BenchWriter::append(const Json& line) {
-    const std::string text = line.dump() + "\n";
+    const std::string text = line_text(line);
     if (std::fwrite(text.data(), 1, text.size(), file_.get()) == text.size() && std::fflush(file_.get()) == 0) return {};
     return {StatusCode::kResourceExhausted, cannot_be_written(path_, errno).message()};
 }

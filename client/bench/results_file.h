@@ -3,7 +3,6 @@
 // it is written so that a kill at any moment costs the unfinished runs and nothing else, and how it is gone on with.
 
 #include <cstdio>
-#include <functional>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -32,10 +31,15 @@ struct BenchHistory {
 };
 
 /// Reads the lines of an earlier, perhaps killed process. Checkpoints of runs that have no last line are left out, because those
-/// runs start again; so do finished ones of which `again` says so. The beginning of a line at the end of the file is ignored; any
-/// other line that is not one of a benchmark is an error that names it.
-Result<BenchHistory> parse_history(std::string_view text, const std::string& file_name,
-                                   const std::function<bool(const Json&)>& again = {});
+/// runs start again. Of a run that is there twice, as a kill may leave one that took another's place, the last one that has ended
+/// is kept. The beginning of a line at the end of the file is ignored; any other line that is not one of a benchmark is an error
+/// that names it.
+Result<BenchHistory> parse_history(std::string_view text, const std::string& file_name);
+
+/// What makes two lines speak of the same run of a suite, whatever else decides it: scene, label, seed and budget.
+std::string name_of_run(const Json& line);
+/// A line as the file has it, with its end. Text that is not UTF-8, as in a path, has replacement characters.
+std::string line_text(const Json& line);
 
 /// The error of a benchmark that would begin a file which is there.
 Status exists_already(const std::string& path);

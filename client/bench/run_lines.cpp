@@ -5,11 +5,11 @@
 #include <unistd.h>
 
 #include <cmath>
-#include <ctime>
 #include <fstream>
 
 #include "common/core/digest.h"
 #include "common/metrics/stability.h"
+#include "server/results.h"
 
 namespace lightloom::client {
 namespace {
@@ -31,15 +31,6 @@ Json machine_json() {
     utsname name{};
     if (::uname(&name) == 0) machine["system"] = std::string(name.sysname) + " " + name.release + " " + name.machine;
     return machine;
-}
-
-std::string utc_now() {
-    const std::time_t now = std::time(nullptr);
-    std::tm parts{};
-    gmtime_r(&now, &parts);
-    char text[32];
-    std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
-    return text;
 }
 
 template <class Value>
@@ -64,12 +55,13 @@ Json BenchRun::json() const {
               {"build", build}};
     if (threshold > 0) json["threshold_percent"] = threshold;
     if (stop_after >= 0) json["stop_after"] = stop_after;
-    if (!tables.empty()) json["tables"] = tables;
+    // A line says in "tables" what became of them in its run.
+    if (!tables.empty()) json["table_source"] = tables;
     if (!server.empty()) json["server"] = server;
     return json;
 }
 
-std::string BenchRun::key() const { return sha256(json().dump()).hex().substr(0, 16); }
+std::string BenchRun::key() const { return sha256(line_text(json())).hex().substr(0, 16); }
 
 Json BenchRun::line(const char* type) const {
     Json line{{"type", type}, {"run", key()}, {"label", algorithm.label}};
@@ -105,6 +97,7 @@ Json scene_line(const SuiteScene& scene, const BenchRun& run, const Reference& r
               {"claim", scene.claim},
               {"reference", reference.path},
               {"reference_digest", reference.digest},
+              {"reference_scene_digest", reference.image.attribute(exr_attribute::kScene)},
               {"reference_algorithm", reference.image.attribute(exr_attribute::kAlgorithm)}};
     const std::string samples = reference.image.attribute(exr_attribute::kSamples);
     if (!samples.empty()) line["reference_samples_per_pixel"] = std::strtoull(samples.c_str(), nullptr, 10);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 
 #include "client/bench/reference_maker.h"
@@ -11,6 +12,7 @@
 #include "client/bench/technique_shares.h"
 #include "client/output_files.h"
 #include "client/run_job.h"
+#include "common/core/atomic_file.h"
 #include "common/transport/rare_light.h"
 #include "common/work/identity.h"
 
@@ -26,6 +28,25 @@ void warn(const std::string& what) { std::fprintf(stderr, "lightloom: warning: %
 
 std::string frame_text(const FrameLayout& frame) { return std::to_string(frame.width) + "x" + std::to_string(frame.height); }
 
+/// Seconds of rendering that a reference took, by its description; 0 where it has none.
+double seconds_of(const std::string& exr_path) {
+    const auto text = read_file(description_path(exr_path));
+    const auto json = text.ok() ? nlohmann::ordered_json::parse(*text, nullptr, false) : nlohmann::ordered_json();
+    const auto seconds = json.is_object() ? json.find("seconds") : json.end();
+    return json.is_object() && seconds != json.end() && seconds->is_number() ? seconds->get<double>() : 0;
+}
+
+/// kInvalidArgument where a run would share its random numbers with the reference: they would agree by more than their means.
+Status check_seeds(const SuiteScene& scene, const Reference& reference) {
+    const std::string text = reference.image.attribute(exr_attribute::kSeed);
+    if (text.empty()) return {};
+    const uint64_t seed = std::strtoull(text.c_str(), nullptr, 10);
+    if (seed < scene.job.seed || seed - scene.job.seed >= scene.seeds) return {};
+    return invalid_argument(
+        reference.path + " was rendered with seed " + text +
+        ", which a run has, too, so that both would have the same random numbers; give the runs another first seed");
+}
+
 /// Pixel value of a unit of luminance.
 double exposure_of(const FilmResponse& response) {
     const FilmResponse::Triple grey = response.of(Rgb(1.0f));
@@ -40,7 +61,7 @@ std::string SuiteOptions::beside_results(const char* ending) const {
 }
 
 Result<std::unique_ptr<SceneBench>> SceneBench::open(const SuiteScene& scene, const Suite& suite, const SuiteOptions& options,
-                                                     double reference_seconds, std::stop_token stop) {
+                                                     const ReferenceBudget& budget, std::stop_token stop) {
     std::unique_ptr<SceneBench> bench(new SceneBench(scene, suite, options));
     JobOptions job = scene.job;
     job.quiet = true;
@@ -63,17 +84,19 @@ Result<std::unique_ptr<SceneBench>> SceneBench::open(const SuiteScene& scene, co
     });
     if (!built.ok()) return built.status();
     bench->built_ = *std::move(built);
-    if (!bench->reference_) LL_RETURN_IF_ERROR(bench->find_or_make_reference(reference_seconds, stop));
+    if (!bench->reference_) LL_RETURN_IF_ERROR(bench->find_or_make_reference(budget, stop));
+    LL_RETURN_IF_ERROR(check_seeds(scene, *bench->reference_));
     const JobSpec& spec = bench->built_.spec;
-    const auto warnings = check_reference(bench->reference_->path, bench->reference_->image,
-                                          {spec.frame, spec.max_depth, spec.scene_root.hex(), scene.algorithms, suite.threshold});
+    const auto warnings = check_reference(
+        bench->reference_->path, bench->reference_->image,
+        {spec.frame, spec.max_depth, spec.scene_root.hex(), scene.algorithms, suite.threshold, scene.reference.empty()});
     if (!warnings.ok()) return warnings.status();
     if (!options.quiet) std::for_each(warnings->begin(), warnings->end(), warn);
     if (options.service) LL_RETURN_IF_ERROR(upload_scene(*options.service, bench->built_.files));
     return bench;
 }
 
-Status SceneBench::find_or_make_reference(double seconds, std::stop_token stop) {
+Status SceneBench::find_or_make_reference(const ReferenceBudget& budget, std::stop_token stop) {
     const FrameLayout& frame = built_.spec.frame;
     const fs::path found = find_reference(scene_.job.scene, frame.width, frame.height);
     std::string path = found.string();
@@ -95,9 +118,23 @@ Status SceneBench::find_or_make_reference(double seconds, std::stop_token stop) 
         std::error_code error;
         fs::create_directories(directory, error);
         if (error) return invalid_argument(directory.string() + ": cannot be made: " + error.message());
-        path = (directory / (scene_.name + "-" + frame_text(frame) + "-" + sha256(identity.dump()).hex().substr(0, 12) + ".exr"))
-                   .string();
-        if (!fs::exists(path, error)) LL_RETURN_IF_ERROR(make_missing_reference(path, seconds, stop));
+        const std::string stem =
+            (directory / (scene_.name + "-" + frame_text(frame) + "-" + sha256(line_text(identity)).hex().substr(0, 12))).string();
+        const std::string whole = stem + ".exr", cut = stem + "-cut.exr";
+        // One that a budget cut serves within a budget, above all the runs that were measured by it. Without a budget it is made
+        // anew.
+        const bool has_cut = fs::exists(cut, error);
+        if (fs::exists(whole, error)) {
+            path = whole;
+            reference_was_remade_ = has_cut;
+        } else if (has_cut && std::isfinite(budget.seconds) && (budget.begun || seconds_of(cut) >= 0.5 * budget.seconds)) {
+            path = cut;
+        } else {
+            auto made = make_missing_reference(stem, budget.seconds, stop);
+            if (!made.ok()) return made.status();
+            path = *made;
+            reference_was_remade_ = has_cut;
+        }
     }
     auto reference = read_reference(path);
     if (!reference.ok()) return reference.status();
@@ -105,7 +142,7 @@ Status SceneBench::find_or_make_reference(double seconds, std::stop_token stop) 
     return {};
 }
 
-Status SceneBench::make_missing_reference(const std::string& path, double seconds, std::stop_token stop) {
+Result<std::string> SceneBench::make_missing_reference(const std::string& stem, double seconds, std::stop_token stop) {
     const ReferenceRecipe& recipe = *scene_.recipe;
     JobSpec spec = built_.spec;
     spec.algorithm = recipe.algorithm.settings;
@@ -133,7 +170,9 @@ Status SceneBench::make_missing_reference(const std::string& path, double second
     if (!made.ok()) return made.status();
     if (const uint64_t samples = made->render.iterations(); samples < recipe.budget.samples)
         cut_of_reference_ = "samples of the reference " + std::to_string(recipe.budget.samples) + " -> " + std::to_string(samples);
-    return write_reference(*made, path);
+    const std::string path = stem + (cut_of_reference_.empty() ? ".exr" : "-cut.exr");
+    if (Status status = write_reference(*made, path); !status.ok()) return status;
+    return path;
 }
 
 std::string SceneBench::tables_word(const AlgorithmChoice& algorithm) const {
@@ -170,7 +209,8 @@ JobSpec SceneBench::spec_of(const BenchRun& run) const {
 
 Result<Preparation> SceneBench::preparation_of(const BenchRun& run, std::stop_token stop) {
     const std::string& label = run.algorithm.label;
-    if (const auto found = shared_.find(label); found != shared_.end()) return found->second;
+    const bool is_first = suite_.shared_tables || run.seed == scene_.job.seed;
+    if (const auto found = first_.find(label); is_first && found != first_.end()) return found->second;
     JobSpec spec = spec_of(run);
     // Tables that several runs share are those of the scene's first seed, whichever run needs them first.
     if (suite_.shared_tables) spec.seed = scene_.job.seed;
@@ -178,7 +218,7 @@ Result<Preparation> SceneBench::preparation_of(const BenchRun& run, std::stop_to
     auto preparation = cached_preparation(*built_.scene, spec, options_.cache, silent, stop);
     if (!preparation.ok()) return preparation;
     if (!preparation->note.empty()) warn(label + ": " + preparation->note);
-    if (suite_.shared_tables) shared_.emplace(label, *preparation);
+    if (is_first) first_.emplace(label, *preparation);
     return preparation;
 }
 
@@ -197,7 +237,11 @@ Result<std::unique_ptr<MeasuredRender>> SceneBench::start(const BenchRun& run, s
     if (!render.ok()) return render.status();
     const std::string tables = run.tables.empty() || suite_.shared_tables ? run.tables : preparation->cached ? "cached" : "made";
     auto rare = rare_.find(run.algorithm.label);
-    if (rare == rare_.end()) rare = rare_.emplace(run.algorithm.label, estimate_rare_light(*built_.scene, settings, stop)).first;
+    if (rare == rare_.end()) {
+        const RareLight estimate = estimate_rare_light(*built_.scene, settings, stop);
+        if (stop.stop_requested()) return Status(StatusCode::kCancelled, "interrupted");
+        rare = rare_.emplace(run.algorithm.label, estimate).first;
+    }
     return std::unique_ptr<MeasuredRender>(
         std::make_unique<LocalRender>(*std::move(render), tables, rare->second, exposure_of(built_.response)));
 }

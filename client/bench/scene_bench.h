@@ -34,10 +34,14 @@ struct SuiteOptions {
 
 class SceneBench {
   public:
-    /// Reads and builds the scene and finds its reference; one that has to be made may take `reference_seconds`. Warnings go to
-    /// standard error.
+    /// What is known before a reference is made.
+    struct ReferenceBudget {
+        double seconds = 0;  ///< That it may take; infinite without a budget.
+        bool begun = false;  ///< Runs of the scene were measured already.
+    };
+    /// Reads and builds the scene and finds its reference, or makes it. Warnings go to standard error.
     static Result<std::unique_ptr<SceneBench>> open(const SuiteScene& scene, const Suite& suite, const SuiteOptions& options,
-                                                    double reference_seconds, std::stop_token stop);
+                                                    const ReferenceBudget& budget, std::stop_token stop);
 
     /// All that identifies a run.
     BenchRun run_of(const AlgorithmChoice& algorithm, uint64_t seed, const RunBudget& budget) const;
@@ -50,14 +54,17 @@ class SceneBench {
     const Reference& reference() const { return *reference_; }
     /// Where a reference was made, what --budget cut of it; empty otherwise.
     const std::string& cut_of_reference() const { return cut_of_reference_; }
+    /// A reference that a budget had cut was made anew: what was measured by it is measured again.
+    bool reference_was_remade() const { return reference_was_remade_; }
 
   private:
     SceneBench(const SuiteScene& scene, const Suite& suite, const SuiteOptions& options)
         : scene_(scene),
           suite_(suite),
           options_(options) {}
-    Status find_or_make_reference(double seconds, std::stop_token stop);
-    Status make_missing_reference(const std::string& path, double seconds, std::stop_token stop);
+    Status find_or_make_reference(const ReferenceBudget& budget, std::stop_token stop);
+    /// At PATH.exr, or at PATH-cut.exr where the budget ended it; returns which.
+    Result<std::string> make_missing_reference(const std::string& path, double seconds, std::stop_token stop);
     JobSpec spec_of(const BenchRun& run) const;
     Result<Preparation> preparation_of(const BenchRun& run, std::stop_token stop);
     std::string tables_word(const AlgorithmChoice& algorithm) const;
@@ -68,8 +75,9 @@ class SceneBench {
     BuiltJob built_;
     std::optional<Reference> reference_;
     std::string cut_of_reference_;
-    std::map<std::string, Preparation> shared_;  ///< By label.
-    std::map<std::string, RareLight> rare_;      ///< By label.
+    bool reference_was_remade_ = false;
+    std::map<std::string, Preparation> first_;  ///< Of the first seed, by label: of all seeds where they share.
+    std::map<std::string, RareLight> rare_;     ///< By label.
 };
 
 }  // namespace lightloom::client

@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
-#include <optional>
 #include <set>
 #include <utility>
 
 #include "client/bench/measured_run.h"
+#include "client/bench/results_book.h"
 #include "client/bench/suite_clock.h"
+#include "client/bench/timed_stop.h"
 #include "client/progress.h"
 #include "common/work/identity.h"
 
@@ -35,33 +37,14 @@ Status of_scene(const SuiteScene& scene, const Status& status) {
     return {status.code(), "scene " + scene.name + ": " + status.message()};
 }
 
-/// What makes two lines speak of the same run of a suite, whatever else decides it.
-std::string name_of(const std::string& scene, const std::string& label, uint64_t seed, const Json& budget) {
-    return Json{scene, label, seed, budget}.dump();
-}
-
 class SuiteRun {
   public:
-    SuiteRun(const Suite& suite, const SuiteOptions& options, BenchWriter writer, BenchHistory history, std::stop_token stop)
-        : suite_(suite),
-          options_(options),
-          writer_(std::move(writer)),
-          history_(std::move(history)),
-          stop_(std::move(stop)),
-          clock_(history_.suite_seconds, options.budget) {}
+    SuiteRun(const Suite& suite, const SuiteOptions& options, ResultsBook book, std::stop_token stop);
 
-    Status begin();
     Status run_scene(const SuiteScene& scene, double later_weight);
     /// What is left to do of a scene, in seconds as they were asked for; weighs scenes against one another.
     double weight_of(const SuiteScene& scene) const;
-    /// Without the runs that the file holds of something else.
-    SuiteResults results() && {
-        std::erase_if(results_.lines, [&](const Json& line) {
-            const auto key = line.find("run");
-            return key != line.end() && !keys_.contains(key->get<std::string>());
-        });
-        return std::move(results_);
-    }
+    SuiteResults results() && { return {book_.lines(), std::move(skipped_)}; }
 
   private:
     /// What one seed of a scene may take, by the wall clock and by each run's own.
@@ -69,11 +52,6 @@ class SuiteRun {
         double wall = 0;  ///< SuiteClock::elapsed().
         double cap = 0;   ///< Seconds of a run with preparation.
     };
-    Status append(const Json& line);
-    /// Appends a line that says what follows: only once something follows, so that a file without work to do stays as it is.
-    void announce(Json line) { announced_.push_back(std::move(line)); }
-    /// kFailedPrecondition where the file holds a run of the same name that something else decided.
-    Status check_history(const BenchRun& run) const;
     Status run_seed(SceneBench& bench, uint64_t seed, const RunBudget& budget, const Deadline& deadline);
     /// Algorithms whose run with this seed and budget has not ended.
     size_t unfinished(const SuiteScene& scene, uint64_t seed, const RunBudget& budget) const;
@@ -84,57 +62,35 @@ class SuiteRun {
     Status finish(SceneBench& bench, MeasuredRun& run);
     Result<std::string> keep_image(const std::string& name, const RgbImage& image);
     Result<std::string> keep_reference(const SceneBench& bench);
-    Status measure_shares(SceneBench& bench);
+    Status measure_shares(SceneBench& bench, double end);
+    /// Says once for each scene that a run was cut which has no time of its own.
+    Status say_cut(const std::string& scene, const std::string& what);
     void report(const MeasuredRun& run) const;
 
     const Suite& suite_;
     const SuiteOptions& options_;
-    BenchWriter writer_;
-    BenchHistory history_;
+    ResultsBook book_;
     std::stop_token stop_;
     SuiteClock clock_;
-    SuiteResults results_;
-    std::optional<Json> start_;  ///< The line of this process, before anything else is appended.
-    std::vector<Json> announced_;
-    std::set<std::string> keys_;      ///< Of all runs that the suite asks for.
-    std::set<std::string> finished_;  ///< Names of the runs that the file held at first,
-    std::set<std::string> begun_;     ///< and of their scenes.
-    size_t runs_total_ = 0, runs_done_ = 0;
+    std::vector<std::string> skipped_;
+    std::set<std::string> said_;               ///< Of the scene at hand: what was said to be cut.
+    std::map<std::string, double> too_short_;  ///< Of the scene at hand: seconds in which an algorithm could not learn, by label.
+    size_t runs_total_ = 0, runs_done_ = 0, measured_ = 0;
 };
 
-Status SuiteRun::begin() {
-    LL_RETURN_IF_ERROR(writer_.replace(history_.kept));
-    for (size_t begin = 0; begin < history_.kept.size();) {
-        const size_t end = history_.kept.find('\n', begin);
-        results_.lines.push_back(Json::parse(std::string_view(history_.kept).substr(begin, end - begin)));
-        begin = end + 1;
-    }
-    for (const auto& [key, line] : history_.done) {
-        const std::string scene = line.value("scene", std::string());
-        begun_.insert(scene);
-        finished_.insert(name_of(scene, line.value("label", std::string()), line.value("seed", uint64_t(0)),
-                                 line.value("budget", Json::object())));
-    }
+SuiteRun::SuiteRun(const Suite& suite, const SuiteOptions& options, ResultsBook book, std::stop_token stop)
+    : suite_(suite),
+      options_(options),
+      book_(std::move(book)),
+      stop_(std::move(stop)),
+      clock_(book_.suite_seconds(), options.budget) {
     for (const SuiteScene& scene : suite_.scenes) runs_total_ += scene.seeds * scene.algorithms.size() * scene.budgets.size();
-    start_ = start_line(suite_, {history_.suite_seconds, options_.budget, options_.threads, options_.server, kBuildId});
-    return {};
-}
-
-Status SuiteRun::append(const Json& line) {
-    std::vector<Json> lines;
-    if (start_) lines.push_back(*std::exchange(start_, std::nullopt));
-    for (Json& before : std::exchange(announced_, {})) lines.push_back(std::move(before));
-    lines.push_back(line);
-    for (const Json& next : lines) {
-        results_.lines.push_back(next);
-        LL_RETURN_IF_ERROR(writer_.append(next));
-    }
-    return {};
+    book_.set_start(start_line(suite_, {book_.suite_seconds(), options_.budget, options_.threads, options_.server, kBuildId}));
 }
 
 size_t SuiteRun::unfinished(const SuiteScene& scene, uint64_t seed, const RunBudget& budget) const {
     return size_t(std::count_if(scene.algorithms.begin(), scene.algorithms.end(), [&](const AlgorithmChoice& algorithm) {
-        return !finished_.contains(name_of(scene.name, algorithm.label, seed, budget.json()));
+        return !book_.is_done(scene.name, algorithm.label, seed, budget);
     }));
 }
 
@@ -152,7 +108,7 @@ double SuiteRun::weight_of(const SuiteScene& scene) const {
     if (scene.optional && is_missing(scene.job.scene)) return 0;
     const double runs = seconds_left(scene, 0, scene.seeds, 0);
     // A scene that was begun has its reference.
-    const bool makes_reference = scene.recipe && scene.reference.empty() && !begun_.contains(scene.name);
+    const bool makes_reference = scene.recipe && scene.reference.empty() && !book_.has_runs_of(scene.name);
     return runs + (makes_reference ? asked_seconds(scene.recipe->budget, kTypicalSeconds) : 0);
 }
 
@@ -169,23 +125,25 @@ SuiteRun::Deadline SuiteRun::deadline_of(const SuiteScene& scene, uint32_t seeds
 Status SuiteRun::run_scene(const SuiteScene& scene, double later_weight) {
     const size_t runs_of_one_seed = scene.algorithms.size() * scene.budgets.size();
     if (scene.optional && is_missing(scene.job.scene)) {
-        results_.skipped.push_back(scene.name);
+        skipped_.push_back(scene.name);
         if (!options_.quiet) std::fprintf(stderr, "%s: skipped, %s is not there\n", scene.name.c_str(), scene.job.scene.c_str());
         runs_total_ -= scene.seeds * runs_of_one_seed;
         return {};
     }
-    announced_.clear();  // of a scene in which nothing was left to do
+    book_.drop_announced();  // of a scene in which nothing was left to do
+    said_.clear();
+    too_short_.clear();
     const double weight = weight_of(scene);
     const double share = weight > 0 ? clock_.left() * weight / (weight + later_weight) : 0;
     const double end = clock_.elapsed() + share;
-    auto opened = SceneBench::open(scene, suite_, options_, share * kReferenceShare, stop_);
+    auto opened = SceneBench::open(scene, suite_, options_, {share * kReferenceShare, book_.has_runs_of(scene.name)}, stop_);
     if (!opened.ok()) return opened.status();
     SceneBench& bench = **opened;
     const auto reference_file = keep_reference(bench);
     if (!reference_file.ok()) return reference_file.status();
     const BenchRun any = bench.run_of(scene.algorithms.front(), scene.job.seed, scene.budgets.front());
-    announce(scene_line(scene, any, bench.reference(), *reference_file));
-    if (!bench.cut_of_reference().empty()) announce(cut_line(scene.name, bench.cut_of_reference()));
+    book_.announce(scene_line(scene, any, bench.reference(), *reference_file));
+    if (!bench.cut_of_reference().empty()) book_.announce(cut_line(scene.name, bench.cut_of_reference()));
 
     uint32_t seeds = scene.seeds;
     if (clock_.limited() && weight > 0) {
@@ -193,45 +151,32 @@ Status SuiteRun::run_scene(const SuiteScene& scene, double later_weight) {
         seeds = seeds_within(left, scene.seeds, seconds_left(scene, 0, scene.seeds, 0) / scene.seeds, suite_.stability);
         if (seeds < scene.seeds) {
             runs_total_ -= (scene.seeds - seeds) * runs_of_one_seed;
-            announce(cut_line(scene.name, "seeds " + std::to_string(scene.seeds) + " -> " + std::to_string(seeds)));
+            book_.announce(cut_line(scene.name, "seeds " + std::to_string(scene.seeds) + " -> " + std::to_string(seeds)));
         }
     }
-    bool said = false;
     for (uint32_t i = 0; i < seeds; ++i) {
         for (size_t b = 0; b < scene.budgets.size(); ++b) {
             const RunBudget& budget = scene.budgets[b];
             const Deadline deadline = deadline_of(scene, seeds, i, b, end);
-            if (!said && budget.seconds > deadline.cap) {
+            if (budget.seconds > deadline.cap && said_.insert("time").second) {
                 char text[96];
                 std::snprintf(text, sizeof text, "time of each run %.4g -> %.3g s", budget.seconds, deadline.cap);
-                announce(cut_line(scene.name, text));
-                said = true;
+                book_.announce(cut_line(scene.name, text));
             }
             LL_RETURN_IF_ERROR(run_seed(bench, scene.job.seed + i, budget, deadline));
         }
     }
-    return suite_.share_iterations > 0 && options_.server.empty() ? measure_shares(bench) : Status();
+    if (suite_.share_iterations > 0 && !options_.service) LL_RETURN_IF_ERROR(measure_shares(bench, end));
+    return clock_.limited() ? Status() : book_.forget_cuts(scene.name);
 }
 
-Status SuiteRun::check_history(const BenchRun& run) const {
-    const Json wanted = run.line("run");
-    for (const auto& [key, line] : history_.done) {
-        const auto same = [&](const char* field) { return line.contains(field) && line[field] == wanted[field]; };
-        if (!same("scene") || !same("label") || !same("seed") || !same("budget")) continue;
-        for (const char* field : {"build", "threads", "server", "scene_digest", "reference_digest", "max_depth", "width", "height",
-                                  "parameters", "threshold_percent", "stop_after"}) {
-            const bool here = wanted.contains(field);
-            if (here == line.contains(field) && (!here || same(field))) continue;
-            return failed_precondition(options_.out + " holds " + run.algorithm.label + " seed " + std::to_string(run.seed) +
-                                       " with another " + field + "; give another name, so that no two kinds are mixed");
-        }
-    }
-    return {};
+Status SuiteRun::say_cut(const std::string& scene, const std::string& what) {
+    return said_.insert(what.substr(0, what.find("->"))).second ? book_.append(cut_line(scene, what)) : Status();
 }
 
 Status SuiteRun::run_seed(SceneBench& bench, uint64_t seed, const RunBudget& budget, const Deadline& deadline) {
     const std::function<bool()> out_of_time = [&] { return clock_.elapsed() >= deadline.wall; };
-    const MeasuredRun::Append append_line = [&](const Json& line) { return append(line); };
+    const MeasuredRun::Append append_line = [&](const Json& line) { return book_.append(line); };
     const MeasuredRun::SuiteSeconds elapsed = [&] { return clock_.elapsed(); };
     const auto of_run = [](const BenchRun& run, const Status& status) {
         return status.ok() ? status : Status(status.code(), run.algorithm.label + ": " + status.message());
@@ -253,13 +198,29 @@ Status SuiteRun::run_seed(SceneBench& bench, uint64_t seed, const RunBudget& bud
     };
     for (const AlgorithmChoice& algorithm : bench.scene().algorithms) {
         const BenchRun run = bench.run_of(algorithm, seed, budget);
-        keys_.insert(run.key());
-        if (history_.done.contains(run.key())) {
+        const auto done = book_.is_done(run, bench.reference_was_remade());
+        if (!done.ok()) return done.status();
+        if (*done) {
             ++runs_done_;
             continue;
         }
-        LL_RETURN_IF_ERROR(check_history(run));
-        auto render = bench.start(run, stop_);
+        // Learning has as long as the whole run: what takes longer leaves nothing to measure, and nothing to the others.
+        const auto known = too_short_.find(algorithm.label);
+        if (known != too_short_.end() && deadline.cap <= known->second) {
+            --runs_total_;
+            continue;
+        }
+        const TimedStop limit(stop_, deadline.cap);
+        auto render = bench.start(run, limit.token());
+        if (!render.ok() && limit.timed_out()) {
+            too_short_[algorithm.label] = deadline.cap;
+            --runs_total_;
+            char text[64];
+            std::snprintf(text, sizeof text, "%.3g s", deadline.cap);
+            LL_RETURN_IF_ERROR(
+                say_cut(run.scene, algorithm.label + " is not measured: it does not learn its tables within -> " + text));
+            continue;
+        }
         if (!render.ok()) return of_run(run, render.status());
         alive.push_back(std::make_unique<MeasuredRun>(run, *std::move(render), bench.reference()));
         // A service would share its workers between jobs: each has it alone.
@@ -275,8 +236,14 @@ Status SuiteRun::finish(SceneBench& bench, MeasuredRun& run) {
         if (!kept.ok()) return kept.status();
         file = *kept;
     }
-    LL_RETURN_IF_ERROR(append(run.last_line(file)));
+    const uint64_t asked = run.run().budget.samples;
+    if (run.was_cut() && asked > 0) {
+        LL_RETURN_IF_ERROR(say_cut(run.run().scene, "samples of each run " + std::to_string(asked) + " -> " +
+                                                        std::to_string(run.cost().iterations) + " or so"));
+    }
+    LL_RETURN_IF_ERROR(book_.finish(run.run(), run.last_line(file)));
     ++runs_done_;
+    ++measured_;
     if (!options_.quiet) report(run);
     return {};
 }
@@ -296,15 +263,19 @@ Result<std::string> SuiteRun::keep_reference(const SceneBench& bench) {
     return keep_image(bench.scene().name + "-reference.exr", bench.reference().image.color);
 }
 
-Status SuiteRun::measure_shares(SceneBench& bench) {
+Status SuiteRun::measure_shares(SceneBench& bench, double end) {
+    const std::string& scene = bench.scene().name;
     for (const AlgorithmChoice& algorithm : bench.scene().algorithms) {
-        if (history_.shares.contains(bench.scene().name + "\n" + algorithm.label)) continue;
-        const auto line = bench.shares(algorithm, stop_);
+        if (book_.has_shares(scene, algorithm.label) || too_short_.contains(algorithm.label)) continue;
+        const double left = clock_.limited() ? end - clock_.elapsed() : std::numeric_limits<double>::infinity();
+        const TimedStop limit(stop_, std::max(0.0, left));
+        const auto line = left > 0 ? bench.shares(algorithm, limit.token()) : Result<Json>(Status(StatusCode::kCancelled, ""));
+        if (!line.ok() && (left <= 0 || limit.timed_out())) return say_cut(scene, "shares of techniques are not measured");
         // Some algorithms show no contributions, and some find no light in a scene: then there is nothing to show.
         if (line.status().code() == StatusCode::kInvalidArgument || line.status().code() == StatusCode::kFailedPrecondition)
             continue;
         if (!line.ok()) return line.status();
-        LL_RETURN_IF_ERROR(append(*line));
+        LL_RETURN_IF_ERROR(book_.append(*line));
     }
     return {};
 }
@@ -313,8 +284,7 @@ void SuiteRun::report(const MeasuredRun& run) const {
     const RenderCost cost = run.cost();
     const BenchRun& of = run.run();
     // What the suite took so far, for as many runs; coarse, but it follows the machine.
-    const double rate =
-        (clock_.elapsed() - history_.suite_seconds) / double(runs_done_ - std::min(runs_done_ - 1, history_.done.size()));
+    const double rate = (clock_.elapsed() - book_.suite_seconds()) / double(measured_);
     const double left = std::min(clock_.left(), rate * double(runs_total_ - std::min(runs_total_, runs_done_)));
     std::fprintf(stderr, "[%zu/%zu] %s%s%s seed %llu: %llu spp, %.1f s + %.1f s, about %s left\n", runs_done_, runs_total_,
                  of.scene.c_str(), of.scene.empty() ? "" : " ", of.algorithm.label.c_str(),
@@ -339,23 +309,8 @@ Status check_files(const Suite& suite) {
 
 namespace {
 
-Result<SuiteResults> measure(const Suite& suite, const SuiteOptions& options, BenchWriter writer, std::stop_token stop) {
-    const auto text = writer.text();
-    if (!text.ok()) return text.status();
-    // Runs that an earlier budget cut are made whole once there is no budget any more.
-    auto history = parse_history(*text, options.out, [&](const Json& run) { return options.budget <= 0 && run.contains("cut"); });
-    if (!history.ok()) return history.status();
-    if (history->started && history->suite != suite.name) {
-        return failed_precondition(options.out + " holds results of " +
-                                   (history->suite.empty() ? "a single scene" : "the suite " + history->suite) +
-                                   "; give another name");
-    }
-    if (history->torn && !options.quiet)
-        std::fprintf(stderr, "%s: the end of its last line is missing; that line's run is measured again\n", options.out.c_str());
-    if (!history->done.empty() && !options.quiet)
-        std::fprintf(stderr, "%zu run(s) are in %s already\n", history->done.size(), options.out.c_str());
-    SuiteRun run(suite, options, std::move(writer), *std::move(history), stop);
-    LL_RETURN_IF_ERROR(run.begin());
+Result<SuiteResults> measure(const Suite& suite, const SuiteOptions& options, ResultsBook book, std::stop_token stop) {
+    SuiteRun run(suite, options, std::move(book), stop);
     double later = 0;
     for (const SuiteScene& scene : suite.scenes) later += run.weight_of(scene);
     for (const SuiteScene& scene : suite.scenes) {
@@ -373,9 +328,10 @@ Result<SuiteResults> measure(const Suite& suite, const SuiteOptions& options, Be
 
 Result<SuiteResults> run_suite(const Suite& suite, const SuiteOptions& options, std::stop_token stop) {
     LL_RETURN_IF_ERROR(check_files(suite));
-    auto writer = BenchWriter::open(options.out, options.resume);
-    if (!writer.ok()) return writer.status();
-    auto results = measure(suite, options, *std::move(writer), stop);
+    // Runs that an earlier budget cut are measured in full once there is no budget any more.
+    auto book = ResultsBook::open(options.out, options.resume, suite.name, options.budget > 0, options.quiet);
+    if (!book.ok()) return book.status();
+    auto results = measure(suite, options, *std::move(book), stop);
     std::error_code ignored;
     // A mistake leaves nothing behind that a second attempt would have to --resume.
     if (!results.ok() && fs::is_regular_file(options.out, ignored) && fs::file_size(options.out, ignored) == 0)

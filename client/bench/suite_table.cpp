@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <numeric>
 
 #include "client/bench/numbers.h"
 #include "client/bench/verdicts.h"
@@ -45,6 +45,11 @@ std::vector<Runs> group(std::span<const Json> lines) {
         else
             groups.push_back({scene, label, budget, {&line}});
     }
+    for (Runs& runs : groups) {
+        double longest = 0;
+        for (const double iterations : runs.of("iterations")) longest = std::max(longest, iterations);
+        std::erase_if(runs.lines, [&](const Json* line) { return much_shorter(line->value("iterations", 0.0), longest); });
+    }
     return groups;
 }
 
@@ -79,21 +84,27 @@ Outcome judge(const Expectation& e, const std::string& scene, const std::vector<
         }
         return outcome;
     }
-    const auto value_of = [&](const std::string& label) {
-        double value = std::nan("");
+    double value = 1;
+    for (const std::string& label : {e.algorithm, e.other}) {
+        if (label.empty()) continue;
+        const Runs* last = nullptr;
         for (const Runs& runs : groups) {
-            if (runs.scene != scene || runs.label != label) continue;
-            if (e.kind != Expectation::Kind::kMeanRatio) {
-                value = median(errors_of(runs));
-                continue;
-            }
-            const std::vector<double> ratios = runs.of("mean_ratio");
-            value = 0;
-            for (const double r : ratios) value += r / double(ratios.size());
+            if (runs.scene == scene && runs.label == label) last = &runs;
         }
-        return value;
-    };
-    const double value = value_of(e.algorithm) / (e.other.empty() ? 1 : value_of(e.other));
+        if (!last) return outcome;
+        if (e.kind == Expectation::Kind::kMeanRatio) {
+            const std::vector<double> ratios = last->of("mean_ratio");
+            value = std::accumulate(ratios.begin(), ratios.end(), 0.0) / double(ratios.size());
+            continue;
+        }
+        const double error = median(errors_of(*last));
+        // What is left of such an error without the reference's own is as uncertain as that, and may be negative.
+        if (last->any("near_floor") || !(error > 0)) {
+            outcome.found = label + " is too near the reference's own error";
+            return outcome;
+        }
+        value = label == e.algorithm ? error : value / error;
+    }
     if (!std::isfinite(value)) return outcome;
     outcome.kind = value >= e.low && value <= e.high ? Outcome::Kind::kHolds : Outcome::Kind::kFails;
     outcome.found = formatted("%.4g", value);
@@ -107,13 +118,16 @@ std::string suite_table(std::span<const Json> lines) {
         {"scene", "algorithm", "budget", "runs", "spp", "render s", "prepare s", "relMSE", "+-", ""}};
     for (const Runs& runs : group(lines)) {
         const std::vector<double> errors = errors_of(runs);
+        // Near the reference's own error what is left of the runs' is anybody's guess: only a bound is known.
+        const bool near = runs.any("near_floor");
+        const std::string error = near ? "< " + formatted("%.3g", median(runs.of("relmse"))) : formatted("%.4g", median(errors));
         std::string note;
-        if (runs.any("near_floor")) note = "as small as the reference's own error";
+        if (near) note = "as small as the reference's own error";
         if (runs.any("cut")) note.append(note.empty() ? "" : "; ").append("cut by --budget");
         rows.push_back({runs.scene, runs.label, runs.budget.text(), std::to_string(runs.lines.size()),
                         formatted("%.0f", median(runs.of("iterations"))), formatted("%.2f", median(runs.of("seconds"))),
-                        formatted("%.2f", median(runs.of("preparation_seconds"))), formatted("%.4g", median(errors)),
-                        errors.size() < 2 ? "" : formatted("%.2g", standard_error(errors)), note});
+                        formatted("%.2f", median(runs.of("preparation_seconds"))), error,
+                        errors.size() < 2 || near ? "" : formatted("%.2g", standard_error(errors)), note});
     }
     return text_table(rows);
 }

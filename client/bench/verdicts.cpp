@@ -6,6 +6,7 @@
 #include <set>
 
 #include "client/bench/numbers.h"
+#include "client/bench/results_file.h"
 #include "client/text_table.h"
 
 namespace lightloom::client {
@@ -92,6 +93,7 @@ struct RunLines {
     std::vector<StabilityCheckpoint> checkpoints;
     std::optional<StabilityRun> end;
     size_t row = 0;
+    bool cut = false;
 
     /// A run that was killed begins again, and its last line repeats the last checkpoint.
     void add(const StabilityCheckpoint& checkpoint) {
@@ -121,12 +123,13 @@ struct Results {
         if (!run.end) order.push_back(key);
         run.end = run_of(line);
         run.row = row_for(line);
+        run.cut = line.contains("cut");
     }
 
     size_t row_for(const Json& line) {
         const Json row{text(line, "scene"), text(line, "label"), nested(line, "budget")};
-        const auto [found, is_new] = row_of.emplace(row.dump(), rows.size());
-        if (is_new) rows.push_back({row[0], row[1], row[2], {}});
+        const auto [found, is_new] = row_of.emplace(line_text(row), rows.size());
+        if (is_new) rows.push_back({.scene = row[0], .label = row[1], .budget = row[2]});
         return found->second;
     }
 };
@@ -173,8 +176,19 @@ Result<std::vector<Judged>> judge_results(std::span<const Json> lines) {
         }
     }
     std::vector<std::vector<StabilityRun>> runs(results.rows.size());
+    std::vector<double> longest(results.rows.size());
+    for (const std::string& key : results.order) {
+        const RunLines& run = results.runs[key];
+        longest[run.row] = std::max(longest[run.row], run.checkpoints.back().iterations);
+    }
     for (const std::string& key : results.order) {
         RunLines& lines_of_run = results.runs[key];
+        Judged& judged = results.rows[lines_of_run.row];
+        judged.cut += lines_of_run.cut;
+        if (much_shorter(lines_of_run.checkpoints.back().iterations, longest[lines_of_run.row])) {
+            ++judged.left_out;
+            continue;
+        }
         lines_of_run.end->checkpoints = std::move(lines_of_run.checkpoints);
         runs[lines_of_run.row].push_back(*std::move(lines_of_run.end));
     }
@@ -188,10 +202,14 @@ std::string verdict_table(std::span<const Judged> judged) {
     for (const Judged& row : judged) {
         const Stability& s = row.stability;
         const double light = s.regions[0].ratio;
-        rows.push_back({cell(row.scene, 24), cell(row.label, 32), budget_text(row.budget), std::to_string(s.seeds),
+        std::string verdict = s.verdict;
+        if (row.left_out > 0)
+            verdict.append("; without ").append(std::to_string(row.left_out)).append(" run(s) that a budget cut to less than half");
+        const std::string cut = row.cut > 0 ? ", " + std::to_string(row.cut) + " cut" : "";
+        rows.push_back({cell(row.scene, 24), cell(row.label, 32), budget_text(row.budget) + cut, std::to_string(s.seeds),
                         formatted("%.3g", s.error.mean), s.seeds > 1 ? share_text(s.variation) : "-",
                         s.slope ? formatted("%.2f", s.slope->mean) : "-", share_text(s.rising),
-                        formatted("%.3g", s.firefly_count.mean), std::isfinite(light) ? share_text(light) : "-", s.verdict});
+                        formatted("%.3g", s.firefly_count.mean), std::isfinite(light) ? share_text(light) : "-", verdict});
     }
     return text_table(rows);
 }
@@ -203,6 +221,8 @@ Json verdict_json(std::span<const Judged> judged) {
         Json json{{"scene", row.scene}, {"label", row.label},   {"budget", row.budget},         {"seeds", s.seeds},
                   {"flags", s.flags()}, {"verdict", s.verdict}, {"relmse", mean_json(s.error)}, {"variation", s.variation}};
         put(&json, "spread", s.spread);
+        if (row.cut > 0) json["cut"] = row.cut;
+        if (row.left_out > 0) json["left_out"] = row.left_out;
         json["worst_seed"] = s.worst_seed;
         json["worst_seed_share"] = s.worst_seed_share;
         json["concentration"] = s.concentration;

@@ -18,6 +18,8 @@ struct Judged {
     std::string scene, label;
     Json budget;  ///< {"seconds": 20} or {"samples": 64}.
     Stability stability;
+    int cut = 0;       ///< Runs that --budget cut,
+    int left_out = 0;  ///< and those of them that are not judged: much_shorter() than the longest.
 };
 
 /// One for each (scene, label, budget) with at least one finished run, in the order in which their first runs ended. Of several

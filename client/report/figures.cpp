@@ -169,9 +169,9 @@ std::optional<SpeedUp> speed_up(std::span<const TimedRun> base, std::span<const 
     const LogTime base_time = log_time(a.times), other_time = log_time(b.times);
     SpeedUp out;
     out.factor = std::exp(base_time.mean - other_time.mean);
-    out.at_least = b.at_most;
+    out.at_least = b.at_most || a.lower_bound;
     out.at_most = a.at_most || b.lower_bound;
-    out.extrapolated = b.far;
+    out.extrapolated = a.far || b.far;
     const double variance = base_time.variance + other_time.variance;
     if (std::isnan(variance)) return out;
     out.log_error = std::sqrt(variance);

@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "client/bench/results_file.h"
 #include "common/core/atomic_file.h"
 
 namespace lightloom::client::report {
@@ -181,6 +182,9 @@ class Reader {
   public:
     Reader(const std::string& name, Results* results) : name_(name), results_(results) {
         for (const Run& run : results->runs) earlier_.insert(run.id);
+        for (const Json& line : results->lines) {
+            if (line.value("type", std::string()) == "run") label_names_.insert(name_of_run(line));
+        }
         const std::filesystem::path path(name);
         images_ = path.extension() == ".jsonl" ? std::filesystem::path(path).replace_extension() : path;
         images_ += ".images";
@@ -231,6 +235,12 @@ class Reader {
             if (!same && !suite_.empty()) renamed_[scene] = scene + " (" + suite_ + ")";
         }
         if (const auto found = renamed_.find(scene); found != renamed_.end()) json["scene"] = found->second;
+        // Runs of one name and seed in two files, as of two days or numbers of threads, are two rows.
+        const std::string label = text("label");
+        if (const std::string name = name_of_run(json);
+            text("type") != "scene" && label_names_.contains(name) && !earlier_.contains(text("run")))
+            relabelled_[label] = label + " (" + std::filesystem::path(name_).stem().string() + ")";
+        if (const auto found = relabelled_.find(label); found != relabelled_.end()) json["label"] = found->second;
     }
 
     Status add(const Json& json) {
@@ -317,8 +327,9 @@ class Reader {
     std::set<std::string> earlier_, here_;  ///< Finished runs; scenes of this file.
     std::map<std::string, std::vector<Checkpoint>> open_;
     std::map<std::string, std::string> unfinished_;
-    std::string suite_;                           ///< Of the last "start" line.
-    std::map<std::string, std::string> renamed_;  ///< Scenes of this file, see tell_apart().
+    std::string suite_;                                        ///< Of the last "start" line.
+    std::map<std::string, std::string> renamed_, relabelled_;  ///< Scenes and labels of this file, see tell_apart().
+    std::set<std::string> label_names_;                        ///< Names of the runs of the files before, see name_of_run().
 };
 
 }  // namespace

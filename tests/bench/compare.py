@@ -67,7 +67,10 @@ def read_times(path):
     for run in runs:
         if run.get("error_occurred"):
             raise Unusable(f"{path}: {run['name']}: {run.get('error_message')}")
-        times[run["name"]] = 1 / run["items_per_second"]
+        rate = run.get("items_per_second", 0)
+        if not rate > 0:
+            raise Unusable(f"{path}: {run['name']} counts no items per second")
+        times[run["name"]] = 1 / rate
     return times
 
 
@@ -91,6 +94,9 @@ def main():
 
     times = {role: [read_times(os.path.join(options.directory, f"{role}-{n}.json")) for n in range(options.pairs)]
              for role in ("base", "head")}
+    for role, runs in times.items():
+        if any(run.keys() != runs[0].keys() for run in runs):
+            raise Unusable(f"the runs of {role.upper()} do not have the same benchmarks")
     names = [name for name in times["base"][0] if name in times["head"][0]]
     if not names:
         raise Unusable("the revisions have no benchmark in common")

@@ -150,8 +150,9 @@ TEST_F(Bench, TablesOfTheCacheCostWhatMakingThemTook) {
     const std::string tables = path("tables");
     const std::vector<std::string> job{kScene, "--resolution", "24x18", "--max-depth", "4", "--threads", "2", "-q"};
     const auto reference = [&](const std::string& name) {
-        std::vector<std::string> arguments{"reference", "-o",    path(name + ".exr"),   "--spp",         "2",   "--algorithm",
-                                           "spcbpt",    "--set", "training-paths=2000", "--table-cache", tables};
+        std::vector<std::string> arguments{"reference", "-o",    path(name + ".exr"),   "--spp",         "2",    "--algorithm",
+                                           "spcbpt",    "--set", "training-paths=2000", "--table-cache", tables, "--seed",
+                                           "1"};
         arguments.insert(arguments.end(), job.begin(), job.end());
         EXPECT_EQ(run(arguments), 0) << output();
         return Json::parse(*read_file(path(name + ".json")));
@@ -160,11 +161,15 @@ TEST_F(Bench, TablesOfTheCacheCostWhatMakingThemTook) {
     EXPECT_EQ(first["tables"], "made");
     EXPECT_EQ(second["tables"], "cached");
     EXPECT_EQ(first["sha256"], second["sha256"]) << "they are the same tables";
+    ASSERT_EQ(run({"reference", kScene, "-o", path("other.exr"), "-a", "path", "--spp", "8", "--resolution", "24x18", "--max-depth",
+                   "4", "-q"}),
+              0)
+        << output();
 
     const auto bench = [&](const std::string& name, std::vector<std::string> more) {
         std::vector<std::string> arguments{
-            "bench",   "--reference", path("ref.exr"), "--algorithms", "path,spcbpt:training-paths=2000", "--spp", "2",
-            "--seeds", "2",           "--out",         path(name)};
+            "bench",   "--reference", path("other.exr"), "--algorithms", "path,spcbpt:training-paths=2000", "--spp", "2",
+            "--seeds", "2",           "--out",           path(name)};
         arguments.insert(arguments.end(), job.begin(), job.end());
         arguments.insert(arguments.end(), more.begin(), more.end());
         EXPECT_EQ(run(arguments), 0) << output();
@@ -180,15 +185,15 @@ TEST_F(Bench, TablesOfTheCacheCostWhatMakingThemTook) {
     auto some = bench("some.jsonl", {"--table-cache", tables});
     EXPECT_EQ(count(), 2);
     EXPECT_NE(output().find("* as recorded"), std::string::npos) << output();
-    EXPECT_FALSE(some["path0"].contains("tables"));
-    for (const char* run : {"spcbpt0", "spcbpt1"}) {
+    EXPECT_FALSE(some["path1"].contains("tables"));
+    for (const char* run : {"spcbpt1", "spcbpt2"}) {
         EXPECT_EQ(measured[run]["tables"], "made");
         EXPECT_GT(measured[run]["preparation_seconds"].get<double>(), 0);
         EXPECT_EQ(measured[run]["mape_percent"], some[run]["mape_percent"]);
     }
-    EXPECT_EQ(some["spcbpt0"]["tables"], "cached") << "the reference has made those of seed 0";
-    EXPECT_EQ(some["spcbpt1"]["tables"], "made");
-    const double made = first["preparation_seconds"].get<double>(), found = some["spcbpt0"]["preparation_seconds"].get<double>();
+    EXPECT_EQ(some["spcbpt1"]["tables"], "cached") << "a rendering has made those of seed 1";
+    EXPECT_EQ(some["spcbpt2"]["tables"], "made");
+    const double made = first["preparation_seconds"].get<double>(), found = some["spcbpt1"]["preparation_seconds"].get<double>();
     EXPECT_GT(found, 0.5 * made) << "finding them is not free";
 }
 
@@ -228,6 +233,8 @@ TEST_F(Bench, MistakesAreRefusedBeforeAnythingIsRendered) {
     EXPECT_EQ(bench({"--algorithms", "path", "--spp", "1", "--resolution", "16x16"}), 2);
     EXPECT_EQ(bench({"--algorithms", "path", "--spp", "1", "--max-depth", "1"}), 2);
     EXPECT_NE(output().find("--max-depth 8"), std::string::npos) << output();
+    EXPECT_EQ(bench({"--algorithms", "path", "--spp", "1", "--seed", "0"}), 2) << "the reference's random numbers";
+    EXPECT_NE(output().find("was rendered with seed 0"), std::string::npos) << output();
     EXPECT_FALSE(std::filesystem::exists(path("runs.jsonl")));
     EXPECT_EQ(bench({"--algorithms", "path", "--spp", "5", "--seeds", "1"}), 0) << output();
     EXPECT_EQ(lines("runs.jsonl").back()["iterations"], 5);

@@ -166,13 +166,23 @@ TEST(BenchHistory, ResumeKeepsFinishedRunsAndForgetsBegunOnes) {
     EXPECT_EQ(history->suite, "s");
     EXPECT_EQ(history->suite_seconds, 9) << "the begun run took its time, too";
     EXPECT_EQ(history->shares, std::set<std::string>{"x\nbdpt"});
-    const auto again = parse_history(kStart + finished, "f", [](const Json& run) { return run["iterations"] == 2; });
-    EXPECT_EQ(again->kept, kStart);
+    // A run that was measured again and had not ended keeps what it had; one that had, replaces it.
+    const std::string more = "{\"type\":\"checkpoint\",\"run\":\"a\",\"iterations\":4}\n";
+    const std::string end = "{\"type\":\"run\",\"run\":\"a\",\"iterations\":9}\n";
+    EXPECT_EQ(parse_history(kStart + finished + more, "f")->kept, kStart + finished);
+    EXPECT_EQ(parse_history(kStart + finished + more + end, "f")->kept, kStart + more + end);
+    // Another key of the same name, as after a new reference.
+    EXPECT_EQ(parse_history(R"({"type":"run","run":"a","seed":1})"
+                            "\n"
+                            R"({"type":"run","run":"b","seed":1})",
+                            "f")
+                  ->kept,
+              "{\"type\":\"run\",\"run\":\"b\",\"seed\":1}\n");
 }
 
 TEST(BenchHistory, ATornLastLineIsIgnoredWhereverItIsCut) {
     const std::string whole = kEndOfA;
-    const std::string last = "{\"type\":\"run\",\"run\":\"b\",\"iterations\":7}\n";
+    const std::string last = "{\"type\":\"run\",\"run\":\"b\",\"seed\":2,\"iterations\":7}\n";
     for (size_t cut = 0; cut + 2 < last.size(); ++cut) {
         const auto history = parse_history(whole + last.substr(0, cut), "f");
         ASSERT_TRUE(history.ok()) << cut;
@@ -207,7 +217,7 @@ TEST(BenchWriter, LinesAreReadBack) {
         ASSERT_TRUE(writer->append({{"type", "run"}, {"run", "x"}}).ok());
         EXPECT_EQ(parse_history(*writer->text(), path)->done.size(), 1u);
         ASSERT_TRUE(writer->replace(kEndOfA).ok());
-        ASSERT_TRUE(writer->append({{"type", "run"}, {"run", "b"}}).ok());
+        ASSERT_TRUE(writer->append({{"type", "run"}, {"run", "b"}, {"seed", 2}}).ok());
     }
     EXPECT_EQ(parse_history(*read_file(path), path)->done.size(), 2u);
     EXPECT_NE(BenchWriter::open(path, false).status().message().find("--resume"), std::string::npos);

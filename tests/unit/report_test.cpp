@@ -285,6 +285,13 @@ TEST(Results, OfSeveralFilesBelongToTheSameScenes) {
     EXPECT_EQ(results.scenes.size(), 1u);
     EXPECT_NE(add_results(file(path, scene_line("slit", 0)), "a.jsonl", &results).message().find("give each file once"),
               std::string::npos);
+    std::vector<BenchLine> tuesday{start_line(), scene_line("slit", 0)};
+    for (BenchLine& line : path.lines()) {
+        line["run"] = "another key";  // as of another build
+        tuesday.push_back(std::move(line));
+    }
+    ASSERT_TRUE(add_results(text_of(tuesday), "days/tuesday.jsonl", &results).ok());
+    EXPECT_EQ(results.runs.back().label, "path (tuesday)") << "the same seed of another day";
     BenchLine other = scene_line("slit", 0);
     other["scene_digest"] = "another";
     ASSERT_TRUE(add_results(file(MadeRun{"slit", "light"}, other), "c.jsonl", &results).ok());

@@ -158,6 +158,24 @@ TEST(Expectations, AreJudgedByMediansOverSeeds) {
     EXPECT_NE(table.find("a      path       20 s    3     10   19.00     1.00       0.4"), std::string::npos) << table;
 }
 
+TEST(Expectations, AreNotJudgedNearTheReferencesOwnError) {
+    Suite suite;
+    suite.scenes.resize(1);
+    suite.scenes[0].name = "a";
+    using Kind = Expectation::Kind;
+    suite.scenes[0].expectations = {{Kind::kErrorRatio, "path", "bdpt", "", 1.05, HUGE_VAL},
+                                    {Kind::kErrorRatio, "bdpt", "path", "", 1.05, HUGE_VAL}};
+    std::vector<Json> lines{run("a", "path", 0.0097, 1), run("a", "bdpt", 0.0091, 1)};  // own errors below zero
+    for (Json& line : lines) line["near_floor"] = true;
+    const auto outcomes = judge_expectations(suite, lines);
+    ASSERT_TRUE(outcomes.ok());
+    for (const Outcome& outcome : *outcomes) {
+        EXPECT_EQ(outcome.kind, Outcome::Kind::kNotJudged);
+        EXPECT_NE(outcome.found.find("too near the reference's own error"), std::string::npos) << outcome.found;
+    }
+    EXPECT_NE(suite_table(lines).find("< 0.0097"), std::string::npos) << suite_table(lines);
+}
+
 TEST(Reference, IsFoundBesideItsScene) {
     const std::filesystem::path directory = std::filesystem::temp_directory_path() / ("references-" + std::to_string(::getpid()));
     std::filesystem::create_directories(directory / "references");

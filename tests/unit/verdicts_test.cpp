@@ -57,6 +57,29 @@ std::vector<Json> results() {
     return lines;
 }
 
+TEST(Verdicts, RunsThatABudgetCutToLessThanHalfAreNotJudgedWithTheOthers) {
+    std::vector<Json> lines{scene_line("slit")};
+    for (uint64_t seed = 1; seed <= 20; ++seed) {
+        std::vector<Json> run = run_lines("slit", "path", seed);
+        if (seed > 15) {
+            Json end = run.back();
+            run.resize(3);  // 1, 2, 4 samples
+            end["iterations"] = 4, end["relmse"] = 0.25, end["cut"] = {{"given_seconds", 0.1}};
+            run.push_back(end);
+        }
+        lines.insert(lines.end(), run.begin(), run.end());
+    }
+    const auto judged = judge_results(lines);
+    ASSERT_TRUE(judged.ok()) << judged.status().message();
+    const Judged& row = judged->front();
+    EXPECT_EQ(row.cut, 5);
+    EXPECT_EQ(row.left_out, 5);
+    EXPECT_EQ(row.stability.seeds, 15);
+    EXPECT_NEAR(row.stability.error.mean, 1.0 / 64, 1e-3);
+    EXPECT_NE(verdict_table(*judged).find("64 samples, 5 cut"), std::string::npos);
+    EXPECT_NE(verdict_table(*judged).find("without 5 run(s) that a budget cut"), std::string::npos);
+}
+
 TEST(Verdicts, OneRowForEachSceneAndAlgorithm) {
     const std::vector<Json> lines = results();
     const auto judged = judge_results(lines);
