@@ -13,25 +13,13 @@
 #include "server/coordinator.h"
 #include "server/local_ports.h"
 #include "tests/support/algorithm_of.h"
+#include "tests/support/temp_directory.h"
 #include "worker/worker.h"
 
 namespace lightloom::testing {
 
 /// As in the programs, the log is set up before there are threads.
 inline const bool kLogging = (set_up_logging("test", "info"), true);
-
-class TempDirectory {
-  public:
-    TempDirectory() {
-        std::string name = (std::filesystem::temp_directory_path() / "lightloom-test-XXXXXX").string();
-        path = ::mkdtemp(name.data());
-    }
-    ~TempDirectory() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path, ignored);
-    }
-    std::filesystem::path path;
-};
 
 /// Pixels of widely different size, so that a sum that depended on its order would show.
 inline Partial fake_partial(const RenderUnit& work, const FrameLayout& frame) {

@@ -14,6 +14,7 @@
 #include "common/transport/settings.h"
 #include "common/work/asset.h"
 #include "tests/service/process.h"
+#include "tests/support/temp_directory.h"
 
 namespace lightloom {
 namespace {
@@ -26,12 +27,7 @@ const std::string kScene = std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/gl
 
 class Look : public ::testing::Test {
   protected:
-    void SetUp() override {
-        std::string name = (fs::temp_directory_path() / "lightloom-test-XXXXXX").string();
-        directory_ = ::mkdtemp(name.data());
-    }
-    void TearDown() override { fs::remove_all(directory_); }
-    std::string path(const std::string& name) const { return (directory_ / name).string(); }
+    std::string path(const std::string& name) const { return directory_.file(name); }
 
     struct Run {
         int exit_code;
@@ -63,7 +59,7 @@ class Look : public ::testing::Test {
     }
 
   private:
-    fs::path directory_;
+    testing::TempDirectory directory_;
     mutable int runs_ = 0;
 };
 

@@ -18,25 +18,13 @@
 #include "common/transport/unit_renderer.h"
 #include "common/work/job.h"
 #include "tests/support/small_scenes.h"
+#include "tests/support/temp_directory.h"
 
 namespace lightloom::client {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-
-class Directory {
-  public:
-    Directory() {
-        std::string name = (fs::temp_directory_path() / "lightloom-test-XXXXXX").string();
-        path_ = ::mkdtemp(name.data());
-    }
-    ~Directory() { fs::remove_all(path_); }
-    std::string path(const std::string& name = "") const { return (path_ / name).string(); }
-
-  private:
-    fs::path path_;
-};
 
 constexpr FrameLayout kFrame{4, 3, {1, 0, 4, 3}};
 
@@ -189,8 +177,8 @@ TEST(Pyramid, WeightedPicturesSumToTheImage) {
 }
 
 TEST(PyramidFiles, ADirectoryOfItsOwnIsReplaced) {
-    const Directory directory;
-    const std::string place = directory.path("a/b");
+    const testing::TempDirectory directory;
+    const std::string place = directory.file("a/b");
     ASSERT_TRUE(open_pyramid_directory(place).ok());
     EXPECT_TRUE(fs::is_empty(place));
     const Rendered rendered;
@@ -232,15 +220,15 @@ TEST(PyramidFiles, ADirectoryOfItsOwnIsReplaced) {
 }
 
 TEST(PyramidFiles, OtherPlacesAreRefused) {
-    const Directory directory;
-    std::ofstream(directory.path("file")) << "x";
-    for (const std::string& place : {directory.path(), directory.path("file"), directory.path("file/below")}) {
+    const testing::TempDirectory directory;
+    std::ofstream(directory.file("file")) << "x";
+    for (const std::string& place : {directory.path.string(), directory.file("file"), directory.file("file/below")}) {
         const Status status = open_pyramid_directory(place);
         EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << place;
         EXPECT_NE(status.message().find(place), std::string::npos) << status.message();
     }
-    std::ofstream(directory.path("pyramid.json")) << "{\"other\": 1}";
-    EXPECT_FALSE(open_pyramid_directory(directory.path()).ok());
+    std::ofstream(directory.file("pyramid.json")) << "{\"other\": 1}";
+    EXPECT_FALSE(open_pyramid_directory(directory.path.string()).ok());
 }
 
 TEST(PyramidFiles, OneSampleHasNoVariance) {
@@ -271,7 +259,7 @@ const AlgorithmInfo kOwnLoopsRow{
 
 TEST(PyramidFiles, AnAlgorithmThatShowsNothingIsRefused) {
     add_to_catalog(kOwnLoopsRow);
-    const Directory directory;
+    const testing::TempDirectory directory;
     JobOptions options;
     options.scene = std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/cornell.pbrt";
     options.algorithm = "own-loops";
@@ -280,9 +268,9 @@ TEST(PyramidFiles, AnAlgorithmThatShowsNothingIsRefused) {
     TableCacheOptions no_cache;
     no_cache.directory = "off";
     ::testing::internal::CaptureStderr();
-    EXPECT_EQ(render_pyramid(options, {.directory = directory.path("p")}, 1, no_cache), kUsage);
+    EXPECT_EQ(render_pyramid(options, {.directory = directory.file("p")}, 1, no_cache), kUsage);
     EXPECT_NE(::testing::internal::GetCapturedStderr().find("'own-loops' does its own loops"), std::string::npos);
-    EXPECT_TRUE(fs::is_empty(directory.path("p")));
+    EXPECT_TRUE(fs::is_empty(directory.file("p")));
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "common/core/atomic_file.h"
 #include "common/film/exr_io.h"
 #include "tests/support/bench_lines.h"
+#include "tests/support/temp_directory.h"
 
 namespace lightloom::client::report {
 namespace {
@@ -25,19 +26,6 @@ using testing::MadeRun;
 using testing::scene_line;
 using testing::start_line;
 using testing::text_of;
-
-class Directory {
-  public:
-    Directory() {
-        std::string name = (fs::temp_directory_path() / "lightloom-test-XXXXXX").string();
-        path_ = ::mkdtemp(name.data());
-    }
-    ~Directory() { fs::remove_all(path_); }
-    std::string path(const std::string& name = "") const { return (path_ / name).string(); }
-
-  private:
-    fs::path path_;
-};
 
 Curve power_law(double at_one, double from, double to, double exponent = -1) {
     Curve curve;
@@ -368,10 +356,10 @@ void write_images(const std::string& directory) {
 
 TEST(Page, HasEverySectionAndNothingFromElsewhere) {
     if (const Status found = find_gnuplot(); !found.ok()) GTEST_SKIP() << found.message();
-    const Directory directory;
-    ASSERT_TRUE(write_file_atomically(directory.path("r.jsonl"), text_of(suite())).ok());
-    write_images(directory.path("r.images"));
-    const Result<Results> results = read_results(std::vector<std::string>{directory.path("r.jsonl")});
+    const testing::TempDirectory directory;
+    ASSERT_TRUE(write_file_atomically(directory.file("r.jsonl"), text_of(suite())).ok());
+    write_images(directory.file("r.images"));
+    const Result<Results> results = read_results(std::vector<std::string>{directory.file("r.jsonl")});
     ASSERT_TRUE(results.ok()) << results.status().message();
     const Comparison comparison = compare_results(*results);
     ASSERT_EQ(comparison.panels.size(), 3u);
