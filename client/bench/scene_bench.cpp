@@ -228,7 +228,7 @@ Result<std::unique_ptr<MeasuredRender>> SceneBench::start(const BenchRun& run, s
         // Without samples the time bounds a job; with both, the job has the samples and the run ends at its time.
         spec.samples_per_pixel = uint32_t(run.budget.samples);
         spec.time_limit_seconds = run.budget.samples > 0 ? 0 : run.budget.seconds;
-        return ServiceRender::start(*options_.service, spec, "bench " + scene_.name + " " + run.algorithm.label);
+        return ServiceRender::start(*options_.service, spec, "bench " + scene_.name + " " + run.algorithm.label, stop);
     }
     const auto preparation = preparation_of(run, stop);
     if (!preparation.ok()) return preparation.status();

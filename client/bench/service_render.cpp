@@ -4,14 +4,29 @@
 #include <thread>
 
 #include "client/run_job.h"
+#include "common/core/utf8.h"
 #include "common/film/exr_io.h"
 
 namespace lightloom::client {
+namespace {
 
-Result<std::unique_ptr<MeasuredRender>> ServiceRender::start(JobPort& port, const JobSpec& spec, const std::string& name) {
-    auto job = submit(port, spec, {.name = name, .owner = {}});
-    if (!job.ok()) return job.status();
-    return std::unique_ptr<MeasuredRender>(new ServiceRender(port, *std::move(job)));
+/// Between two looks at a job.
+constexpr auto kPause = std::chrono::milliseconds(50);
+
+}  // namespace
+
+Result<std::unique_ptr<MeasuredRender>> ServiceRender::start(JobPort& port, const JobSpec& spec, const std::string& name,
+                                                             std::stop_token stop) {
+    auto submitted = submit(port, spec, {.name = std::string(clipped_utf8(name, JobLabel::kMaxBytes)), .owner = {}});
+    if (!submitted.ok()) return submitted.status();
+    std::unique_ptr<ServiceRender> render(new ServiceRender(port, *std::move(submitted)));
+    for (; render->job_.state == JobState::kPreparing; std::this_thread::sleep_for(kPause)) {
+        if (stop.stop_requested()) return Status(StatusCode::kCancelled, "interrupted");
+        auto job = port.get_job(render->job_.job_id);
+        if (!job.ok()) return job.status();
+        render->job_ = *std::move(job);
+    }
+    return std::unique_ptr<MeasuredRender>(std::move(render));
 }
 
 ServiceRender::~ServiceRender() {
@@ -27,7 +42,6 @@ Status ServiceRender::take(const std::string& exr, uint64_t iterations) {
 }
 
 Status ServiceRender::advance(uint64_t /*iteration_limit*/, std::stop_token stop) {
-    constexpr auto kPause = std::chrono::milliseconds(50);
     for (;; std::this_thread::sleep_for(kPause)) {
         if (stop.stop_requested()) return {StatusCode::kCancelled, "interrupted"};
         auto job = port_.get_job(job_.job_id);

@@ -13,8 +13,10 @@ namespace lightloom::client {
 /// transfer late.
 class ServiceRender final : public MeasuredRender {
   public:
-    /// Submits the job, whose scene the service has. It bounds itself: `spec` has samples or a time.
-    static Result<std::unique_ptr<MeasuredRender>> start(JobPort& port, const JobSpec& spec, const std::string& name);
+    /// Submits the job, whose scene the service has, and waits until it renders; after a stop request it is cancelled. It bounds
+    /// itself: `spec` has samples or a time.
+    static Result<std::unique_ptr<MeasuredRender>> start(JobPort& port, const JobSpec& spec, const std::string& name,
+                                                         std::stop_token stop);
     /// Cancels a job that has not ended.
     ~ServiceRender() override;
     Status advance(uint64_t iteration_limit, std::stop_token stop) override;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "client/bench/measured_run.h"
+#include "client/bench/numbers.h"
 #include "client/bench/results_book.h"
 #include "client/bench/suite_clock.h"
 #include "client/bench/timed_stop.h"
@@ -63,8 +64,8 @@ class SuiteRun {
     Result<std::string> keep_image(const std::string& name, const RgbImage& image);
     Result<std::string> keep_reference(const SceneBench& bench);
     Status measure_shares(SceneBench& bench, double end);
-    /// Says once for each scene that a run was cut which has no time of its own.
-    Status say_cut(const std::string& scene, const std::string& what);
+    /// Says once for each scene and `thing` what was cut.
+    Status say_cut(const std::string& scene, const std::string& thing, const std::string& what);
     void report(const MeasuredRun& run) const;
 
     const Suite& suite_;
@@ -170,8 +171,8 @@ Status SuiteRun::run_scene(const SuiteScene& scene, double later_weight) {
     return clock_.limited() ? Status() : book_.forget_cuts(scene.name);
 }
 
-Status SuiteRun::say_cut(const std::string& scene, const std::string& what) {
-    return said_.insert(what.substr(0, what.find("->"))).second ? book_.append(cut_line(scene, what)) : Status();
+Status SuiteRun::say_cut(const std::string& scene, const std::string& thing, const std::string& what) {
+    return said_.insert(thing).second ? book_.append(cut_line(scene, what)) : Status();
 }
 
 Status SuiteRun::run_seed(SceneBench& bench, uint64_t seed, const RunBudget& budget, const Deadline& deadline) {
@@ -215,10 +216,9 @@ Status SuiteRun::run_seed(SceneBench& bench, uint64_t seed, const RunBudget& bud
         if (!render.ok() && limit.timed_out()) {
             too_short_[algorithm.label] = deadline.cap;
             --runs_total_;
-            char text[64];
-            std::snprintf(text, sizeof text, "%.3g s", deadline.cap);
-            LL_RETURN_IF_ERROR(
-                say_cut(run.scene, algorithm.label + " is not measured: it does not learn its tables within -> " + text));
+            LL_RETURN_IF_ERROR(say_cut(
+                run.scene, algorithm.label,
+                algorithm.label + " is not measured: it does not learn its tables within " + formatted("%.3g s", deadline.cap)));
             continue;
         }
         if (!render.ok()) return of_run(run, render.status());
@@ -238,8 +238,9 @@ Status SuiteRun::finish(SceneBench& bench, MeasuredRun& run) {
     }
     const uint64_t asked = run.run().budget.samples;
     if (run.was_cut() && asked > 0) {
-        LL_RETURN_IF_ERROR(say_cut(run.run().scene, "samples of each run " + std::to_string(asked) + " -> " +
-                                                        std::to_string(run.cost().iterations) + " or so"));
+        LL_RETURN_IF_ERROR(
+            say_cut(run.run().scene, "samples",
+                    "samples of each run " + std::to_string(asked) + " -> " + std::to_string(run.cost().iterations) + " or so"));
     }
     LL_RETURN_IF_ERROR(book_.finish(run.run(), run.last_line(file)));
     ++runs_done_;
@@ -270,7 +271,8 @@ Status SuiteRun::measure_shares(SceneBench& bench, double end) {
         const double left = clock_.limited() ? end - clock_.elapsed() : std::numeric_limits<double>::infinity();
         const TimedStop limit(stop_, std::max(0.0, left));
         const auto line = left > 0 ? bench.shares(algorithm, limit.token()) : Result<Json>(Status(StatusCode::kCancelled, ""));
-        if (!line.ok() && (left <= 0 || limit.timed_out())) return say_cut(scene, "shares of techniques are not measured");
+        if (!line.ok() && (left <= 0 || limit.timed_out()))
+            return say_cut(scene, "shares", "shares of techniques are not measured");
         // Some algorithms show no contributions, and some find no light in a scene: then there is nothing to show.
         if (line.status().code() == StatusCode::kInvalidArgument || line.status().code() == StatusCode::kFailedPrecondition)
             continue;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdarg>
 
+#include "client/bench/numbers.h"
 #include "client/bench/suite_table.h"
 
 namespace lightloom::client {
@@ -36,12 +37,12 @@ Finish finish_of(const Json& done) {
     return f;
 }
 
-/// Median of one field; for an even number the mean of the middle two.
+/// Of one field.
 template <class Field>
-double median(std::vector<Finish> runs, Field field) {
-    std::sort(runs.begin(), runs.end(), [&](const Finish& a, const Finish& b) { return field(a) < field(b); });
-    const size_t middle = runs.size() / 2;
-    return runs.size() % 2 ? field(runs[middle]) : (field(runs[middle - 1]) + field(runs[middle])) / 2;
+double median(const std::vector<Finish>& runs, Field field) {
+    std::vector<double> values;
+    for (const Finish& run : runs) values.push_back(field(run));
+    return client::median(std::move(values));
 }
 
 [[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...) {
