@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <set>
 
 #include "client/bench/suite_run.h"
 #include "client/bench/suite_table.h"
@@ -104,8 +105,9 @@ Result<bool> report(const Suite& suite, const SuiteResults& results) {
     } else {
         std::fputs(suite_table(results.lines).c_str(), stdout);
     }
+    std::set<std::string> said;  // several processes may have cut the same
     for (const Json& line : results.lines) {
-        if (line.value("type", std::string()) != "cut") continue;
+        if (line.value("type", std::string()) != "cut" || !said.insert(line_text(line)).second) continue;
         std::printf("cut by --budget: %s: %s\n", line.value("scene", std::string()).c_str(),
                     line.value("what", std::string()).c_str());
     }
