@@ -146,7 +146,7 @@ Result<TableFile> read_tables(const std::string& path, const Scene& scene) {
     if (!bytes.ok()) return bytes.status();
     const auto content = tables_of_file(*std::move(bytes));
     if (!content.ok()) return invalid_argument(path + ": " + content.status().message());
-    const TablePart* const known[] = {&SubspaceTables::kPart};
+    const TablePart* const known[] = {&EmissionPart::kPart, &SubspaceTables::kPart};
     const auto parts = parse_tables(*content, known);
     if (!parts.ok()) return invalid_argument(path + ": " + parts.status().message());
     const auto tables = parts->get<SubspaceTables>();

@@ -40,7 +40,7 @@ Result<AlgorithmChoice> parse_algorithm(const std::string& text) {
 }
 
 Result<Preparation> prepare(const Scene& scene, const RenderSettings& settings, std::stop_token stop, TrainingReport* report) {
-    if (!settings.algorithm.info().learning) return Preparation{};
+    if (!settings.algorithm.learning()) return Preparation{};
     const auto begin = Clock::now();
     TrainingReport own;
     if (!report) report = &own;

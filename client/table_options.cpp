@@ -49,7 +49,7 @@ void add_measured_table_cache_options(cli::App command, TableCacheOptions& optio
 
 Result<Preparation> cached_preparation(const Scene& scene, const JobSpec& spec, const TableCacheOptions& options, bool quiet,
                                        std::stop_token stop) {
-    const LearningInfo* learning = spec.algorithm.info().learning;
+    const LearningInfo* learning = spec.algorithm.learning();
     if (!learning) return Preparation();
     const TableCache cache(options.path(), options.bytes());
     Digest key;

@@ -75,7 +75,7 @@ Status Coordinator::prepare(JobRecord& job, std::stop_token stop) {
                                                           " GB, so lower the resolution or give a crop window");
     spec.frame = facts->frame;
     if (spec.max_depth < 0) spec.max_depth = facts->max_depth;
-    if (spec.algorithm.info().learning) return prepare_tables(job, std::move(spec), *std::move(facts), true);
+    if (spec.algorithm.learning()) return prepare_tables(job, std::move(spec), *std::move(facts), true);
     plan_units(job, std::move(spec), *std::move(facts), {});
     return {};
 }

@@ -128,7 +128,7 @@ Status Coordinator::take_over_tables(JobRecord& job) {
 
 bool Coordinator::adopt_cached_tables(JobRecord& job, const JobSpec& spec, const SceneFacts& facts) {
     const Digest key = table_key(options_.identity, spec);
-    auto entry = table_cache_.find(key, spec.algorithm.info().learning->parts);
+    auto entry = table_cache_.find(key, spec.algorithm.learning()->parts);
     if (!entry) return false;
     log_info("{}: tables {} of an earlier job are used again", job.id, entry->info.asset.digest.hex().substr(0, 12));
     entry->info.capped_by_time_limit = job.capped_by_time_limit;
@@ -243,8 +243,8 @@ bool Coordinator::repair_tables(const std::string& job_id) {
     {
         const std::lock_guard lock(mutex_);
         job = find_job(job_id);
-        if (!job || is_terminal(job->state) || !job->spec.algorithm.info().learning) return false;
-        parts = job->spec.algorithm.info().learning->parts;
+        if (!job || is_terminal(job->state) || !job->spec.algorithm.learning()) return false;
+        parts = job->spec.algorithm.learning()->parts;
         guide = job->guide_bytes;
         asset = guide ? job->guide : job->tables.asset;
         cache_key = job->tables.cache_key;

@@ -78,7 +78,7 @@ SceneReader make_scene_reader(std::filesystem::path scratch) {
         if (!scene.ok()) return scene.status();
         auto facts = scene_facts(scene->description, spec);
         if (!facts.ok()) return facts;
-        if (!spec.algorithm.info().learning) return facts;
+        if (!spec.algorithm.learning()) return facts;
         // The scene is read a second time when it is needed, while workers trace, so that no waiting job holds a scene.
         // This read does not wait for a turn, because workers wait for this job.
         facts->build_scene = [&assets, scratch, root = spec.scene_root,

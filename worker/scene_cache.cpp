@@ -181,7 +181,7 @@ Result<Tables> RendererCache::tables(const UnitLease& lease, const Scene& scene,
         return Status(bytes.status().code(),
                       "this worker cannot get the tables " + asset.digest.hex() + ": " + bytes.status().message());
     }
-    const LearningInfo* learning = lease.spec.algorithm.info().learning;
+    const LearningInfo* learning = lease.spec.algorithm.learning();
     if (!learning) return failed_precondition("algorithm '" + lease.spec.algorithm.name() + "' reads no tables");
     auto tables = parse_tables(*bytes, learning->parts);
     Status status = tables.ok() ? tables->validate(scene.emitters()) : tables.status();

@@ -77,7 +77,7 @@ Result<MadeReference> make_reference(const std::shared_ptr<const Scene>& scene, 
     made.description = describe(spec, made.render, made.regions, made.exr);
     made.description["scene"] = scene_file;
     made.description["threads"] = threads;
-    if (spec.algorithm.info().learning) made.description["tables"] = preparation->cached ? "cached" : "made";
+    if (spec.algorithm.learning()) made.description["tables"] = preparation->cached ? "cached" : "made";
     return made;
 }
 

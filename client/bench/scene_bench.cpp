@@ -176,7 +176,7 @@ Result<std::string> SceneBench::make_missing_reference(const std::string& stem, 
 }
 
 std::string SceneBench::tables_word(const AlgorithmChoice& algorithm) const {
-    if (!algorithm.settings.info().learning || !options_.server.empty()) return {};
+    if (!algorithm.settings.learning() || !options_.server.empty()) return {};
     if (suite_.shared_tables) return "shared";
     return options_.cache.path().empty() ? "made" : "cached";
 }

@@ -77,9 +77,9 @@ Rgb emitter_hit(const Scene& scene, const PathVertex* z, int t, PathView* view) 
     view->k = k;
     view_suffix<detail>(z, t, k, view);
     view->delta[0] = view->discrete_source = false;
-    view->fwd[0] = emitters.pdf_position(e, v.wo);
+    view->fwd[0] = emitters.pdf_position(e, v.p, v.wo);
     if (k >= 2) {
-        const float direction_pdf = emitters.pdf_direction(e, v.ng, v.wo);
+        const float direction_pdf = emitters.pdf_direction(e, v.p, v.ng, v.wo, z[t - 2].p);
         if constexpr (detail == ViewDetail::kSubspace) view_start(emitters, e, v.p, v.ng, v.wo, direction_pdf, view);
         view->fwd[1] = double(direction_pdf) * v.to_previous;
         view->next_event = emitters.pdf_next_event(e, z[t - 2].p, v.p, v.ng, -v.wo);
@@ -100,12 +100,12 @@ Rgb environment_hit(const Scene& scene, const PathVertex* z, int t, const WalkRa
     view_suffix<detail>(z, t, k, view);
     view->delta[0] = view->discrete_source = false;
     view->rev[0] = ray.pdf;
-    view->fwd[0] = emitters.pdf_position(e, -ray.direction);
+    view->fwd[0] = emitters.pdf_position(e, {}, -ray.direction);
     if (k >= 2) {
-        const float direction_pdf = emitters.pdf_direction(e, {}, -ray.direction);
+        const float direction_pdf = emitters.pdf_direction(e, {}, {}, -ray.direction, z[t - 1].p);
         if constexpr (detail == ViewDetail::kSubspace) view_start(emitters, e, {}, {}, -ray.direction, direction_pdf, view);
         view->fwd[1] = double(direction_pdf) * abs_dot(z[t - 1].ng, ray.direction);
-        view->next_event = view->fwd[0];
+        view->next_event = emitters.pdf_next_event(e, {}, {}, {}, ray.direction);
     }
     return ray.alpha * radiance;
 }
@@ -131,11 +131,11 @@ Rgb next_event(const Scene& scene, const PathVertex* z, int t, const NextEventSa
     view->delta[0] = view->delta[1] = false;
     view->discrete_source = e.is_discrete();
     view->rev[0] = e.can_be_hit() ? double(s.pdf_fwd) * light.geometry : 0.0;
-    view->fwd[0] = emitters.pdf_position(e, -light.wi);
+    view->fwd[0] = emitters.pdf_position(e, light.position, -light.wi);
     view->next_event = light.pdf;
     const float receiver = abs_dot(v.ng, light.wi);
     const float inv_d2 = e.is_infinite() ? 1.0f : 1 / length_squared(light.position - v.p);
-    const float direction_pdf = emitters.pdf_direction(e, light.normal, -light.wi);
+    const float direction_pdf = emitters.pdf_direction(e, light.position, light.normal, -light.wi, v.p);
     view->fwd[1] = double(direction_pdf) * (receiver * inv_d2);
     if constexpr (detail == ViewDetail::kSubspace) {
         view_start(emitters, e, light.position, light.normal, -light.wi, direction_pdf, view);

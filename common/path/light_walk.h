@@ -22,8 +22,9 @@ class LightSampler : public WalkSampler {
     Vec2 direction() { return point(2); }
 };
 
-/// Starts a light sub-path: sets y_0 and the ray that leaves it. False when nothing is emitted. y_0's alpha is F(1) /
-/// C(1), its emission without the direction.
+/// Starts a light sub-path: sets y_0 and the ray that leaves it. False when the place of y_0 is black. y_0's alpha is F(1) /
+/// C(1), its emission without the direction. The ray is black if nothing leaves y_0 in its direction; y_0 counts all the
+/// same, because its density is that of its place alone.
 inline bool start_light_path(const Scene& scene, LightSampler& sampler, PathVertex* y0, WalkRay* ray) {
     EmissionSample s;
     if (!scene.emitters().sample_emission(sampler.pick(), sampler.position(), sampler.direction(), &s)) return false;
@@ -45,7 +46,7 @@ inline bool start_light_path(const Scene& scene, LightSampler& sampler, PathVert
     ray->clearance = e.clearance;
     ray->previous_hittable = e.can_be_hit();
     ray->origin = e.is_area() ? offset_origin(s.position, s.normal, s.direction, e.reach) : s.position;
-    return true;
+    return !y0->alpha.is_black();
 }
 
 /// Traces a light sub-path into `path` (room for `max_vertices`); returns the number of vertices, y_0 included. Vertices
@@ -54,6 +55,7 @@ inline int trace_light_path(const Scene& scene, LightSampler& sampler, int max_v
                             WalkCounters* counters) {
     WalkRay ray;
     if (max_vertices < 1 || !start_light_path(scene, sampler, &path[0], &ray)) return 0;
+    if (ray.alpha.is_black()) return 1;
     const bool area = scene.emitters()[uint32_t(path[0].emitter)].is_area();
     const float start = scalar_of(ray.alpha);
     int n = 1;

@@ -82,13 +82,12 @@ Rgb EmitterSet::emitted(const Emitter& e, const Vec3& position, const Vec3& norm
     return {};
 }
 
-float EmitterSet::pdf_position(const Emitter& e, const Vec3& w) const {
-    if (e.is_area()) return e.pmf * e.inv_area;
-    if (e.kind == EmitterKind::kEnvironment) return e.pmf * environment_.pdf_solid_angle(-w);
-    return e.pmf;
+float EmitterSet::place_on_emitter(const Emitter& e, const Vec3& w) const {
+    if (e.is_area()) return e.inv_area;
+    return e.kind == EmitterKind::kEnvironment ? environment_.pdf_solid_angle(-w) : 1;
 }
 
-float EmitterSet::pdf_direction(const Emitter& e, const Vec3& normal, const Vec3& w) const {
+float EmitterSet::departure_by_power(const Emitter& e, const Vec3& normal, const Vec3& w) const {
     switch (e.kind) {
         case EmitterKind::kTriangle:
         case EmitterKind::kSphere: {
@@ -106,61 +105,88 @@ float EmitterSet::pdf_direction(const Emitter& e, const Vec3& normal, const Vec3
     return 0;
 }
 
-bool EmitterSet::sample_emission(double pick, Vec2 u_position, Vec2 u_direction, EmissionSample* out) const {
-    if (emitters_.empty()) return false;
-    float rest = 0;
-    out->emitter = pick_.sample(pick, &rest);
+void EmitterSet::sample_place(double pick, Vec2 u, EmissionSample* out, float* rest) const {
+    out->emitter = pick_.sample(pick, rest);
+    sample_on_emitter(u, out, *rest);
+}
+
+void EmitterSet::sample_on_emitter(Vec2 u, EmissionSample* out, float rest) const {
+    const Emitter& e = emitters_[out->emitter];
+    switch (e.kind) {
+        case EmitterKind::kTriangle: {
+            const Vec2 b = sample_triangle(u);
+            out->position = e.position + e.edge1 * b.x + e.edge2 * b.y;
+            out->normal = e.normal;
+            break;
+        }
+        case EmitterKind::kSphere: {
+            const Vec3 n = sample_sphere(u);
+            out->position = e.position + n * e.radius;
+            out->normal = e.inward ? -n : n;
+            break;
+        }
+        case EmitterKind::kPoint:
+        case EmitterKind::kSpot:
+        case EmitterKind::kProjection:
+        case EmitterKind::kGoniometric: out->position = e.position; break;
+        case EmitterKind::kDistant: out->direction = out->normal = e.normal; break;
+        case EmitterKind::kEnvironment: out->direction = out->normal = -environment_.sample(rest, u); break;
+    }
+}
+
+void EmitterSet::start_before_scene(const Vec3& point, EmissionSample* out) const {
+    const Vec3& w = out->direction;
+    out->position = point - w * (dot(point - centre_, w) + scene_radius_);
+}
+
+void EmitterSet::sample_departure(float rest, Vec2 u, EmissionSample* out) const {
     const Emitter& e = emitters_[out->emitter];
     switch (e.kind) {
         case EmitterKind::kTriangle:
         case EmitterKind::kSphere: {
-            if (e.kind == EmitterKind::kTriangle) {
-                const Vec2 b = sample_triangle(u_position);
-                out->position = e.position + e.edge1 * b.x + e.edge2 * b.y;
-                out->normal = e.normal;
-            } else {
-                const Vec3 n = sample_sphere(u_position);
-                out->position = e.position + n * e.radius;
-                out->normal = e.inward ? -n : n;
-            }
-            Vec3 local = sample_cosine_hemisphere_concentric(u_direction);
+            Vec3 local = sample_cosine_hemisphere_concentric(u);
             if (e.two_sided && rest < 0.5f) local.z = -local.z;
             out->direction = Frame(out->normal).to_world(local);
             break;
         }
-        case EmitterKind::kPoint:
-            out->position = e.position;
-            out->direction = out->normal = sample_sphere(u_direction);
-            break;
+        case EmitterKind::kPoint: out->direction = out->normal = sample_sphere(u); break;
         case EmitterKind::kSpot: {
-            const float height = u_direction.x * e.total_height;
+            const float height = u.x * e.total_height;
             const float z = 1 - height, r = safe_sqrt(height * (2 - height));
-            const math::SinCos sc = math::sincos_turns(u_direction.y);
-            out->position = e.position;
+            const math::SinCos sc = math::sincos_turns(u.y);
             out->direction = out->normal = Frame(e.normal).to_world({r * float(sc.cos), r * float(sc.sin), z});
             break;
         }
         case EmitterKind::kProjection:
-        case EmitterKind::kGoniometric:
-            out->position = e.position;
-            out->direction = out->normal = direction_map(e).sample(rest, u_direction);
-            break;
+        case EmitterKind::kGoniometric: out->direction = out->normal = direction_map(e).sample(rest, u); break;
         case EmitterKind::kDistant:
         case EmitterKind::kEnvironment: {
-            out->direction = e.kind == EmitterKind::kDistant ? e.normal : -environment_.sample(rest, u_position);
-            out->normal = out->direction;
-            const Vec2 d = sample_disk(u_direction);
+            const Vec2 d = sample_disk(u);
             const Frame f(out->direction);
             out->position = centre_ + (f.s * d.x + f.t * d.y - f.n) * scene_radius_;
             break;
         }
     }
-    out->pdf_position = pdf_position(e, out->direction);
-    out->pdf_direction = pdf_direction(e, out->normal, out->direction);
-    if (!(out->pdf_position > 0 && out->pdf_direction > 0)) return false;
+}
+
+bool EmitterSet::sample_emission(double pick, Vec2 u_position, Vec2 u_direction, EmissionSample* out) const {
+    if (emitters_.empty()) return false;
+    float rest = 0;
+    out->alpha = {};
+    if (!learned_) [[likely]] {
+        sample_place(pick, u_position, out, &rest);
+        sample_departure(rest, u_direction, out);
+    } else {
+        sample_learned(pick, u_position, u_direction, out);
+    }
+    const Emitter& e = emitters_[out->emitter];
+    out->pdf_position = pdf_position(e, out->position, out->direction);
+    out->pdf_direction = pdf_direction(e, out->position, out->normal, out->direction, out->position);
+    if (!(out->pdf_position > 0)) return false;
+    if (!(out->pdf_direction > 0)) return true;
     const float cosine = e.is_area() ? abs_dot(out->normal, out->direction) : 1;
     out->alpha = emitted(e, out->position, out->normal, out->direction) * (cosine / (out->pdf_position * out->pdf_direction));
-    return !out->alpha.is_black();
+    return true;
 }
 
 bool EmitterSet::sample_next_event(const Vec3& reference, double pick, Vec2 u, NextEventSample* out) const {
@@ -173,7 +199,7 @@ bool EmitterSet::sample_next_event(const Vec3& reference, double pick, Vec2 u, N
         out->normal = -out->wi;
         out->position = reference + out->wi * (2 * scene_radius_);
         out->geometry = 1;
-        out->pdf = pdf_position(e, -out->wi);
+        out->pdf = place_by_power(e, -out->wi);
     } else {
         if (e.kind == EmitterKind::kTriangle) {
             const Vec2 b = sample_triangle(u);
@@ -233,9 +259,9 @@ bool EmitterSet::connect_point(const Vec3& reference, const Vec3& position, cons
 
 float EmitterSet::pdf_next_event(const Emitter& e, const Vec3& reference, const Vec3& position, const Vec3& normal,
                                  const Vec3& wi) const {
-    if (e.kind != EmitterKind::kSphere) return pdf_position(e, -wi);
+    if (e.kind != EmitterKind::kSphere) return place_by_power(e, -wi);
     const float centre_d2 = length_squared(e.position - reference);
-    if (!samples_cone(e, centre_d2)) return pdf_position(e, -wi);
+    if (!samples_cone(e, centre_d2)) return place_by_power(e, -wi);
     const float solid_angle = kTwoPi * cone_height(e.radius, centre_d2);
     const float d2 = length_squared(position - reference);
     // Only the near side is sampled.

@@ -2,13 +2,18 @@
 // Emitters: everything that light sub-paths start from and next event estimation connects to. One list; an emissive
 // triangle is one emitter, all infinite lights together are one.
 //
+// Light sub-paths leave the emitters in proportion to power, or, where a table was learned for the scene, from the places
+// and in the directions that matter. Next event estimation always chooses by power.
+//
 // The "native measure" of a point x_0 on an emitter: area (m^-2) for triangles and spheres, solid angle (sr^-1) of the
 // direction towards it for the environment, counting measure for all others.
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "common/scene/description.h"
+#include "common/scene/emission_table.h"
 #include "common/scene/environment.h"
 #include "common/scene/light_map.h"
 #include "common/scene/sampling.h"
@@ -20,7 +25,7 @@ enum class EmitterKind : uint8_t { kTriangle, kSphere, kPoint, kSpot, kDistant, 
 struct Emitter {
     EmitterKind kind = EmitterKind::kTriangle;
     bool two_sided = false;
-    float pmf = 0;        ///< Selection probability (by power), for light sub-paths and next event alike.
+    float pmf = 0;        ///< Selection probability by power.
     int32_t map = kNone;  ///< Index of the map that multiplies `radiance`: SurfaceMap of area lights, DirectionMap of kProjection
                           ///< and kGoniometric, which have one.
     Rgb radiance;         ///< Radiance; intensity of lights at a point; irradiance for distant; unused for environment.
@@ -80,6 +85,9 @@ class EmitterSet {
     /// `emitters` need no pmf yet; `centre` and `radius` are those of the sphere around the scene, for infinite lights.
     EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius, LightMaps maps = {});
 
+    /// Makes light sub-paths leave as the table says, which must be valid for these emitters; null: by power.
+    void guide_emission(std::shared_ptr<const EmissionTable> table) { learned_ = std::move(table); }
+
     bool empty() const { return emitters_.empty(); }
     const std::vector<Emitter>& all() const { return emitters_; }
     const Emitter& operator[](uint32_t i) const { return emitters_[i]; }
@@ -93,7 +101,8 @@ class EmitterSet {
     /// Scalar power of an emitter, W.
     double power(const Emitter& e) const;
 
-    /// Samples the start of a light sub-path. False when nothing emits there (a black texel, for instance).
+    /// Samples the start of a light sub-path. False when there is no place. Nothing may leave it in the direction that was chosen,
+    /// behind an area light for instance: then alpha is black, and x_0 is a point on a light all the same.
     bool sample_emission(double pick, Vec2 u_position, Vec2 u_direction, EmissionSample* out) const;
     /// Chooses x_0 from `reference`. False when the chosen point cannot light `reference` (wrong side, outside of a
     /// spot's cone...).
@@ -112,15 +121,35 @@ class EmitterSet {
         if (e.kind == EmitterKind::kEnvironment) return environment_.radiance(-w);
         return e.has_direction_map() ? e.radiance * direction_map(e).mean() : radiance_at(e, position);
     }
-    /// pL of x_0: density of sample_emission() for the point, native measure, pmf included. `w` as above (environment).
-    float pdf_position(const Emitter& e, const Vec3& w) const;
-    /// Density of the emission direction `w` given x_0: solid angle for finite lights, disc area for infinite ones.
-    float pdf_direction(const Emitter& e, const Vec3& normal, const Vec3& w) const;
+    /// pL of x_0: density of sample_emission() for the point at `position`, native measure, probability of the emitter
+    /// included. `w` as above (environment).
+    float pdf_position(const Emitter& e, const Vec3& position, const Vec3& w) const;
+    /// Density of the emission direction `w` given x_0 at `position`, whose geometric normal is `normal`: solid angle for
+    /// finite lights. For infinite ones, whose x_0 is `w`, it is the density of the ray through `x1` per area across it.
+    float pdf_direction(const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w, const Vec3& x1) const;
     /// Density of sample_next_event() at x_0, native measure, pmf included. `position`, `normal` at x_0; `wi` from the
     /// reference point to it.
     float pdf_next_event(const Emitter& e, const Vec3& reference, const Vec3& position, const Vec3& normal, const Vec3& wi) const;
 
   private:
+    /// The choice of x_0: the emitter, and the point on a finite light or the direction of an infinite one. `rest` receives a new
+    /// uniform number.
+    void sample_place(double pick, Vec2 u, EmissionSample* out, float* rest) const;
+    /// The same on out->emitter.
+    void sample_on_emitter(Vec2 u, EmissionSample* out, float rest) const;
+    /// The choice of the direction of a finite light or of the ray of an infinite one.
+    void sample_departure(float rest, Vec2 u, EmissionSample* out) const;
+    /// Both choices with the learned table.
+    void sample_learned(double pick, Vec2 u_position, Vec2 u_direction, EmissionSample* out) const;
+    /// Puts the origin of an infinite light's ray through `point` before the scene.
+    void start_before_scene(const Vec3& point, EmissionSample* out) const;
+    // The densities by power alone, and those that were learned alone.
+    float place_by_power(const Emitter& e, const Vec3& w) const { return e.pmf * place_on_emitter(e, w); }
+    float place_on_emitter(const Emitter& e, const Vec3& w) const;
+    float learned_place(const Emitter& e, const Vec3& position, const Vec3& w) const;
+    float departure_by_power(const Emitter& e, const Vec3& normal, const Vec3& w) const;
+    float learned_departure(const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w, const Vec3& x1) const;
+
     const DirectionMap& direction_map(const Emitter& e) const { return maps_.directions[size_t(e.map)]; }
     Rgb radiance_at(const Emitter& e, const Vec3& position) const {
         return e.map == kNone ? e.radiance : e.radiance * maps_.surfaces[size_t(e.map)].at(e, position);
@@ -128,6 +157,7 @@ class EmitterSet {
 
     std::vector<Emitter> emitters_;
     AliasTable pick_;
+    std::shared_ptr<const EmissionTable> learned_;
     Environment environment_;
     LightMaps maps_;
     int32_t environment_index_ = kNone;

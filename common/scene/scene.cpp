@@ -77,8 +77,8 @@ bool Scene::intersect(const Vec3& o, const Vec3& d, SurfacePoint* out, float cle
 void Scene::surface_point(const Vec3& o, const Vec3& d, const RawHit& hit, SurfacePoint* out) const {
     const bool instanced = hit.instance >= 0;
     const ObjectDefinition* object =
-        instanced ? &description_.objects[size_t(description_.instances[size_t(hit.instance)].object)] : nullptr;
-    const auto& meshes = instanced ? object->meshes : description_.meshes;
+        instanced ? &description_->objects[size_t(description_->instances[size_t(hit.instance)].object)] : nullptr;
+    const auto& meshes = instanced ? object->meshes : description_->meshes;
     if (hit.geometry < meshes.size()) {
         triangle_point(meshes[hit.geometry], hit, out);
         const int32_t first = instanced ? kNone : mesh_first_emitter_[hit.geometry];
@@ -91,7 +91,7 @@ void Scene::surface_point(const Vec3& o, const Vec3& d, const RawHit& hit, Surfa
             out->reach = e.reach;
         }
     } else {
-        const Sphere& s = (instanced ? object->spheres : description_.spheres)[hit.primitive];
+        const Sphere& s = (instanced ? object->spheres : description_->spheres)[hit.primitive];
         Vec3 from = o, along = d;
         if (instanced) {
             const Mat4& inv = instance_inverse_[size_t(hit.instance)];
@@ -108,7 +108,7 @@ void Scene::surface_point(const Vec3& o, const Vec3& d, const RawHit& hit, Surfa
         out->emitter = instanced ? kNone : sphere_emitter_[hit.primitive];
     }
     if (instanced) {
-        const Mat4& m = description_.instances[size_t(hit.instance)].object_to_world;
+        const Mat4& m = description_->instances[size_t(hit.instance)].object_to_world;
         const Mat4& inv = instance_inverse_[size_t(hit.instance)];
         out->p = m.point(out->p);
         float reach = 0;
@@ -126,17 +126,17 @@ void Scene::surface_point(const Vec3& o, const Vec3& d, const RawHit& hit, Surfa
 void Scene::tilt(const RawHit& hit, SurfacePoint* point) const {
     point->material = choose_material(tables_, point->material, {point->uv, point->p}, position_hash(point->p));
     if (point->material == kNone) return;
-    const Material& material = description_.materials[size_t(point->material)];
+    const Material& material = description_->materials[size_t(point->material)];
     if (material.displacement == kNone && material.normal_map == kNone) return;
-    const Instance* instance = hit.instance >= 0 ? &description_.instances[size_t(hit.instance)] : nullptr;
+    const Instance* instance = hit.instance >= 0 ? &description_->instances[size_t(hit.instance)] : nullptr;
     const Mat4* to_object = instance ? &instance_inverse_[size_t(hit.instance)] : nullptr;
-    const ObjectDefinition* object = instance ? &description_.objects[size_t(instance->object)] : nullptr;
-    const auto& meshes = object ? object->meshes : description_.meshes;
+    const ObjectDefinition* object = instance ? &description_->objects[size_t(instance->object)] : nullptr;
+    const auto& meshes = object ? object->meshes : description_->meshes;
     SurfaceTangents tangents;
     if (hit.geometry < meshes.size()) {
         tangents = tangents_of(meshes[hit.geometry], hit);
     } else {
-        const Sphere& s = (object ? object->spheres : description_.spheres)[hit.primitive];
+        const Sphere& s = (object ? object->spheres : description_->spheres)[hit.primitive];
         tangents = tangents_of(s, normalize((to_object ? to_object->point(point->p) : point->p) - s.centre));
     }
     if (instance) tangents.transform(instance->object_to_world, *to_object);
@@ -162,7 +162,7 @@ bool Scene::occluded(const Vec3& p, const Vec3& ng_p, float reach_p, const Vec3&
 
 float Scene::opacity(const void* user, const Accel::OpacityQuery& query) {
     const Scene& scene = *static_cast<const Scene*>(user);
-    const SceneDescription& d = scene.description_;
+    const SceneDescription& d = *scene.description_;
     const bool needs_place = !d.texture_spaces.empty();
     TexturePoint at{{query.u, query.v}, {}};
     TextureId alpha;

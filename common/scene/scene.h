@@ -58,15 +58,18 @@ struct SurfacePoint {
 
 class Scene {
   public:
-    Scene(const Scene&) = delete;
     Scene& operator=(const Scene&) = delete;
 
     /// Takes over the description. What validate() refuses fails with one clear line, which names the shape's place in
     /// the file.
     static Result<std::unique_ptr<Scene>> build(SceneDescription description, const SceneOptions& options = {});
 
+    /// The same scene, with light sub-paths that leave the lights as the table says (EmitterSet::guide_emission()). It shares the
+    /// geometry of this one, which must outlive it.
+    std::unique_ptr<const Scene> with_emission(std::shared_ptr<const EmissionTable> table) const;
+
     const SceneSummary& summary() const { return summary_; }
-    const SceneDescription& description() const { return description_; }
+    const SceneDescription& description() const { return *description_; }
     const Camera& camera() const { return camera_; }
     const EmitterSet& emitters() const { return emitters_; }
     const FrameLayout& frame() const { return frame_; }
@@ -90,6 +93,7 @@ class Scene {
 
   private:
     Scene() = default;
+    Scene(const Scene&) = default;
     void collect_emitters(std::vector<Emitter>* emitters, LightMaps* maps);
     /// Largest coordinate magnitude of everything in the scene.
     float largest_reach(const Bounds3& bounds) const;
@@ -103,9 +107,9 @@ class Scene {
     void triangle_point(const TriangleMesh& mesh, const RawHit& hit, SurfacePoint* out) const;
     static float opacity(const void* user, const Accel::OpacityQuery& query);
 
-    SceneDescription description_;
+    std::shared_ptr<SceneDescription> description_;
     TextureTables tables_;
-    std::unique_ptr<Accel> accel_;
+    std::shared_ptr<Accel> accel_;
     std::vector<int32_t> mesh_first_emitter_;  // per world mesh, kNone where it does not emit
     std::vector<int32_t> sphere_emitter_;      // per world sphere
     std::vector<Mat4> instance_inverse_;

@@ -59,7 +59,7 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters, LightMaps* maps) {
     // a ray can meet the shape.
     const auto area_emission = [&](const ShapeAttributes& attributes, std::vector<int32_t>* first_emitter) {
         const AreaEmission* emission =
-            attributes.emission != kNone ? &description_.emissions[size_t(attributes.emission)] : nullptr;
+            attributes.emission != kNone ? &description_->emissions[size_t(attributes.emission)] : nullptr;
         if (emission && emission->radiance.is_black()) emission = nullptr;
         if (first_emitter) first_emitter->push_back(emission ? int32_t(emitters->size()) : kNone);
         return emission;
@@ -75,7 +75,7 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters, LightMaps* maps) {
     std::map<int32_t, Rgb> image_means;
     const auto add_map = [&](int32_t image, const auto& place) {
         if (image == kNone) return kNone;
-        const Image& source = description_.images[size_t(image)];
+        const Image& source = description_->images[size_t(image)];
         const auto [mean, inserted] = image_means.try_emplace(image);
         if (inserted) mean->second = source.mean();
         maps->surfaces.push_back({source, mean->second, place});
@@ -121,17 +121,17 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters, LightMaps* maps) {
         e.map = add_map(emission->image, s.orientation);
         emitters->push_back(e);
     };
-    for (const TriangleMesh& mesh : description_.meshes) add_mesh(mesh, false);
-    for (const Sphere& s : description_.spheres) add_sphere(s, false);
-    for (const TriangleMesh& mesh : description_.hidden_meshes) add_mesh(mesh, true);
-    for (const Sphere& s : description_.hidden_spheres) add_sphere(s, true);
-    for (const PointLight& l : description_.point_lights) {
+    for (const TriangleMesh& mesh : description_->meshes) add_mesh(mesh, false);
+    for (const Sphere& s : description_->spheres) add_sphere(s, false);
+    for (const TriangleMesh& mesh : description_->hidden_meshes) add_mesh(mesh, true);
+    for (const Sphere& s : description_->hidden_spheres) add_sphere(s, true);
+    for (const PointLight& l : description_->point_lights) {
         Emitter e = new_emitter(EmitterKind::kPoint, l.source, "point light");
         e.position = l.position;
         e.radiance = l.intensity;
         emitters->push_back(e);
     }
-    for (const SpotLight& l : description_.spot_lights) {
+    for (const SpotLight& l : description_->spot_lights) {
         Emitter e = new_emitter(EmitterKind::kSpot, l.source, "spot light");
         e.position = l.position;
         e.normal = l.axes.n;
@@ -140,9 +140,9 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters, LightMaps* maps) {
         e.falloff_height = l.falloff_height;
         emitters->push_back(e);
     }
-    for (const ImageLight& l : description_.image_lights) {
+    for (const ImageLight& l : description_->image_lights) {
         const bool projection = l.kind == ImageLight::Kind::kProjection;
-        const Image& image = description_.images[size_t(l.image)];
+        const Image& image = description_->images[size_t(l.image)];
         Emitter e = new_emitter(projection ? EmitterKind::kProjection : EmitterKind::kGoniometric, l.source,
                                 projection ? "projection light" : "goniometric light");
         e.position = l.position;
@@ -152,36 +152,36 @@ void Scene::collect_emitters(std::vector<Emitter>* emitters, LightMaps* maps) {
                                               : DirectionMap::goniometric(image, l.light_to_world));
         emitters->push_back(e);
     }
-    for (const DistantLight& l : description_.distant_lights) {
+    for (const DistantLight& l : description_->distant_lights) {
         Emitter e = new_emitter(EmitterKind::kDistant, l.source, "distant light");
         e.normal = l.direction;
         e.radiance = l.irradiance;
         emitters->push_back(e);
     }
-    if (!description_.infinite_lights.empty()) {
-        std::string source = description_.infinite_lights[0].source;
+    if (!description_->infinite_lights.empty()) {
+        std::string source = description_->infinite_lights[0].source;
         // All infinite lights are one emitter, which is sampled by their sum.
-        const size_t others = description_.infinite_lights.size() - 1;
+        const size_t others = description_->infinite_lights.size() - 1;
         if (others > 0 && !source.empty()) source += " (and " + std::to_string(others) + " more)";
         emitters->push_back(new_emitter(EmitterKind::kEnvironment, source, "infinite light"));
     }
 }
 
 float Scene::largest_reach(const Bounds3& bounds) const {
-    float reach = largest_coordinate(description_.camera.camera_to_world.point({0, 0, 0}));
+    float reach = largest_coordinate(description_->camera.camera_to_world.point({0, 0, 0}));
     if (!bounds.empty()) reach = std::max({reach, largest_coordinate(bounds.lo), largest_coordinate(bounds.hi)});
-    for (const TriangleMesh& mesh : description_.hidden_meshes)
+    for (const TriangleMesh& mesh : description_->hidden_meshes)
         for (const Vec3& p : mesh.positions) reach = std::max(reach, largest_coordinate(p));
-    for (const Sphere& s : description_.hidden_spheres) reach = std::max(reach, largest_coordinate(s.centre) + s.radius);
-    for (const PointLight& l : description_.point_lights) reach = std::max(reach, largest_coordinate(l.position));
-    for (const SpotLight& l : description_.spot_lights) reach = std::max(reach, largest_coordinate(l.position));
-    for (const ImageLight& l : description_.image_lights) reach = std::max(reach, largest_coordinate(l.position));
+    for (const Sphere& s : description_->hidden_spheres) reach = std::max(reach, largest_coordinate(s.centre) + s.radius);
+    for (const PointLight& l : description_->point_lights) reach = std::max(reach, largest_coordinate(l.position));
+    for (const SpotLight& l : description_->spot_lights) reach = std::max(reach, largest_coordinate(l.position));
+    for (const ImageLight& l : description_->image_lights) reach = std::max(reach, largest_coordinate(l.position));
     return reach;
 }
 
 /// Finds what lies at distance zero from the camera, a lamp or an area light.
 Status Scene::find_contacts(std::vector<Emitter>* emitters, float largest) {
-    const ContactFinder contacts(description_, *accel_, instance_inverse_, largest);
+    const ContactFinder contacts(*description_, *accel_, instance_inverse_, largest);
     camera_clearance_ = contacts.clearance(camera_.position());
     if (camera_.has_parallel_rays()) {
         const auto [corner, right, down] = camera_.window();
@@ -193,9 +193,9 @@ Status Scene::find_contacts(std::vector<Emitter>* emitters, float largest) {
     covered_ = contacts.cover(emitters, emits);
     if (!covered_.any) return {};
     std::vector<uint32_t> lights;
-    for (uint32_t i = 0; i < description_.meshes.size(); ++i)
+    for (uint32_t i = 0; i < description_->meshes.size(); ++i)
         if (emits(i)) lights.push_back(i);
-    return accel_->keep_apart(description_, lights, &Scene::opacity, this);
+    return accel_->keep_apart(*description_, lights, &Scene::opacity, this);
 }
 
 Status check_crop(const Rect& crop, int width, int height) {
@@ -236,8 +236,8 @@ Result<FrameLayout> frame_layout(const FilmDescription& film, const SceneOptions
 Result<std::unique_ptr<Scene>> Scene::build(SceneDescription description, const SceneOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     std::unique_ptr<Scene> scene(new Scene);
-    scene->description_ = std::move(description);
-    SceneDescription& d = scene->description_;
+    scene->description_ = std::make_shared<SceneDescription>(std::move(description));
+    SceneDescription& d = *scene->description_;
     LL_RETURN_IF_ERROR(validate(d));
 
     const auto prepare = [](std::vector<TriangleMesh>& meshes) {
@@ -283,6 +283,12 @@ Result<std::unique_ptr<Scene>> Scene::build(SceneDescription description, const 
     return scene;
 }
 
+std::unique_ptr<const Scene> Scene::with_emission(std::shared_ptr<const EmissionTable> table) const {
+    std::unique_ptr<Scene> scene(new Scene(*this));
+    scene->emitters_.guide_emission(std::move(table));
+    return scene;
+}
+
 void Scene::summarise() {
     SceneSummary& s = summary_;
     const auto count = [&](const std::vector<TriangleMesh>& meshes) {
@@ -294,18 +300,18 @@ void Scene::summarise() {
         }
         return triangles;
     };
-    s.triangle_count = s.instanced_triangle_count = count(description_.meshes);
-    s.sphere_count = description_.spheres.size();
+    s.triangle_count = s.instanced_triangle_count = count(description_->meshes);
+    s.sphere_count = description_->spheres.size();
     std::vector<uint64_t> object_triangles;
-    for (const ObjectDefinition& o : description_.objects) {
+    for (const ObjectDefinition& o : description_->objects) {
         object_triangles.push_back(count(o.meshes));
         s.triangle_count += object_triangles.back();
         s.sphere_count += o.spheres.size();
     }
-    for (const Instance& i : description_.instances) s.instanced_triangle_count += object_triangles[size_t(i.object)];
-    s.instance_count = description_.instances.size();
-    s.texture_count = description_.textures.size();
-    for (const Image& image : description_.images) s.image_bytes += image.memory_bytes();
+    for (const Instance& i : description_->instances) s.instanced_triangle_count += object_triangles[size_t(i.object)];
+    s.instance_count = description_->instances.size();
+    s.texture_count = description_->textures.size();
+    for (const Image& image : description_->images) s.image_bytes += image.memory_bytes();
     s.acceleration_bytes = accel_->memory_bytes();
     static constexpr const char* kKinds[] = {"area", "area", "point", "spot", "distant", "infinite", "projection", "goniometric"};
     s.lights.resize(light_sources_.size());
@@ -313,7 +319,7 @@ void Scene::summarise() {
         SceneSummary::Light& light = s.lights[size_t(e.light)];
         light.kind = kKinds[int(e.kind)];
         light.where = light_sources_[size_t(e.light)];
-        light.power += emitters_.power(e) / (double(scalar_of({1, 1, 1})) * description_.strength_scale);
+        light.power += emitters_.power(e) / (double(scalar_of({1, 1, 1})) * description_->strength_scale);
         ++light.primitives;
         s.emissive_triangle_count += e.kind == EmitterKind::kTriangle;
     }

@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <type_traits>
 
+#include "common/tables/arrays.h"
 #include "common/tables/sections.h"
 
 namespace lightloom {
@@ -18,21 +17,6 @@ Status positive(const std::vector<float>& values, size_t count, const char* name
         if (!(v > 0 && std::isfinite(v))) return data_loss(std::string(name) + " holds a value that is not positive");
     }
     return {};
-}
-
-/// The values' bytes in memory, which are little-endian on every supported host.
-template <class T>
-std::string bytes_of(const std::vector<T>& values) {
-    static_assert(std::is_trivially_copyable_v<T>);
-    return std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
-}
-
-template <class T>
-bool from_bytes(std::string_view bytes, std::vector<T>* values) {
-    if (bytes.size() % sizeof(T) != 0) return false;
-    values->resize(bytes.size() / sizeof(T));
-    if (!bytes.empty()) std::memcpy(values->data(), bytes.data(), bytes.size());
-    return true;
 }
 
 struct Shape {

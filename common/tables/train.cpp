@@ -41,27 +41,19 @@ class Stopwatch {
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// Ibar of every block: its mean estimate, smoothed over 3 x 3 blocks, plus a tenth of the frame's mean.
-std::vector<double> block_brightness(const TrainingData& d) {
-    const int w = d.blocks_x, h = d.blocks_y;
-    const double per_block = double(d.samples) / double(d.block_sum.size());
-    // A block whose sum is not finite counts as black here and gets its brightness from its neighbours.
-    const auto known = [](double s) { return std::isfinite(s) ? s : 0; };
-    double mean = 0;
-    for (const double s : d.block_sum) mean += known(s) / per_block;
-    mean /= double(d.block_sum.size());
-    std::vector<double> out(d.block_sum.size());
-    for (int y = 0; y < h; ++y) {
-        for (int x = 0; x < w; ++x) {
-            double sum = 0;
-            int count = 0;
-            for (int j = std::max(0, y - 1); j <= std::min(h - 1, y + 1); ++j)
-                for (int i = std::max(0, x - 1); i <= std::min(w - 1, x + 1); ++i, ++count)
-                    sum += known(d.block_sum[size_t(j * w + i)]);
-            out[size_t(y * w + x)] = sum / (count * per_block) + 0.1 * mean;
-        }
+/// How much denser light sub-paths that begin as v[0], v[1] will be in the render than where the data were traced.
+double emission_ratio(const TrainingOptions& o, const TrainingVertex* v, uint32_t count) {
+    if (!o.traced || !o.rendered) return 1;
+    const EmitterSet &traced = *o.traced, &rendered = *o.rendered;
+    const Emitter &a = traced[v[0].emitter], &b = rendered[v[0].emitter];
+    Vec3 w = v[0].normal;
+    if (!a.is_infinite() && count > 1) w = normalize(v[1].position - v[0].position);
+    double ratio = double(rendered.pdf_position(b, v[0].position, w)) / double(traced.pdf_position(a, v[0].position, w));
+    if (count > 1) {
+        ratio *= double(rendered.pdf_direction(b, v[0].position, v[0].normal, w, v[1].position));
+        ratio /= double(traced.pdf_direction(a, v[0].position, v[0].normal, w, v[1].position));
     }
-    return out;
+    return std::isfinite(ratio) ? ratio : 1;
 }
 
 SubPathEnd end_between(const TrainingVertex& v, const TrainingVertex& predecessor) {
@@ -128,12 +120,13 @@ void measure_energy(const TrainingData& d, const EmitterSet& emitters, const Tra
         if (stop.stop_requested()) return;
         if (!d.in_range(p)) continue;
         const TrainingVertex* v = &d.vertices[p.first_vertex];
+        const double ratio = emission_ratio(o, v, p.vertex_count);
         for (uint32_t i = 0; i < p.vertex_count; ++i) {
             if (!(v[i].density > 0)) continue;
             const uint32_t label = i == 0 ? source_label(t->division, emitters, v[0]) : t->light_label(end_between(v[i], v[i - 1]));
             sum[label] += double(v[i].density);
-            count[label] += 1;
-            vertices += 1;
+            count[label] += ratio;
+            vertices += ratio;
         }
     }
     const double paths = double(std::max<uint64_t>(1, d.light_samples));
@@ -184,7 +177,7 @@ GammaDataset gamma_dataset(const TrainingData& d, const std::vector<double>& bri
         path.node_count = uint32_t(out.nodes.size()) - path.first_node;
         if (path.node_count == 0) continue;
         path.weight = float(double(p.square) / (brightness[p.block] * brightness[p.block]));
-        path.fixed = v[0].density + p.next_event + p.lens;
+        path.fixed = v[0].density + p.next_event + float(double(p.lens) * emission_ratio(o, v, p.vertex_count));
         path.contribution = float(double(p.estimate) / brightness[p.block]);
         if (!std::isfinite(path.weight) || !(path.weight > 0)) continue;
         out.paths.push_back(path);
@@ -199,6 +192,28 @@ GammaDataset gamma_dataset(const TrainingData& d, const std::vector<double>& bri
 }
 
 }  // namespace
+
+std::vector<double> block_brightness(const TrainingData& d) {
+    const int w = d.blocks_x, h = d.blocks_y;
+    const double per_block = double(d.samples) / double(d.block_sum.size());
+    // A block whose sum is not finite counts as black here and gets its brightness from its neighbours.
+    const auto known = [](double s) { return std::isfinite(s) ? s : 0; };
+    double mean = 0;
+    for (const double s : d.block_sum) mean += known(s) / per_block;
+    mean /= double(d.block_sum.size());
+    std::vector<double> out(d.block_sum.size());
+    for (int y = 0; y < h; ++y) {
+        for (int x = 0; x < w; ++x) {
+            double sum = 0;
+            int count = 0;
+            for (int j = std::max(0, y - 1); j <= std::min(h - 1, y + 1); ++j)
+                for (int i = std::max(0, x - 1); i <= std::min(w - 1, x + 1); ++i, ++count)
+                    sum += known(d.block_sum[size_t(j * w + i)]);
+            out[size_t(y * w + x)] = sum / (count * per_block) + 0.1 * mean;
+        }
+    }
+    return out;
+}
 
 Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& emitters, const TrainingOptions& asked,
                                     const TrainingControl& control, TrainingReport* report) {

@@ -28,6 +28,9 @@ struct TrainingOptions {
     double reuse_target = 200;  ///< M0: prefixes that a subspace should hold.
     int reuse_windows = 1;      ///< J_max.
     double nominal_paths = 1;   ///< Light paths of the smallest cache that rendering will make.
+    /// How light left the lights where the data were traced, and how it will in the render; null: both alike.
+    const EmitterSet* traced = nullptr;
+    const EmitterSet* rendered = nullptr;
     uint64_t seed = 0;
 };
 
@@ -45,6 +48,9 @@ struct TrainingControl {
     std::stop_token stop;
     std::function<void(double)> progress;  ///< Optional; called now and then with the approximate share of time passed.
 };
+
+/// Brightness of every block: its mean estimate, smoothed over 3 x 3 blocks, plus a tenth of the frame's mean.
+std::vector<double> block_brightness(const TrainingData& data);
 
 /// Returns kCancelled within about a second of a stop request, and otherwise valid tables, whatever the data hold.
 Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& emitters, const TrainingOptions& options,

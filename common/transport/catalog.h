@@ -60,6 +60,8 @@ struct LearningInfo {
     LearningPlan (*plan)(const AlgorithmSettings&);
     /// Makes tables from the data of one round. kCancelled within about a second of a stop request.
     Result<Tables> (*learn)(const LearnRequest&);
+    /// Whether these settings need tables at all; null: they always do.
+    bool (*wanted)(const AlgorithmSettings&) = nullptr;
 };
 
 struct AlgorithmInfo {
@@ -76,7 +78,7 @@ struct AlgorithmInfo {
     /// Whether light paths belong to a unit and serve all of its samples; otherwise each camera sample has one of its
     /// own.
     bool shares_light_paths = false;
-    /// Null for an algorithm without tables.
+    /// Null for an algorithm without tables. See AlgorithmSettings::learning().
     const LearningInfo* learning = nullptr;
     Result<std::unique_ptr<Renderer>> (*make)(const RendererRequest&);
 };

@@ -10,7 +10,7 @@ namespace lightloom {
 uint64_t LearningPlan::energy_paths_before(uint64_t sample) const { return uint64_t(std::ceil(double(sample) * energy_paths)); }
 
 LearningPlan learning_plan(const AlgorithmSettings& algorithm) {
-    LearningPlan plan = algorithm.info().learning->plan(algorithm);
+    LearningPlan plan = algorithm.learning()->plan(algorithm);
     LL_CHECK(!plan.rounds.empty());
     for (const LearningRound& round : plan.rounds) LL_CHECK_GT(round.samples, uint64_t(0));
     LL_CHECK_EQ(plan.first_sample(plan.rounds.size()), plan.samples);

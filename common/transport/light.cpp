@@ -1,5 +1,6 @@
 #include "common/transport/light.h"
 
+#include "common/transport/learn_emission.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {
@@ -8,7 +9,7 @@ extern const AlgorithmInfo kLightRow;
 
 namespace {
 
-constexpr ParameterInfo kParameters[] = {kRouletteStart, kRouletteMin};
+constexpr ParameterInfo kParameters[] = {kRouletteStart, kRouletteMin, emission_parameter(false), kEmissionTraining};
 
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     return make_unit_renderer(r, [&](auto&& select) {
@@ -27,6 +28,7 @@ const AlgorithmInfo kLightRow{
     .parameters = kParameters,
     .traces = Traces::kLight,
     .light_paths_per_pixel = one_light_path,
+    .learning = &kEmissionLearning,
     .make = make,
 };
 

@@ -1,7 +1,7 @@
 #include "common/transport/lvcbpt.h"
 
 #include "common/tables/subspace_tables.h"
-#include "common/transport/learning.h"
+#include "common/transport/learn_emission.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {
@@ -11,16 +11,25 @@ extern const AlgorithmInfo kLvcbptRow;
 namespace {
 
 constexpr ParameterInfo kParameters[] = {
-    kRouletteStart, kRouletteMin,
-    kHeuristic,     kNextEventBesideCache,
-    kLightPaths,    kCache,
-    kConnections,   {kTrainingPaths, 20000, 1, 1e8, true, "light sub-paths that count the vertices per path before rendering"},
+    kRouletteStart,
+    kRouletteMin,
+    kHeuristic,
+    kNextEventBesideCache,
+    kLightPaths,
+    kCache,
+    kConnections,
+    emission_parameter(false),
+    {kTrainingPaths, 20000, 1, 1e8, true,
+     "light sub-paths that count the vertices per path before rendering, and from which emission=learned learns"},
 };
-constexpr const TablePart* kParts[] = {&SubspaceTables::kPart};
+constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &SubspaceTables::kPart};
+constexpr double kPilot = 0.3;  ///< Share of the training set that is traced with emission by power before emission is learned.
 
 LearningPlan plan(const AlgorithmSettings& s) {
     const uint64_t samples = uint64_t(s.value(kTrainingPaths));
-    return {.samples = samples, .rounds = {{samples}}, .connections = CacheParameters::of(s).connections};
+    return {.samples = samples,
+            .rounds = rounds_with_pilot(samples, learns_emission(s) ? kPilot : 0),
+            .connections = CacheParameters::of(s).connections};
 }
 
 /// Learns with one subspace on each side: selection is uniform, and only the number of vertices per path matters.
@@ -31,9 +40,13 @@ Result<Tables> learn(const LearnRequest& r) {
     options.connections = p.connections;
     options.nominal_paths = double(p.minimum_paths);
     options.seed = r.settings.seed;
+    EmissionLesson emission = learn_emission(r);
+    emission.tell(&options);
     auto tables = train_tables(r.data, r.emitters, options, r.control, r.report);
     if (!tables.ok()) return tables.status();
-    return Tables(*std::move(tables));
+    Tables all(*std::move(tables));
+    all.set(std::make_shared<const EmissionPart>(EmissionPart{std::move(emission.data)}));
+    return all;
 }
 
 constexpr LearningInfo kLearning{.parts = kParts, .plan = plan, .learn = learn};

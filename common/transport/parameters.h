@@ -63,8 +63,31 @@ inline constexpr ParameterInfo kCache{"cache",
                                       "[Davidovic et al. 2014 fill one per image]"};
 inline constexpr ParameterInfo kConnections{
     "connections", 3, 1, 64, true, "N: connections per camera vertex [Su et al. 2022, table 3]"};
+inline constexpr std::string_view kEmissions[] = {"power", "learned"};
+inline constexpr std::string_view kEmission = "emission";
+/// How light sub-paths leave the lights, with the algorithm's default.
+constexpr ParameterInfo emission_parameter(bool learned) {
+    return {kEmission,
+            learned ? 1.0 : 0.0,
+            0,
+            1,
+            true,
+            "how light sub-paths leave the lights: in proportion to power, or where and in the directions that training found "
+            "useful [guided emission: Vorba et al. 2014]",
+            kEmissions};
+}
+inline bool learns_emission(const AlgorithmSettings& s) { return s.value(kEmission) != 0; }
 /// The size of a training set; a time-limited job may make it smaller.
 inline constexpr std::string_view kTrainingPaths = "training-paths";
+
+/// For algorithms that learn nothing but emission.
+inline constexpr ParameterInfo kEmissionTraining{
+    kTrainingPaths,
+    100000,
+    1,
+    1e8,
+    true,
+    "camera samples of the training set from which emission=learned learns, each with a light sub-path"};
 
 /// The algorithm's rule for Russian roulette; the defaults if it has no such parameters.
 inline RouletteRule roulette_of(const AlgorithmSettings& s) {

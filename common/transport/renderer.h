@@ -17,9 +17,13 @@
 
 namespace lightloom {
 
+/// The scene with light sub-paths that leave the lights as the tables have learned; the scene itself where they have no
+/// such part.
+std::shared_ptr<const Scene> lit_scene(std::shared_ptr<const Scene> scene, const Tables& tables);
+
 /// The input from which a row of the catalog makes a renderer; it is checked and complete.
 struct RendererRequest {
-    std::shared_ptr<const Scene> scene;
+    std::shared_ptr<const Scene> scene;  ///< With the emission of the tables.
     const RenderSettings& settings;
     const Tables& tables;       ///< The parts that the row asks for.
     const TechniqueMask* mask;  ///< Null: all techniques.

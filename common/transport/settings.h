@@ -22,6 +22,11 @@ class AlgorithmSettings {
     static Result<AlgorithmSettings> parse(std::string_view name, const std::map<std::string, std::string>& set);
 
     const AlgorithmInfo& info() const { return *info_; }
+    /// How the tables for these settings are learned; null if they need none.
+    const LearningInfo* learning() const {
+        const LearningInfo* learning = info_->learning;
+        return learning && (!learning->wanted || learning->wanted(*this)) ? learning : nullptr;
+    }
     std::string name() const { return std::string(info_->name); }
     bool has(std::string_view parameter) const { return index(parameter) < values_.size(); }
     /// The value of a parameter, which the algorithm must have.

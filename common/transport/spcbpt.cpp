@@ -1,6 +1,6 @@
 #include "common/transport/spcbpt.h"
 
-#include "common/transport/learning.h"
+#include "common/transport/learn_emission.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {
@@ -19,6 +19,7 @@ constexpr ParameterInfo kParameters[] = {
     kLightPaths,
     kCache,
     kConnections,
+    emission_parameter(true),
     {"light-subspaces", 1000, 1, 16384, true, "N_L: upper bound of the light subspaces [Su et al. 2022, section 8.1]"},
     {"eye-subspaces", 1000, 1, 16384, true, "N_E: upper bound of the eye subspaces [Su et al. 2022, section 8.1]"},
     {"source-share", 0.2, 0, 1, false, "share of N_L that divides the lights themselves [Su et al. 2022, section 7.2.1]"},
@@ -50,7 +51,7 @@ constexpr ParameterInfo kParameters[] = {
      kSwitch},
 };
 static_assert(SubspaceTables::kMaxSubspaces == 16384 && SubspaceTables::kMaxWindow == 32, "the ranges above");
-constexpr const TablePart* kParts[] = {&SubspaceTables::kPart};
+constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &SubspaceTables::kPart};
 
 Correction correction_of(const AlgorithmSettings& s) {
     return s.value("correlation-aware") != 0 ? Correction::kCorrelation : Correction::kUncorrected;
@@ -81,9 +82,13 @@ Result<Tables> learn(const LearnRequest& r) {
     options.reuse_target = s.value("reuse-target");
     options.nominal_paths = double(p.minimum_paths);
     options.seed = r.settings.seed;
+    EmissionLesson emission = learn_emission(r);
+    emission.tell(&options);
     auto tables = train_tables(r.data, r.emitters, options, r.control, r.report);
     if (!tables.ok()) return tables.status();
-    return Tables(*std::move(tables));
+    Tables all(*std::move(tables));
+    all.set(std::make_shared<const EmissionPart>(EmissionPart{std::move(emission.data)}));
+    return all;
 }
 
 constexpr LearningInfo kLearning{.parts = kParts, .plan = plan, .learn = learn};

@@ -8,6 +8,7 @@
 
 #include "common/core/fork_join.h"
 #include "common/path/throughput.h"
+#include "common/tables/emission_part.h"
 #include "common/transport/bdpt.h"
 #include "common/transport/parameters.h"
 #include "common/transport/spcbpt.h"
@@ -148,20 +149,28 @@ struct Blocks {
 Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const RenderSettings& settings, const Tables& guide) {
     LL_RETURN_IF_ERROR(check_depth(settings.max_depth));
     const AlgorithmSettings& algorithm = settings.algorithm;
-    if (!algorithm.info().learning) return failed_precondition("algorithm '" + algorithm.name() + "' learns nothing");
+    if (!algorithm.learning()) return failed_precondition("algorithm '" + algorithm.name() + "' learns nothing");
     TrainingGenerator generator(scene);
+    if (auto emission = emission_of(guide)) {
+        LL_RETURN_IF_ERROR(guide.validate(scene.emitters()));
+        generator.lit_ = scene.with_emission(std::move(emission));
+        generator.scene_ = generator.lit_.get();
+    }
     generator.roulette_ = roulette_of(algorithm);
     generator.heuristic_ = heuristic_of(algorithm);
     generator.plan_ = learning_plan(algorithm);
     generator.light_paths_per_iteration_ = algorithm.light_paths_per_iteration(scene.frame().crop.area());
     if (!guide.empty()) {
         LL_RETURN_IF_ERROR(guide.validate(scene.emitters()));
-        const auto subspaces = guide.get<SubspaceTables>();
-        if (!subspaces) return failed_precondition("the tables of the first round have no subspaces to guide the second one");
-        // Training traces one light sub-path per camera sample, however large the caches of the render will be.
-        SubspaceTables tables = *subspaces;
-        std::fill(tables.window.begin(), tables.window.end(), uint16_t(1));
-        generator.guide_ = std::make_shared<const PreparedTables>(std::move(tables));
+        const auto parts = algorithm.learning()->parts;
+        if (std::find(parts.begin(), parts.end(), &SubspaceTables::kPart) != parts.end() && !guide.get<SubspaceTables>())
+            return failed_precondition("the tables of the first round have no subspaces to guide the second one");
+        if (const auto subspaces = guide.get<SubspaceTables>()) {
+            // Training traces one light sub-path per camera sample, however large the caches of the render will be.
+            SubspaceTables tables = *subspaces;
+            std::fill(tables.window.begin(), tables.window.end(), uint16_t(1));
+            generator.guide_ = std::make_shared<const PreparedTables>(std::move(tables));
+        }
     }
     generator.seed_ = settings.seed ^ kTrainingSeed;
     generator.max_edges_ = settings.max_edges();
@@ -339,7 +348,7 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
 
 Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, std::stop_token stop, TrainingReport* report) {
     Tables tables;
-    if (!settings.algorithm.info().learning) return tables;
+    if (!settings.algorithm.learning()) return tables;
     const LearningPlan plan = learning_plan(settings.algorithm);
     *report = {};
     for (size_t round = 0; round < plan.rounds.size(); ++round) {

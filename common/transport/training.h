@@ -19,9 +19,9 @@ struct PreparedTables;
 inline constexpr uint64_t kTrainingChunkSamples = 512;
 
 /// Traces training units of one scene. Without a guide it pairs camera with light sub-paths, which needs no tables;
-/// with the tables of an earlier round as guide it makes subspace connections, which find far more of the light that is
-/// hard to find. The tables of the render are learned from the last round alone: its paths have the smaller variance,
-/// and the few paths of a pilot would outweigh them.
+/// with the tables of an earlier round as guide its light leaves where that round found it useful, and it makes subspace
+/// connections where the algorithm has them, which find far more of the light that is hard to find. The tables of the render are
+/// learned from the last round alone: its paths have the smaller variance, and the few paths of a pilot would outweigh them.
 class TrainingGenerator {
   public:
     /// `scene` must outlive the generator. The algorithm must be one that learns.
@@ -41,6 +41,7 @@ class TrainingGenerator {
     Result<TrainingData> trace_guided(const Unit& unit) const;
 
     const Scene* scene_;
+    std::shared_ptr<const Scene> lit_;  ///< The scene with the guide's emission; null where it has none.
     RouletteRule roulette_;
     LearningPlan plan_;
     Heuristic heuristic_ = Heuristic::kBalance;

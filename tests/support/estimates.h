@@ -55,11 +55,14 @@ inline std::map<std::string, std::string> those_of(const std::string& algorithm,
 }
 
 /// Training and caches that suit 32 x 32 pixels, for the rows of the catalog that have them; parameters that are
-/// already set stay.
+/// already set stay. What can be learned is learned.
 inline std::map<std::string, std::string> with_small_training(const std::string& algorithm,
                                                               std::map<std::string, std::string> parameters) {
-    parameters.merge(
-        those_of(algorithm, {{"training-paths", "1500"}, {"cache", "1500"}, {"light-subspaces", "40"}, {"eye-subspaces", "30"}}));
+    parameters.merge(those_of(algorithm, {{"emission", "learned"},
+                                          {"training-paths", "1500"},
+                                          {"cache", "1500"},
+                                          {"light-subspaces", "40"},
+                                          {"eye-subspaces", "30"}}));
     return parameters;
 }
 

@@ -91,11 +91,11 @@ inline std::optional<std::vector<PathVertex>> rebuild_light(const Scene& scene, 
     const Vec3 first = path.infinite ? path.x[0].ng : normalize(path.x[1].p - path.x[0].p);
     PathVertex y0 = path.x[0];
     if (!path.infinite && !e.is_area()) y0.ng = first;
-    y0.fwd = emitters.pdf_position(e, first);
+    y0.fwd = emitters.pdf_position(e, y0.p, first);
     y0.rev = 0;
     WalkRay ray;
     ray.direction = first;
-    ray.pdf = emitters.pdf_direction(e, y0.ng, first);
+    ray.pdf = emitters.pdf_direction(e, y0.p, y0.ng, first, path.x.size() > 1 ? path.x[1].p : y0.p);
     if (!(y0.fwd > 0 && ray.pdf > 0)) return std::nullopt;
     ray.from_infinite = e.is_infinite();
     ray.previous_hittable = e.can_be_hit();

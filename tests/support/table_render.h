@@ -1,8 +1,10 @@
 #pragma once
 // Settings and random tables of the rows of the catalog that learn, for renders whose means must not depend on them.
 
+#include "common/tables/emission_part.h"
 #include "common/tables/subspace_tables.h"
 #include "tests/support/estimates.h"
+#include "tests/support/random_emission.h"
 #include "tests/support/random_tables.h"
 
 namespace lightloom::testing {
@@ -15,7 +17,8 @@ inline Tables random_tables_for(const AlgorithmInfo& row, const Scene& scene, ui
     Tables tables;
     if (!row.learning) return tables;
     const std::span<const TablePart* const> parts = row.learning->parts;
-    const bool known = std::all_of(parts.begin(), parts.end(), [](const TablePart* p) { return p == &SubspaceTables::kPart; });
+    const bool known = std::all_of(parts.begin(), parts.end(),
+                                   [](const TablePart* p) { return p == &SubspaceTables::kPart || p == &EmissionPart::kPart; });
     if (!known) {
         const std::string name(row.name);
         TrainingReport report;
@@ -25,6 +28,10 @@ inline Tables random_tables_for(const AlgorithmInfo& row, const Scene& scene, ui
     }
     if (std::find(parts.begin(), parts.end(), &SubspaceTables::kPart) != parts.end())
         tables.set(std::make_shared<const SubspaceTables>(random_tables(scene.emitters(), seed, options)));
+    if (std::find(parts.begin(), parts.end(), &EmissionPart::kPart) != parts.end()) {
+        EmissionData data = random_emission(scene.emitters(), seed, {0, 1, 0}, 3.5f);
+        tables.set(std::make_shared<const EmissionPart>(EmissionPart{std::move(data)}));
+    }
     tables.belong_to(std::string(row.name));
     return tables;
 }
@@ -41,7 +48,8 @@ struct CacheOptions {
 /// left out.
 inline RenderSettings cache_settings(const std::string& algorithm, const CacheOptions& o, int max_depth) {
     return settings_of(algorithm,
-                       those_of(algorithm, {{"connections", std::to_string(o.connections)},
+                       those_of(algorithm, {{"emission", "learned"},
+                                            {"connections", std::to_string(o.connections)},
                                             {"cache", std::to_string(o.paths)},
                                             {"light-paths", std::to_string(o.light_paths)},
                                             {"ris-aware", o.ris_aware ? "on" : "off"},

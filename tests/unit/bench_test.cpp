@@ -104,9 +104,12 @@ TEST(AlgorithmChoice, ParsesSettingsAndNamesMistakes) {
     const auto choice = parse_algorithm("bdpt:rr-start=6:heuristic=power");
     ASSERT_TRUE(choice.ok()) << choice.status().message();
     EXPECT_EQ(choice->settings.name(), "bdpt");
-    EXPECT_EQ(
-        choice->settings.named_text(),
-        (std::map<std::string, std::string>{{"heuristic", "power"}, {"next-event", "1"}, {"rr-min", "0.5"}, {"rr-start", "6"}}));
+    EXPECT_EQ(choice->settings.named_text(), (std::map<std::string, std::string>{{"emission", "power"},
+                                                                                 {"heuristic", "power"},
+                                                                                 {"next-event", "1"},
+                                                                                 {"rr-min", "0.5"},
+                                                                                 {"rr-start", "6"},
+                                                                                 {"training-paths", "100000"}}));
     EXPECT_EQ(choice->label, "bdpt:rr-start=6:heuristic=power");
     EXPECT_TRUE(parse_algorithm("path").ok());
     for (const char* wrong : {"", "no-such", "bdpt:", "bdpt:=1", "bdpt:heuristic", "bdpt:heuristic=9", "bdpt:heuristic=powr",

@@ -53,8 +53,8 @@ TEST(Emission, IsDrawnWithItsDensities) {
             const Vec2 u = rng.uniform2(), v = rng.uniform2();
             if (!set.sample_emission(pick, u, v, &s) || s.emitter != 0) continue;
             ++drawn;
-            EXPECT_FLOAT_EQ(s.pdf_position, set.pdf_position(e, s.direction)) << c.name;
-            EXPECT_FLOAT_EQ(s.pdf_direction, set.pdf_direction(e, s.normal, s.direction)) << c.name;
+            EXPECT_FLOAT_EQ(s.pdf_position, set.pdf_position(e, s.position, s.direction)) << c.name;
+            EXPECT_FLOAT_EQ(s.pdf_direction, set.pdf_direction(e, s.position, s.normal, s.direction, s.position)) << c.name;
             int position = 0, direction = 0;
             if (e.kind == EmitterKind::kTriangle) position = quarter_of(e, s.position);
             if (e.kind == EmitterKind::kSphere) {
@@ -87,21 +87,21 @@ TEST(Emission, IsDrawnWithItsDensities) {
             if (e.kind == EmitterKind::kTriangle)
                 position = double(e.pmf) * e.inv_area * 0.25 / e.inv_area;
             else if (e.kind == EmitterKind::kSphere)
-                position = double(set.pdf_position(e, {})) * 4 * kPiD * e.radius * e.radius / position_bins;
+                position = double(set.pdf_position(e, {}, {})) * 4 * kPiD * e.radius * e.radius / position_bins;
             else if (map) {
                 const int n = c.environment == 3 ? 16 : 1;  // one lobe is turned against these cells
                 for (int i = 0; i < n * n; ++i) {
                     const Vec2 uv{(float(p % square) + (float(i % n) + 0.5f) / float(n)) / square,
                                   (float(p / square) + (float(i / n) + 0.5f) / float(n)) / square};
                     const Vec3 d = normalize(map_to_world.vector(equal_area_square_to_sphere(uv)));
-                    position += double(set.pdf_position(e, -d)) * 4 * kPiD / (square * square * n * n);
+                    position += double(set.pdf_position(e, {}, -d)) * 4 * kPiD / (square * square * n * n);
                 }
             } else
-                position = set.pdf_position(e, e.normal);
+                position = set.pdf_position(e, {}, e.normal);
             for (int d = 0; d < direction_bins; ++d) {
                 double direction = 0;
                 if (e.is_infinite()) {
-                    direction = double(set.pdf_direction(e, {}, e.normal)) * kPiD * kRadius * kRadius / direction_bins;
+                    direction = double(set.pdf_direction(e, {}, {}, e.normal, {})) * kPiD * kRadius * kRadius / direction_bins;
                 } else {
                     // Only images depend on the azimuth.
                     const int n = e.has_direction_map() ? 256 : 64, azimuths = e.has_direction_map() ? n : 1;
@@ -111,7 +111,8 @@ TEST(Emission, IsDrawnWithItsDensities) {
                         const Vec3 axis = e.is_area() ? Vec3{0, 0, 1} : e.kind == EmitterKind::kSpot ? e.normal : Vec3{0, 0, 1};
                         const double r = std::sqrt(1 - z * z), angle = 2 * kPiD * turns;
                         const Vec3 w = Frame(axis).to_world({float(r * std::cos(angle)), float(r * std::sin(angle)), float(z)});
-                        direction += double(set.pdf_direction(e, axis, w)) * 4 * kPiD / (double(direction_bins) * n * azimuths);
+                        direction +=
+                            double(set.pdf_direction(e, {}, axis, w, {})) * 4 * kPiD / (double(direction_bins) * n * azimuths);
                     }
                 }
                 total += expected[size_t(p * direction_bins + d)] = position * direction;

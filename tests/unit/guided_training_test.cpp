@@ -218,7 +218,7 @@ TEST(GuidedTraining, RefusesWhatCannotGuideOrLearn) {
     for (const AlgorithmInfo* row : catalog()) {
         const RenderSettings settings = testing::settings_of(std::string(row->name));
         const Status status = TrainingGenerator::create(*scene, settings).status();
-        EXPECT_EQ(status.code(), row->learning ? StatusCode::kOk : StatusCode::kFailedPrecondition) << row->name;
+        EXPECT_EQ(status.code(), settings.algorithm.learning() ? StatusCode::kOk : StatusCode::kFailedPrecondition) << row->name;
     }
 }
 

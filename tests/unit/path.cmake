@@ -1,6 +1,7 @@
 lightloom_test(sampling_test LINK lt_scene)
 lightloom_test(camera_test LINK lt_scene)
 lightloom_test(emitter_test LINK lt_scene)
+lightloom_test(emission_table_test LINK lt_tables)
 lightloom_test(light_map_test LINK lt_scene)
 lightloom_test(weights_test LINK lt_transport)
 lightloom_test(transport_test LINK lt_transport)

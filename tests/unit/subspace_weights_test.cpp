@@ -10,6 +10,7 @@
 #include "common/transport/spcbpt.h"
 #include "common/transport/unit_renderer.h"
 #include "tests/support/path_generator.h"
+#include "tests/support/random_emission.h"
 #include "tests/support/random_tables.h"
 #include "tests/support/tally.h"
 #include "tests/support/test_scenes.h"
@@ -91,8 +92,10 @@ TEST(CorrelationFactor, LiesBetweenOneOverTheConnectionsAndOne) {
 
 /// Mutations: light_step() of random_walk.h without the squared index ratio of a Dirac refraction fails this (and the sums) on
 /// spheres_in_glass; with it for thin panes as well, on mixes_and_pane.
-TEST_P(SubspaceWeights, EveryTechniqueSeesTheSameLabelsAndThroughput) {
-    const auto scene = GetParam().make(), stage = GetParam().stage(scene);
+void check_labels(const testing::NamedScene& named, bool lit) {
+    const auto unlit = named.make(), unlit_stage = named.stage(unlit);
+    const auto scene = lit ? testing::randomly_lit(unlit, 3) : unlit;
+    const auto stage = lit ? testing::randomly_lit(unlit_stage, 3) : unlit_stage;
     testing::RandomTableOptions options;
     options.light_count = options.eye_count = 200, options.source_cells = 60, options.tree_leaves = 300;
     const SpcbptWeights weights = weights_of(*scene, random_tables(scene->emitters(), 5, options), 3);
@@ -120,11 +123,14 @@ TEST_P(SubspaceWeights, EveryTechniqueSeesTheSameLabelsAndThroughput) {
             });
         },
         &weights);
-    throughput.check("throughput of light prefixes", kLooseTraced);
+    throughput.check("throughput of light prefixes", lit ? testing::kLooseLit : kLooseTraced, lit ? testing::kGrossLit : 2e-4);
     // A direction is recomputed to the last bits only: a split between its two values is as likely as that.
     EXPECT_GT(labels.count, 500u);
     EXPECT_LE(double(labels.gross), 1e-4 * double(labels.count)) << labels.gross << " of " << labels.count;
 }
+
+TEST_P(SubspaceWeights, EveryTechniqueSeesTheSameLabelsAndThroughput) { check_labels(GetParam(), false); }
+TEST_P(SubspaceWeights, EveryTechniqueSeesTheSameWithLearnedEmission) { check_labels(GetParam(), true); }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, SubspaceWeights, ::testing::ValuesIn(testing::kScenes),
                          [](const ::testing::TestParamInfo<testing::NamedScene>& param) { return param.param.name; });

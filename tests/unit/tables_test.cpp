@@ -9,6 +9,7 @@
 #include <limits>
 #include <thread>
 
+#include "common/tables/emission_part.h"
 #include "common/transport/training.h"
 #include "tests/support/table_render.h"
 #include "tests/support/test_scenes.h"
@@ -220,7 +221,9 @@ TEST(Tables, EveryBadTableIsRefusedByName) {
         EXPECT_EQ(status.code(), StatusCode::kDataLoss) << name;
         EXPECT_FALSE(status.message().empty()) << name;
         // And nothing renders from them.
-        EXPECT_EQ(Renderer::create(scene, small_settings(), Tables(bad)).status().code(), StatusCode::kDataLoss) << name;
+        Tables tables(bad);
+        tables.set(std::make_shared<const EmissionPart>());
+        EXPECT_EQ(Renderer::create(scene, small_settings(), tables).status().code(), StatusCode::kDataLoss) << name;
     }
 }
 

@@ -53,12 +53,13 @@ Family family_of(const AlgorithmInfo& row, const std::shared_ptr<const Scene>& s
         for (const std::string_view choice : p.choices) changes.emplace_back(p.name, choice);
         if (p.name == "connections") changes.insert(changes.end(), {{"connections", "1"}, {"connections", "5"}});
     }
-    const Tables tables = testing::random_tables_for(row, *scene, seed);
+    const Tables all_tables = testing::random_tables_for(row, *scene, seed);
     Family family;
     for (const auto& [parameter, value] : changes) {
         auto set = parameters;
         if (!parameter.empty()) set[parameter] = value;
         const RenderSettings settings = testing::settings_of(name, set, seed);
+        const Tables tables = settings.algorithm.learning() ? all_tables : Tables();
         const auto renderer = Renderer::create(scene, settings, tables);
         if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
         auto weights = (*renderer)->weights();
@@ -127,8 +128,9 @@ double refraction_measure(const FullPath& path, int i) {
 class Weights : public ::testing::TestWithParam<testing::NamedScene> {};
 
 /// With Russian roulette where a path was traced, without where it is rebuilt: weights do not know it.
-TEST_P(Weights, SumToOneOverAllTechniques) {
-    const auto scene = GetParam().make(), stage = GetParam().stage(scene);
+/// With `lit`, light leaves by a random table, of which weights know no more than the densities that they see.
+void check_sums(const testing::NamedScene& named, bool lit) {
+    const auto scene = named.make(), stage = named.stage(scene);
     const bool hits = can_be_hit(*scene);
     // A scene without lights that can be hit has far fewer paths to offer.
     const int count = hits ? 4000 : 10000;
@@ -138,11 +140,13 @@ TEST_P(Weights, SumToOneOverAllTechniques) {
         for (uint64_t seed = 1; seed <= 3; ++seed) {
             Family family = make(seed);
             if (family.empty()) return;
+            const auto traced = lit ? testing::randomly_lit(scene, seed) : scene;
+            const auto rebuilt = lit ? testing::randomly_lit(stage, seed) : stage;
             testing::for_each_path(
-                *scene, count, kEdges, 40 + seed,
+                *traced, count, kEdges, 40 + seed,
                 [&](const FullPath& path, Technique own, const PathView& view, const Rgb&) {
                     ++made[size_t(own.s)];
-                    if (path.k() >= 2) add_sums(*stage, path, own, view, &family);
+                    if (path.k() >= 2) add_sums(*rebuilt, path, own, view, &family);
                 },
                 family.front().weights.get());
             if (all.empty()) {
@@ -152,9 +156,11 @@ TEST_P(Weights, SumToOneOverAllTechniques) {
             for (size_t i = 0; i < all.size(); ++i) all[i].rebuilt += family[i].rebuilt, all[i].traced += family[i].traced;
         }
         for (const Member& m : all) {
-            m.rebuilt.check(m.name);
+            m.rebuilt.check(m.name, lit ? testing::kLooseLit : 2e-3, lit ? testing::kGrossLit : 2e-4);
             // Squares of densities deviate twice as much.
-            if (m.heuristic == Heuristic::kBalance) m.traced.check(m.name + ", own view as traced", kLooseTraced);
+            if (m.heuristic == Heuristic::kBalance)
+                m.traced.check(m.name + ", own view as traced", lit ? testing::kLooseLit : kLooseTraced,
+                               lit ? testing::kGrossLit : 2e-4);
         }
     };
     for (const AlgorithmInfo* row : catalog()) check([&](uint64_t seed) { return family_of(*row, scene, seed); });
@@ -162,8 +168,13 @@ TEST_P(Weights, SumToOneOverAllTechniques) {
     for (int s = hits ? 0 : 1; s <= 4; ++s) EXPECT_GT(made[size_t(s)], 20) << "technique s = " << s << " was hardly exercised";
 }
 
-TEST_P(Weights, EveryTechniqueSeesTheSamePath) {
-    const auto scene = GetParam().make(), stage = GetParam().stage(scene);
+TEST_P(Weights, SumToOneOverAllTechniques) { check_sums(GetParam(), false); }
+TEST_P(Weights, SumToOneWithLearnedEmission) { check_sums(GetParam(), true); }
+
+void check_views(const testing::NamedScene& named, bool lit) {
+    const auto unlit = named.make(), unlit_stage = named.stage(unlit);
+    const auto scene = lit ? testing::randomly_lit(unlit, 3) : unlit;
+    const auto stage = lit ? testing::randomly_lit(unlit_stage, 3) : unlit_stage;
     Tally densities, contributions;
     testing::for_each_path(*scene, 1500, 6, 12, [&](const FullPath& path, Technique own, const PathView&, const Rgb&) {
         const int k = path.k();
@@ -193,9 +204,12 @@ TEST_P(Weights, EveryTechniqueSeesTheSamePath) {
             contributions.add(f_of(other->view, other->contribution, t) / f - 1, path);
         });
     });
-    densities.check("densities");
-    contributions.check("path integrand");
+    densities.check("densities", lit ? testing::kLooseLit : 2e-3, lit ? testing::kGrossLit : 2e-4);
+    contributions.check("path integrand", lit ? testing::kLooseLit : 2e-3, lit ? testing::kGrossLit : 2e-4);
 }
+
+TEST_P(Weights, EveryTechniqueSeesTheSamePath) { check_views(GetParam(), false); }
+TEST_P(Weights, EveryTechniqueSeesTheSamePathWithLearnedEmission) { check_views(GetParam(), true); }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Weights, ::testing::ValuesIn(testing::kScenes),
                          [](const ::testing::TestParamInfo<testing::NamedScene>& param) { return param.param.name; });
