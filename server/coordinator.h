@@ -71,6 +71,8 @@ class Coordinator {
     Result<WorkerGrant> register_worker(const WorkerHello& hello);
     Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds,
                                                const std::function<bool()>& cancelled);
+    /// Makes calls of lease_units() look at `cancelled` now; they do so by themselves ten times a second.
+    void wake_leases();
     Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running);
     Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why);
     Status goodbye(const std::string& worker_id);
