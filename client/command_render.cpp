@@ -17,7 +17,7 @@
 #include "client/table_options.h"
 #include "common/cli/numbers.h"
 #include "common/cli/start.h"
-#include "common/work/identity.h"
+#include "server/known_identity.h"
 #include "server/local_ports.h"
 #include "server/scene_reader.h"
 #include "worker/scene_cache.h"
@@ -63,7 +63,7 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, c
     if (scratch.path.empty()) return report_error(internal_error("no directory for temporary files can be made"));
 
     const tbb::global_control parallelism(tbb::global_control::max_allowed_parallelism, threads * worker_count);
-    const auto identity = build_identity();
+    const auto identity = known_identity(cache.path());
     if (!identity.ok()) return report_error(identity.status());
     CoordinatorOptions coordinator_options;
     coordinator_options.directory = scratch.path;

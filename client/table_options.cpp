@@ -6,7 +6,7 @@
 #include "common/cli/command_line.h"
 #include "common/cli/numbers.h"
 #include "common/transport/training.h"
-#include "common/work/identity.h"
+#include "server/known_identity.h"
 #include "server/table_cache.h"
 
 namespace lightloom::client {
@@ -29,8 +29,8 @@ TableCacheOptions::TableCacheOptions() : directory("off") {
 void add_table_cache_options(cli::App command, TableCacheOptions& options) {
     command
         .add_option("--table-cache", options.directory,
-                    "Directory in which learned tables are kept for the next render, or off; it holds nothing else, no "
-                    "scene files and no images (default: lightloom/tables in $XDG_CACHE_HOME or ~/.cache)")
+                    "Directory in which learned tables, and what golden units render to on this machine, are kept for the next "
+                    "render, or off; no scene files and no images (default: lightloom/tables in $XDG_CACHE_HOME or ~/.cache)")
         ->type_name("DIR")
         ->envname("LIGHTLOOM_TABLE_CACHE");
     add_size_option(command, options);
@@ -54,7 +54,7 @@ Result<Preparation> cached_preparation(const Scene& scene, const JobSpec& spec, 
     const TableCache cache(options.path(), options.bytes());
     Digest key;
     if (!options.path().empty()) {
-        const auto identity = build_identity();
+        const auto identity = known_identity(options.path());
         if (!identity.ok()) return identity.status();
         key = table_key(*identity, spec);
         if (const auto entry = cache.find(key, learning->parts)) {

@@ -201,6 +201,15 @@ Result<JobInfo> Coordinator::wait_job(const std::string& job_id, uint64_t after_
     return job->info(options_.clock());
 }
 
+Status Coordinator::wait_job_end(const std::string& job_id, double timeout_seconds) const {
+    std::unique_lock lock(mutex_);
+    const std::shared_ptr<const JobRecord> job = find_job(job_id);
+    if (!job) return no_job(job_id);
+    job_changed_.wait_for(lock, std::chrono::duration<double>(timeout_seconds),
+                          [&] { return closing_ || is_terminal(job->state); });
+    return {};
+}
+
 Result<std::string> Coordinator::image(const std::string& job_id, ImageKind kind) const {
     if (kind == ImageKind::kPreview) {
         auto made = preview(job_id, PreviewFormat::kPng);

@@ -63,6 +63,8 @@ class Coordinator {
     Result<JobInfo> cancel_job(const std::string& job_id);
     /// The job once its revision is above `after`, or as it is after `timeout_seconds`.
     Result<JobInfo> wait_job(const std::string& job_id, uint64_t after, double timeout_seconds) const;
+    /// Returns once the job has ended, or after `timeout_seconds`.
+    Status wait_job_end(const std::string& job_id, double timeout_seconds) const;
     Result<std::string> image(const std::string& job_id, ImageKind kind) const;
     Result<Preview> preview(const std::string& job_id, PreviewFormat format, double exposure = 0) const;
     Result<std::string> manifest(const std::string& job_id) const;
@@ -71,6 +73,8 @@ class Coordinator {
     Result<WorkerGrant> register_worker(const WorkerHello& hello);
     Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds,
                                                const std::function<bool()>& cancelled);
+    /// Makes calls of lease_units() look at `cancelled` now; they do so by themselves ten times a second.
+    void wake_leases();
     Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running);
     Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why);
     Status goodbye(const std::string& worker_id);

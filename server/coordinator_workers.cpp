@@ -95,6 +95,11 @@ Result<std::vector<UnitLease>> Coordinator::lease_units(const std::string& worke
     return leases;
 }
 
+void Coordinator::wake_leases() {
+    const std::lock_guard lock(mutex_);  // between a look and the wait that follows it, nobody would hear
+    work_changed_.notify_all();
+}
+
 Result<std::vector<UnitReference>> Coordinator::heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running) {
     const std::lock_guard lock(mutex_);
     WorkerRecord* worker = workers_.find(worker_id);

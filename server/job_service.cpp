@@ -1,13 +1,11 @@
 #include "server/job_service.h"
 
-#include <thread>
-
 #include "server/grpc_answers.h"
 
 namespace lightloom {
 namespace {
 
-constexpr auto kWatchInterval = std::chrono::milliseconds(100);
+constexpr double kWatchSeconds = 0.1;
 
 /// Sends the bytes as chunks, each of which chunk_of(message) points to in its message.
 template <class Message, class ChunkOf>
@@ -69,7 +67,8 @@ grpc::Status JobServiceImpl::WatchJob(grpc::ServerContext* context, const v1::Wa
             wire::put(*info, &message);
             if (!writer->Write(message)) break;
             if (is_terminal(info->state)) return grpc::Status::OK;
-            std::this_thread::sleep_for(kWatchInterval);
+            // Not every step of a job is worth a message, but its end is waited for.
+            if (const Status s = coordinator_.wait_job_end(request->job_id(), kWatchSeconds); !s.ok()) return wire::to_grpc(s);
         } else if (is_terminal(info->state)) {
             return grpc::Status::OK;
         }

@@ -52,6 +52,7 @@ Result<WorkerGrant> LocalWorkerPort::register_worker(const WorkerHello& hello) {
 
 Result<std::vector<UnitLease>> LocalWorkerPort::lease_units(const std::string& worker_id, double wait_seconds,
                                                             std::stop_token stop) {
+    const std::stop_callback wake(stop, [this] { coordinator_.wake_leases(); });
     return coordinator_.lease_units(worker_id, wait_seconds, [stop] { return stop.stop_requested(); });
 }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "common/scene/bsdf.h"
 
@@ -66,13 +67,16 @@ inline float slab_transmittance(float thickness, float cos) {
 
 /// values: share of the light arriving from outside that gets to the bottom of a coat of this index and optical
 /// thickness (one scattering event at the rough interface, then the slab). per_alpha: share of diffuse light leaving
-/// the bottom that the coat returns to it. Thread-safe; the first call for given arguments builds the table (some 50
-/// ms); later calls search the few coats of a scene.
+/// the bottom that the coat returns to it. Thread-safe; the first calls for given arguments build the table together (25
+/// ms of processor time); later calls search the few coats of a scene.
 const DirectionalTable& coat_table(float eta, float thickness);
 
 /// values: the share of a perfectly reflecting rough base's reflection, under a smooth coat, that lies beyond the
 /// critical angle, as a function of the incoming light's cosine outside the coat. Zero for eta <= 1. Thread-safe like
 /// coat_table().
 const DirectionalTable& trapped_table(float eta);
+
+/// Rows of both kinds of tables that this process has computed, for tests.
+uint64_t coat_table_rows_built();
 
 }  // namespace lightloom

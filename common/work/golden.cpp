@@ -1,5 +1,7 @@
 #include "common/work/golden.h"
 
+#include <atomic>
+
 #include "common/core/transform.h"
 #include "common/film/partial_exr.h"
 #include "common/scene/scene.h"
@@ -209,9 +211,14 @@ Status hash_units(SceneDescription description, Sha256& hash) {
     return {};
 }
 
+std::atomic<uint64_t> digests_made{0};
+
 }  // namespace
 
+uint64_t golden_unit_digests_made() { return digests_made; }
+
 Result<Digest> golden_unit_digest() {
+    ++digests_made;
     Sha256 hash;
     LL_RETURN_IF_ERROR(hash_units(golden_scene(), hash));
     LL_RETURN_IF_ERROR(hash_units(golden_courtyard(), hash));

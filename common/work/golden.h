@@ -17,7 +17,9 @@ SceneDescription golden_scene();
 SceneDescription golden_courtyard();
 
 /// Renders one 32 x 32 unit of each scene per algorithm of the catalog, with the tables that it needs, and digests
-/// tables and partials. This takes about a second; the result is the same on every correct host with the same build.
+/// tables and partials. This takes 0.2 s of processor time; the result is the same on every correct host with the same build.
 Result<Digest> golden_unit_digest();
+/// How often this process has begun to do so, for tests.
+uint64_t golden_unit_digests_made();
 
 }  // namespace lightloom

@@ -14,7 +14,7 @@ extern const char* const kTools;
 /// Compiler, instruction set, contraction, ray tracer with its instruction set.
 std::string math_profile();
 
-/// The identity of this process; renders the golden units once.
+/// The identity of this process; the first call renders the golden units. Thread-safe.
 Result<BuildIdentity> build_identity();
 /// A service that cannot start for such an error prints this text before it.
 inline constexpr const char* kNoIdentity = "the golden unit failed on this host: ";

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
+#include <thread>
 
 #include "tests/service/fake.h"
 
@@ -286,6 +288,19 @@ TEST(Coordinator, CancelledJobsRevokeTheirUnits) {
     EXPECT_EQ(service.deliver(worker, lease).outcome, SubmitOutcome::kStale);
     EXPECT_TRUE(service.lease(worker).empty());
     EXPECT_EQ(service.coordinator->image(id, ImageKind::kFinal).status().code(), StatusCode::kFailedPrecondition);
+}
+
+/// Whoever watches a job hears of its end at once, not of every step before it.
+TEST(Coordinator, TheEndOfAJobEndsTheWaitForIt) {
+    FakeService service;
+    const std::string id = service.submit(service.spec(4));
+    EXPECT_TRUE(service.coordinator->wait_job_end(id, 0).ok());
+    EXPECT_EQ(service.coordinator->wait_job_end("none", 0).code(), StatusCode::kNotFound);
+    const auto begin = std::chrono::steady_clock::now();
+    const std::jthread cancel([&] { EXPECT_TRUE(service.coordinator->cancel_job(id).ok()); });
+    EXPECT_TRUE(service.coordinator->wait_job_end(id, 300).ok());
+    EXPECT_EQ(service.coordinator->get_job(id)->state, JobState::kCancelled);
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(100));
 }
 
 TEST(Coordinator, TimeLimitKeepsAPrefixThatSamplesPerPixelReproduce) {
