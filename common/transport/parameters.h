@@ -62,7 +62,7 @@ inline constexpr ParameterInfo kCache{"cache",
                                       "smallest number of light sub-paths in a unit's cache, however few camera samples it has "
                                       "[Davidovic et al. 2014 fill one per image]"};
 inline constexpr ParameterInfo kConnections{
-    "connections", 3, 1, 64, true, "N: connections per camera vertex [Su et al. 2022, table 3]"};
+    "connections", 3, 1, 64, true, "N: connections per camera vertex [Su et al. 2022, table 3]", {}, true};
 /// The size of a training set; a time-limited job may make it smaller.
 inline constexpr std::string_view kTrainingPaths = "training-paths";
 
@@ -90,11 +90,11 @@ inline double chosen_light_paths(const AlgorithmSettings& s) { return s.value(kL
 
 /// What algorithms with a light-vertex cache have in common.
 struct CacheParameters {
-    int connections;         ///< N
-    uint64_t minimum_paths;  ///< Smallest number of light paths in a unit's cache.
+    ByDepth<int> connections;  ///< N
+    uint64_t minimum_paths;    ///< Smallest number of light paths in a unit's cache.
 
     static CacheParameters of(const AlgorithmSettings& s) {
-        return {int(s.value(kConnections.name)), uint64_t(s.value(kCache.name))};
+        return {s.value_by_depth(kConnections.name).each([](double n) { return int(n); }), uint64_t(s.value(kCache.name))};
     }
 };
 

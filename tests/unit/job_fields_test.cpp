@@ -54,8 +54,12 @@ std::string replay(const JobSpec& spec) { return replay_command(spec, kMain, {{3
 // Other values than the given one, each different in another part of it.
 std::vector<AlgorithmSettings> others(const AlgorithmSettings& value) {
     std::vector<AlgorithmSettings> all{testing::algorithm_of("bdpt").completed()};
-    for (const ParameterInfo& p : value.info().parameters)
-        all.push_back(value.with(p.name, value.value(p.name) == p.max_value ? p.min_value : p.max_value));
+    for (const ParameterInfo& p : value.info().parameters) {
+        const ByDepth<double> now = value.value_by_depth(p.name);
+        const auto another = [&](double v) { return v == p.max_value ? p.min_value : p.max_value; };
+        all.push_back(value.with(p.name, p.by_depth ? ByDepth<double>(another(now.at_first), now.later) : another(now.at_first)));
+        if (p.by_depth) all.push_back(value.with(p.name, {now.at_first, another(now.later)}));
+    }
     return all;
 }
 std::array<bool, 1> others(bool value) { return {!value}; }
