@@ -138,7 +138,7 @@ TEST(Techniques, RouletteAndChoicesKeepTheMean) {
         const std::string name(row->name);
         std::vector<std::map<std::string, std::string>> variants{
             {},
-            testing::those_of(name, {{"rr-min", "1"}, {"connections", "5,2"}}),
+            testing::those_of(name, {{"rr-min", "1"}, {"connections", "3"}}),
             {{"rr-start", "2"}, {"rr-min", "0.05"}},
             {{"rr-start", "2"}, {"rr-min", "0.3"}},
             testing::those_of(name, {{"rr-start", "2"}, {"rr-min", "0.6"}, {"connections", "1,4"}})};

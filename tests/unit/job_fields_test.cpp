@@ -26,7 +26,7 @@ const std::string kMain = "room.pbrt";
 /// No field has the value that a forgotten one would have.
 JobSpec full_spec() {
     JobSpec spec;
-    spec.algorithm = testing::algorithm_of("lvcbpt", {{"cache", "500"}, {"rr-min", "0.25"}}).completed();
+    spec.algorithm = testing::algorithm_of("lvcbpt", {{"cache", "500"}, {"connections", "3"}, {"rr-min", "0.25"}}).completed();
     spec.seed = ~0ull;
     spec.samples_per_pixel = 7;
     spec.time_limit_seconds = 1.5;
@@ -117,7 +117,7 @@ TEST(JobFields, EachDecidesWhatItsRolesSayAndTravels) {
 /// text, and the choice of a training set, which a time limit may not change.
 TEST(JobFields, WhichParametersWereChosenTravelsAndDecidesNothing) {
     JobSpec chosen = full_spec(), left = full_spec();
-    left.algorithm = testing::algorithm_of("lvcbpt", {{"cache", "500"}, {"rr-min", "0.25"}});
+    left.algorithm = testing::algorithm_of("lvcbpt", {{"cache", "500"}, {"connections", "3"}, {"rr-min", "0.25"}});
     ASSERT_FALSE(left == chosen);
     EXPECT_FALSE(same_request(left, chosen));
     EXPECT_EQ(left.spec_digest(), chosen.spec_digest());
