@@ -33,7 +33,7 @@ struct Shared {
 
 bool same(const ParameterInfo& a, const ParameterInfo& b) {
     return a.name == b.name && a.default_value == b.default_value && a.min_value == b.min_value && a.max_value == b.max_value &&
-           a.integer == b.integer && a.help == b.help &&
+           a.integer == b.integer && a.help == b.help && a.by_depth == b.by_depth &&
            std::equal(a.choices.begin(), a.choices.end(), b.choices.begin(), b.choices.end());
 }
 
@@ -84,7 +84,8 @@ Json describe(const ParameterInfo& p) {
     } else {
         const auto number = [&](double value) { return p.integer ? Json(int64_t(value)) : Json(value); };
         json["type"] = p.integer ? "integer" : "number";
-        json["default"] = number(p.default_value);
+        json["by_depth"] = p.by_depth;
+        json["default"] = p.by_depth ? Json(p.text_of(p.default_value)) : number(p.default_value.at_first);
         json["min"] = number(p.min_value);
         json["max"] = number(p.max_value);
     }

@@ -10,6 +10,7 @@
 #include "common/core/fork_join.h"
 #include "common/core/rng.h"
 #include "common/film/png.h"
+#include "common/tables/emission_part.h"
 #include "server/table_cache.h"
 
 namespace lightloom::client {

@@ -20,6 +20,18 @@ double process_seconds() {
 
 }  // namespace
 
+std::vector<std::string> split_algorithms(const std::string& list) {
+    std::vector<std::string> words(1);
+    for (size_t i = 0; i < list.size(); ++i) {
+        const bool digit_follows = i + 1 < list.size() && list[i + 1] >= '0' && list[i + 1] <= '9';
+        if (list[i] == ',' && !digit_follows)
+            words.emplace_back();
+        else
+            words.back() += list[i];
+    }
+    return words;
+}
+
 Result<AlgorithmChoice> parse_algorithm(const std::string& text) {
     std::map<std::string, std::string> parameters;
     size_t begin = std::min(text.find(':'), text.size());

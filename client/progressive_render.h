@@ -25,6 +25,9 @@ struct AlgorithmChoice {
     std::string label;  ///< The word.
 };
 
+/// The words of a list with commas between them. A comma before a digit is none of these: it stands in a value
+/// ("spcbpt:connections=5,2"), because no algorithm's name begins with a digit.
+std::vector<std::string> split_algorithms(const std::string& list);
 /// "NAME[:KEY=VALUE]...", checked against the catalog.
 Result<AlgorithmChoice> parse_algorithm(const std::string& text);
 

@@ -52,14 +52,15 @@ struct BenchOptions {
 
 Result<std::vector<AlgorithmChoice>> parse_choices(const std::vector<std::string>& texts) {
     std::vector<AlgorithmChoice> choices;
-    for (const std::string& text : texts) {
-        auto choice = parse_algorithm(text);
-        if (!choice.ok()) return choice.status();
-        for (const AlgorithmChoice& other : choices) {
-            if (other.settings == choice->settings) return invalid_argument("--algorithms names " + text + " twice");
+    for (const std::string& list : texts)
+        for (const std::string& text : split_algorithms(list)) {
+            auto choice = parse_algorithm(text);
+            if (!choice.ok()) return choice.status();
+            for (const AlgorithmChoice& other : choices) {
+                if (other.settings == choice->settings) return invalid_argument("--algorithms names " + text + " twice");
+            }
+            choices.push_back(std::move(choice).value());
         }
-        choices.push_back(std::move(choice).value());
-    }
     return choices;
 }
 
@@ -161,8 +162,7 @@ std::vector<cli::Option> add_single_scene_options(cli::App command, BenchOptions
     own.push_back(command
                       ->add_option("--algorithms", options.algorithms,
                                    "What is measured, with commas between them; the first is what the others' ratios refer to")
-                      ->type_name("NAME[:KEY=VALUE]...")
-                      ->delimiter(','));
+                      ->type_name("NAME[:KEY=VALUE]..."));
     own.push_back(command->add_option("--time", options.time, "Seconds that a run may take; --time or --spp is needed")
                       ->type_name("SECONDS")
                       ->check(number_between(0.001, 30 * 86400.0)));

@@ -12,8 +12,9 @@ enum class Correction : uint8_t {
     kCorrelation,  ///< Connections that share a camera sub-path [Grittmann, Georgiev and Slusallek 2021]; correlation.h.
 };
 
-/// A selection that counts n c_s connections instead of n. Inner::OnPath gives their number, connections(), and sigma
-/// if only a share of them counts, connect(s, share). Its view must have what view_footprint() writes.
+/// A selection that counts n c_s connections instead of n. Inner::OnPath gives the number of those that split the path after s
+/// light vertices, connections(s), and sigma if only a share of them counts, connect(s, share). Its view must have what
+/// view_footprint() writes.
 template <class Inner>
 struct Corrected {
     Inner inner;
@@ -31,7 +32,7 @@ struct Corrected {
                 // Computed one by one, the factors cost the number of possible connections times that of edges per
                 // weight. Products that grow along the path would be cheaper, but they round differently, which changes
                 // the bytes of every image.
-                case Correction::kCorrelation: return correlation_factor(this->view, s, this->connections());
+                case Correction::kCorrelation: return correlation_factor(this->view, s, this->connections(s));
             }
             return 1;
         }

@@ -1,6 +1,7 @@
 #pragma once
 // The number of rays that next event estimation sends, and how far the weights trust it.
 
+#include "common/core/by_depth.h"
 #include "common/core/vec.h"
 #include "common/path/path_view.h"
 
@@ -8,12 +9,8 @@ namespace lightloom {
 
 /// The number of rays that a camera vertex sends to points on lights: it may be larger at the camera's first hit, where
 /// direct light makes up most of an image and more rays need no walk.
-struct NextEventRays {
-    int at_first = 1;  ///< At the camera's first hit.
-    int later = 1;     ///< At every later vertex.
-
-    /// Rays from the last vertex of a camera sub-path of t vertices, t >= 2.
-    int operator()(int t) const { return t == 2 ? at_first : later; }
+struct NextEventRays : ByDepth<int> {
+    using ByDepth::ByDepth;
     /// sigma / survivors(1) of next event estimation, as the weights need it.
     double sigma(const PathView& view) const { return double((*this)(view.k)) * trust(view) * view.next_event / view.fwd[0]; }
 

@@ -3,39 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/core/math.h"
-#include "common/scene/sampling.h"
+#include "common/scene/emitter_square.h"
 
 namespace lightloom {
 namespace {
-
-/// Equal-area coordinates in [0, 1]^2 of a point on an emitter: the inverses of the mappings by which sampling.h draws
-/// points, up to the order of the axes.
-Vec2 emitter_coordinates(const Emitter& e, const Vec3& position, const Vec3& w) {
-    switch (e.kind) {
-        case EmitterKind::kTriangle: {
-            const Vec3 d = position - e.position;
-            const float a = dot(e.edge1, e.edge1), b = dot(e.edge1, e.edge2), c = dot(e.edge2, e.edge2);
-            const float p = dot(d, e.edge1), q = dot(d, e.edge2);
-            const float determinant = a * c - b * b;
-            if (!(determinant > 0)) return {};
-            const float b1 = (c * p - b * q) / determinant, b2 = (a * q - b * p) / determinant;
-            const float sum = b1 + b2;
-            return {sum * sum, sum > 0 ? b2 / sum : 0};
-        }
-        case EmitterKind::kSphere: {
-            const Vec3 n = (position - e.position) / e.radius;
-            return {0.5f + 0.5f * n.z, 0.5f + float(math::atan2(n.y, n.x)) / kTwoPi};
-        }
-        case EmitterKind::kEnvironment: return equal_area_sphere_to_square(-w);
-        case EmitterKind::kPoint:
-        case EmitterKind::kSpot:
-        case EmitterKind::kDistant:
-        case EmitterKind::kProjection:
-        case EmitterKind::kGoniometric: return {};
-    }
-    return {};
-}
 
 uint32_t grid_line(float u, uint32_t side) {
     const float scaled = u * float(side);
@@ -81,7 +52,7 @@ LightDivision LightDivision::divide(const EmitterSet& emitters, uint32_t cell_co
 uint32_t LightDivision::label(const EmitterSet& emitters, uint32_t index, const Vec3& position, const Vec3& w) const {
     const Cells& c = cells_[index];
     if (c.side == 1) return c.first;
-    const Vec2 u = emitter_coordinates(emitters[index], position, w);
+    const Vec2 u = emitter_square(emitters[index], position, w);
     return c.first + grid_line(u.y, c.side) * c.side + grid_line(u.x, c.side);
 }
 

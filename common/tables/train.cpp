@@ -171,7 +171,8 @@ GammaDataset gamma_dataset(const TrainingData& d, const std::vector<double>& bri
             node.light =
                 uint16_t(s == 1 ? source_label(t.division, emitters, v[0]) : t.light_label(end_between(v[s - 1], v[s - 2])));
             node.eye = uint16_t(t.eye_label(end_between(v[s], v[s + 1])));
-            node.g = float(o.connections * double(v[s].density) / double(t.energy[node.light]));
+            const int camera_vertices = int(p.vertex_count - s);
+            node.g = float(o.connections(camera_vertices) * double(v[s].density) / double(t.energy[node.light]));
             if (node.g > 0 && std::isfinite(node.g)) out.nodes.push_back(node);
         }
         path.node_count = uint32_t(out.nodes.size()) - path.first_node;

@@ -11,6 +11,7 @@
 #include <stop_token>
 #include <string>
 
+#include "common/core/by_depth.h"
 #include "common/core/result.h"
 #include "common/tables/subspace_tables.h"
 #include "common/tables/train_gamma.h"
@@ -24,10 +25,10 @@ struct TrainingOptions {
     double direction_weight = 0.05;                         ///< k_d.
     double mix = 0.1;                                       ///< Conservative share of Gamma; see train_gamma.h.
     GammaTrainer trainer = GammaTrainer::kMm;
-    int connections = 3;        ///< N, the number of connections that rendering will make.
-    double reuse_target = 200;  ///< M0: prefixes that a subspace should hold.
-    int reuse_windows = 1;      ///< J_max.
-    double nominal_paths = 1;   ///< Light paths of the smallest cache that rendering will make.
+    ByDepth<int> connections = 3;  ///< N, the number of connections that rendering will make.
+    double reuse_target = 200;     ///< M0: prefixes that a subspace should hold.
+    int reuse_windows = 1;         ///< J_max.
+    double nominal_paths = 1;      ///< Light paths of the smallest cache that rendering will make.
     /// How light left the lights where the data were traced, and how it will in the render; null: both alike.
     const EmitterSet* traced = nullptr;
     const EmitterSet* rendered = nullptr;

@@ -17,8 +17,9 @@
 //       void label_light_path(const Scene&, PathVertex* y, int n) const;
 //       void label_camera_vertex(const Scene&, PathVertex* v) const;
 //       void complete(const Scene&, const LightSubPath& y, int s, PathVertex* z, int t, const Vec3& towards, PathView*) const;
-//       int draw(const LightCache&, const Index&, const PathVertex& v, Stratified&& u, Rng&, int longest_prefix,
-//                LightPick*) const;                    // u(): a point of the vertex that is stratified where that helps
+//       int draw(const LightCache&, const Index&, const PathVertex& v, int t, Stratified&& u, Rng&, int longest_prefix,
+//                LightPick*) const;                    // v: the last vertex of a camera sub-path of t; u(): a point of the
+//                                                      // vertex that is stratified where that helps
 //       float inverse_density(const LightPick&) const; // see PathContribution
 //   };
 //
@@ -110,7 +111,7 @@ struct CachedAlgorithm {
             LightPick picks[kMaxConnections];
             // The first vertex uses low-discrepancy points over the iterations of the pixel.
             const int count = method.draw(
-                state.cache, state.index, v, [&] { return sampler.connection(t); }, sampler.rng(), context.max_edges + 1 - t,
+                state.cache, state.index, v, t, [&] { return sampler.connection(t); }, sampler.rng(), context.max_edges + 1 - t,
                 picks);
             for (int n = 0; n < count; ++n) picks[n].y[picks[n].s - 1].prefetch_surface();
             for (int n = 0; n < count; ++n) {

@@ -26,14 +26,17 @@ std::string number_text(double value, bool integer) {
 
 }  // namespace
 
-std::string ParameterInfo::text_of(double value) const {
-    return choices.empty() ? number_text(value, integer) : std::string(choices[size_t(value)]);
+std::string ParameterInfo::text_of(const ByDepth<double>& value) const {
+    if (!choices.empty()) return std::string(choices[size_t(value.at_first)]);
+    const std::string first = number_text(value.at_first, integer);
+    return value.later == value.at_first ? first : first + "," + number_text(value.later, integer);
 }
 
 std::string ParameterInfo::range() const {
     if (choices.empty()) {
         return std::string(integer ? "an integer" : "a number") + " from " + number_text(min_value, integer) + " to " +
-               number_text(max_value, integer);
+               number_text(max_value, integer) +
+               (by_depth ? ", or two with a comma between them: at the camera's first hit, at later ones" : "");
     }
     std::string names;
     for (size_t c = 0; c < choices.size(); ++c) {

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/core/by_depth.h"
 #include "common/core/result.h"
 
 namespace lightloom {
@@ -25,16 +26,18 @@ struct TablePart;
 
 struct ParameterInfo {
     std::string_view name;
-    double default_value;
+    ByDepth<double> default_value;
     double min_value, max_value;
     bool integer;
     std::string_view help;  ///< What it does, unit, source.
     /// Names of the values 0, 1, ... where a name says more than a number. People are shown names alone; digests, the wire and the
     /// header of an EXR have the number, which is therefore understood as well.
     std::span<const std::string_view> choices = {};
+    /// Whether a second number, after a comma, may say what holds behind the camera's first hit; one number holds everywhere.
+    bool by_depth = false;
 
-    /// A value in its range as people write it: the name of a choice, or the number.
-    std::string text_of(double value) const;
+    /// A value in its range as people write it: the name of a choice, or the number, or "5,2".
+    std::string text_of(const ByDepth<double>& value) const;
     /// What values there are: "balance, power or maximum", "an integer from 1 to 64", "a number from 0.01 to 1".
     std::string range() const;
 };

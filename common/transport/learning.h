@@ -34,7 +34,7 @@ struct LearningPlan {
     double energy_paths = 1;  ///< M' / D: light sub-paths that measure Q, per sample.
     std::vector<LearningRound> rounds;
     // Parameters of the render's weights that are not in the tables.
-    int connections = 1;  ///< N
+    ByDepth<int> connections;  ///< N
     Correction correction = Correction::kUncorrected;
     NextEventRays rays{0, 0};
 

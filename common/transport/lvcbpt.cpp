@@ -56,9 +56,9 @@ Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     const CacheParameters p = CacheParameters::of(settings);
     const double vertices_per_path = r.tables.get<SubspaceTables>()->vertices_per_path;
     return make_unit_renderer(r, [&](auto&& select) {
-        const auto selection =
-            select(UniformSelection{double(r.light_paths_per_iteration()), double(p.connections) / vertices_per_path,
-                                    TypicalSurvival(roulette_of(settings)), next_event_beside_cache_of(settings)});
+        const auto selection = select(UniformSelection{
+            double(r.light_paths_per_iteration()), p.connections.each([&](int n) { return double(n) / vertices_per_path; }),
+            TypicalSurvival(roulette_of(settings)), next_event_beside_cache_of(settings)});
         return LvcbptAlgorithm<std::remove_cvref_t<decltype(selection)>>{
             {selection, p.connections}, heuristic_of(settings), p.minimum_paths};
     });

@@ -2,10 +2,11 @@
 // `lvcbpt`: bidirectional path tracing with a light-vertex cache and uniform selection [Davidovic, Krivanek, Hasan and Slusallek
 // 2014, section 4.1; the baseline of Su, Li and Wang 2022].
 //
-// Every camera vertex is connected to N prefixes drawn uniformly from the unit's cache (V prefixes of M paths). Densities:
+// Every camera vertex is connected to N(t) prefixes drawn uniformly from the unit's cache (V prefixes of M paths); N(t) is one
+// number for the camera's first hit, t = 2, and one for later vertices. Densities, with t = k + 1 - s:
 //   s = 0          rho = A(0)
 //   s = 1          rho = n next_event A(1)     next event estimation at the first hit, beside the cache's own
-//   1 <= s <= k-1  rho = N / v  C(s) A(s)       v: expected number of prefixes per light path, a table. The estimator divides by
+//   1 <= s <= k-1  rho = N(t) / v  C(s) A(s)    v: expected number of prefixes per light path, a table. The estimator divides by
 //                                               what was really done, V / (M N): the weight must not know the realised V
 //   s = k          rho = N1 |crop| C(k)
 // each times the share of light sub-paths of s vertices and of camera sub-paths of t vertices that survive roulette
@@ -18,7 +19,7 @@ namespace lightloom {
 
 struct UniformSelection {
     double light_paths_per_iteration = 1;  ///< N1 |crop|
-    double connection_density = 1;         ///< N / v
+    ByDepth<double> connection_density;    ///< N / v
     TypicalSurvival survival;
     NextEventRays rays;
 
@@ -28,7 +29,7 @@ struct UniformSelection {
 
         double survivors(int s) const { return survival.light(s) * survival.camera(view.k + 1 - s); }
         double next_event() const { return selection.rays.sigma(view); }
-        double connect(int) const { return selection.connection_density; }
+        double connect(int s) const { return selection.connection_density(view.k + 1 - s); }
         double lens() const { return selection.light_paths_per_iteration; }
     };
     OnPath on(const PathView& view) const { return {{view}, *this, {survival, view}}; }
@@ -38,13 +39,13 @@ struct UniformSelection {
 template <class Selection = UniformSelection>
 struct UniformConnections {
     Selection densities;
-    int connections = 3;  ///< N
+    ByDepth<int> connections = 3;  ///< N
 
     const Selection& selection(const UnitScope&) const { return densities; }
     static constexpr ViewDetail kDetail = ViewDetail::kFull;
     struct Index {
         std::vector<LightCandidate> candidates;
-        float inverse_density = 0;  ///< V / (M N), with the V that the cache really has.
+        ByDepth<float> inverse_density;  ///< V / (M N), with the V that the cache really has.
     };
 
     uint64_t windows() const { return 1; }
@@ -56,21 +57,23 @@ struct UniformConnections {
     Index index(const LightCache& cache, uint64_t paths) const {
         Index index;
         cache.for_each_prefix([&](const LightPrefix& p) { index.candidates.push_back({p.first_vertex, p.s}); });
-        index.inverse_density = float(double(index.candidates.size()) / (double(paths) * connections));
+        index.inverse_density =
+            connections.each([&](int n) { return float(double(index.candidates.size()) / (double(paths) * n)); });
         return index;
     }
 
     template <class Stratified>
-    int draw(const LightCache& cache, const Index& index, const PathVertex&, Stratified&&, Rng& rng, int longest_prefix,
+    int draw(const LightCache& cache, const Index& index, const PathVertex&, int t, Stratified&&, Rng& rng, int longest_prefix,
              LightPick* picks) const {
         const uint32_t count = uint32_t(index.candidates.size());
+        const float inverse_density = index.inverse_density(t);
         int found = 0;
-        for (int n = 0; n < connections && count > 0; ++n) {
+        for (int n = 0; n < connections(t) && count > 0; ++n) {
             const LightCandidate& prefix = index.candidates[rng.below(count)];
             if (int(prefix.s) > longest_prefix) continue;
             const LightVertex* y = cache.at(prefix.first_vertex);
             prefetch(&y[prefix.s - 1]);
-            picks[found++] = {y, int(prefix.s), index.inverse_density};
+            picks[found++] = {y, int(prefix.s), inverse_density};
         }
         return found;
     }

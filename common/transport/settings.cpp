@@ -2,6 +2,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <optional>
 
 #include "common/core/check.h"
 #include "common/core/nearest.h"
@@ -10,8 +11,8 @@
 namespace lightloom {
 namespace {
 
-/// Parses the value of a parameter; the error says what is wrong.
-Result<double> parse_value(const AlgorithmInfo& algorithm, const ParameterInfo& p, const std::string& text) {
+/// One number in the range of a parameter, or the name of a choice.
+std::optional<double> parse_number(const ParameterInfo& p, std::string_view text) {
     double v = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), v);
     bool number = error == std::errc() && end == text.data() + text.size() && std::isfinite(v);
@@ -19,8 +20,28 @@ Result<double> parse_value(const AlgorithmInfo& algorithm, const ParameterInfo& 
         if (p.choices[c] == text) v = double(c), number = true;
     }
     if (number && v >= p.min_value && v <= p.max_value && !(p.integer && v != std::floor(v))) return v;
+    return std::nullopt;
+}
+
+/// Parses the value of a parameter; the error says what is wrong.
+Result<ByDepth<double>> parse_value(const AlgorithmInfo& algorithm, const ParameterInfo& p, const std::string& text) {
+    const size_t comma = p.by_depth ? text.find(',') : text.npos;
+    const auto first = parse_number(p, std::string_view(text).substr(0, comma));
+    const auto later = comma == text.npos ? first : parse_number(p, std::string_view(text).substr(comma + 1));
+    if (first && later) return ByDepth<double>(*first, *later);
     return invalid_argument("parameter " + std::string(p.name) + "=" + text + " of '" + std::string(algorithm.name) + "' must be " +
                             p.range() + did_you_mean(text, p.choices));
+}
+
+/// The shortest text that parses to the same numbers; one number where both are equal.
+std::string plain_text(const ByDepth<double>& value) {
+    char text[128];
+    char* end = std::to_chars(text, text + 64, value.at_first).ptr;
+    if (value.later != value.at_first) {
+        *end++ = ',';
+        end = std::to_chars(end, text + sizeof text, value.later).ptr;
+    }
+    return std::string(text, end);
 }
 
 Status unknown_parameter(const AlgorithmInfo& algorithm, const std::string& name) {
@@ -61,6 +82,12 @@ size_t AlgorithmSettings::index(std::string_view parameter) const {
 }
 
 double AlgorithmSettings::value(std::string_view parameter) const {
+    const ByDepth<double>& value = value_by_depth(parameter);
+    LL_CHECK(!info_->parameters[index(parameter)].by_depth, "parameter '" + std::string(parameter) + "' may be two numbers");
+    return value.at_first;
+}
+
+const ByDepth<double>& AlgorithmSettings::value_by_depth(std::string_view parameter) const {
     LL_CHECK(has(parameter), "algorithm '" + name() + "' has no parameter '" + std::string(parameter) + "'");
     return values_[index(parameter)];
 }
@@ -73,12 +100,16 @@ AlgorithmSettings AlgorithmSettings::completed() const {
     return all;
 }
 
-AlgorithmSettings AlgorithmSettings::with(std::string_view parameter, double value) const {
+AlgorithmSettings AlgorithmSettings::with(std::string_view parameter, const ByDepth<double>& value) const {
     AlgorithmSettings changed = *this;
     LL_CHECK(has(parameter), "algorithm '" + name() + "' has no parameter '" + std::string(parameter) + "'");
     const size_t i = index(parameter);
-    LL_CHECK_GE(value, info_->parameters[i].min_value);
-    LL_CHECK_LE(value, info_->parameters[i].max_value);
+    const ParameterInfo& p = info_->parameters[i];
+    LL_CHECK(p.by_depth || value.at_first == value.later, "parameter '" + std::string(parameter) + "' is one number");
+    for (const double v : {value.at_first, value.later}) {
+        LL_CHECK_GE(v, p.min_value);
+        LL_CHECK_LE(v, p.max_value);
+    }
     changed.values_[i] = value;
     changed.chosen_[i] = true;
     return changed;
@@ -96,13 +127,8 @@ std::map<std::string, std::string> AlgorithmSettings::chosen_text(bool named) co
     std::map<std::string, std::string> out;
     for (size_t i = 0; i < values_.size(); ++i) {
         if (!chosen_[i]) continue;
-        if (named) {
-            out[std::string(info_->parameters[i].name)] = info_->parameters[i].text_of(values_[i]);
-            continue;
-        }
-        char text[64];
-        const auto end = std::to_chars(text, text + sizeof text, values_[i]).ptr;
-        out[std::string(info_->parameters[i].name)] = std::string(text, end);
+        const ParameterInfo& p = info_->parameters[i];
+        out[std::string(p.name)] = named ? p.text_of(values_[i]) : plain_text(values_[i]);
     }
     return out;
 }

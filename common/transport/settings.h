@@ -29,14 +29,16 @@ class AlgorithmSettings {
     }
     std::string name() const { return std::string(info_->name); }
     bool has(std::string_view parameter) const { return index(parameter) < values_.size(); }
-    /// The value of a parameter, which the algorithm must have.
+    /// The value of a parameter, which the algorithm must have and which must be one number.
     double value(std::string_view parameter) const;
+    /// The same for one that may be two numbers; of any other, both are its value.
+    const ByDepth<double>& value_by_depth(std::string_view parameter) const;
     /// Whether the text that these settings come from named the parameter.
     bool chosen(std::string_view parameter) const;
     /// The same settings with every parameter marked as chosen, so that the defaults in force are recorded.
     AlgorithmSettings completed() const;
     /// The same settings with one parameter chosen, at a value in its range.
-    AlgorithmSettings with(std::string_view parameter, double value) const;
+    AlgorithmSettings with(std::string_view parameter, const ByDepth<double>& value) const;
     /// All parameters with their values as canonical text, so that an image says what was rendered even where defaults applied.
     /// Choices are numbers there, as they are in digests, on the wire and in the header of an EXR.
     std::map<std::string, std::string> text() const;
@@ -61,7 +63,7 @@ class AlgorithmSettings {
     size_t index(std::string_view parameter) const;
 
     const AlgorithmInfo* info_;
-    std::vector<double> values_;  ///< In the order of info_->parameters.
+    std::vector<ByDepth<double>> values_;  ///< In the order of info_->parameters.
     std::vector<bool> chosen_;
 };
 

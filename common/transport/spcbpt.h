@@ -3,7 +3,8 @@
 // common/path/README.md, "Subspaces" and "Corrections of the papers".
 //
 // Light prefixes of the unit's cache lie in light subspaces i = kappa_L(prefix), camera suffixes in eye subspaces
-// j = kappa_E(suffix). Every camera vertex draws N times: i ~ Gamma(. | j), then a prefix Y of subspace i with probability
+// j = kappa_E(suffix). Every camera vertex draws N times (a number for the camera's first hit, t = 2, and one for later vertices,
+// so that N is a function of the path): i ~ Gamma(. | j), then a prefix Y of subspace i with probability
 // P2 = r(Y) / R_i, r = scalar throughput as traced, R_i its sum over the subspace's M_i = J_i M paths. Estimator:
 //     (1 / N) w f / (p(Y) p(Z))  /  (M_i Gamma(i, j) P2(Y))                                       [Eq. 10 with its p(Y)]
 // Effective densities, with F the measurement contribution of a prefix and L its scalar:
@@ -49,11 +50,12 @@ struct PreparedTables {
 /// The learned tables decide how often a camera sub-path meets a prefix: N Gamma(i, j) / Q(i).
 struct LearnedAffinity {
     std::shared_ptr<const PreparedTables> prepared;
-    double connections = 3;  ///< N
+    ByDepth<double> connections = 3;  ///< N
 
     double operator()(const PathView& view, int s, double share) const {
         const uint32_t i = view.light_label[s];
-        return connections * share * double(prepared->tables.column(view.eye_label[s])[i]) * double(prepared->inv_energy[i]);
+        return connections(view.k + 1 - s) * share * double(prepared->tables.column(view.eye_label[s])[i]) *
+               double(prepared->inv_energy[i]);
     }
 };
 
@@ -63,7 +65,7 @@ template <class Affinity = LearnedAffinity>
 struct SubspaceSelection {
     Affinity affinity;
     double light_paths_per_iteration = 1;  ///< N1 |crop|
-    double connections = 3;                ///< N
+    ByDepth<double> connections = 3;       ///< N
     double cache_paths = 0;                ///< M of ris_aware; 0 switches ris_aware off.
     TypicalSurvival survival;
     NextEventRays rays;
@@ -75,7 +77,7 @@ struct SubspaceSelection {
         /// Draws among prefixes compensate for roulette: a survivor has correspondingly more throughput.
         double survivors(int s) const { return s == view.k ? survival.light(s) : survival.camera(view.k + 1 - s); }
         double next_event() const { return selection.rays.sigma(view); }
-        double connections() const { return selection.connections; }
+        double connections(int s) const { return selection.connections(view.k + 1 - s); }
         double connect(int s) const { return connect(s, 1); }
         double connect(int s, double share) const {
             const double target = selection.affinity(view, s, share) * view.light_throughput[s];
@@ -94,7 +96,7 @@ using SpcbptSelection = Corrected<SubspaceSelection<>>;
 /// The selection's parameters besides the tables; see SubspaceSelection.
 struct SpcbptCounts {
     double light_paths_per_iteration = 1;
-    int connections = 3;
+    ByDepth<int> connections = 3;
     double cache_paths = 0;
     Correction correction = Correction::kUncorrected;
     RouletteRule roulette;
@@ -102,7 +104,7 @@ struct SpcbptCounts {
 };
 
 inline SpcbptSelection spcbpt_selection(std::shared_ptr<const PreparedTables> prepared, const SpcbptCounts& c) {
-    const double connections = double(c.connections);
+    const auto connections = c.connections.each([](int n) { return double(n); });
     return {{LearnedAffinity{std::move(prepared), connections}, c.light_paths_per_iteration, connections, c.cache_paths,
              TypicalSurvival(c.roulette), c.rays},
             c.correction};
@@ -112,7 +114,7 @@ template <class Selection = SpcbptSelection>
 struct SubspaceConnections {
     Selection densities;
     std::shared_ptr<const PreparedTables> prepared;
-    int connections = 3;  ///< N
+    ByDepth<int> connections = 3;  ///< N
 
     const Selection& selection(const UnitScope&) const { return densities; }
     static constexpr ViewDetail kDetail = ViewDetail::kSubspace;
@@ -128,7 +130,7 @@ struct SubspaceConnections {
     };
     struct Subspace {
         uint32_t begin = 0, count = 0;  ///< Range of its candidates.
-        float scale = 0;                ///< R_i / (M_i N)
+        ByDepth<float> scale = 0;       ///< R_i / (M_i N)
     };
     /// The cache's candidates, sorted by light subspace.
     struct Index {
@@ -181,7 +183,7 @@ struct SubspaceConnections {
                     index.candidates[subspace.begin + c].keep = entries[c].keep;
                     index.candidates[subspace.begin + c].alias = entries[c].alias;
                 }
-                subspace.scale = float(sum / (double(paths) * tables.window[i] * connections));
+                subspace.scale = connections.each([&](int n) { return float(sum / (double(paths) * tables.window[i] * n)); });
             }
         });
         return index;
@@ -191,9 +193,10 @@ struct SubspaceConnections {
     /// once. One random number serves both stages and is stratified over the draws. Returns how many draws found a
     /// prefix.
     template <class Stratified>
-    int draw(const LightCache& cache, const Index& index, const PathVertex& v, Stratified&& stratified, Rng& rng,
+    int draw(const LightCache& cache, const Index& index, const PathVertex& v, int t, Stratified&& stratified, Rng& rng,
              int longest_prefix, LightPick* picks) const {
         const PreparedTables& tables = *this->prepared;
+        const int draw_count = connections(t);
         const InverseCdfTable::Column column = tables.draws.column(v.label);
         const Vec2 u = stratified(), below = rng.uniform2();
         // u has 24 bits; the lower bits come from the stream.
@@ -205,15 +208,15 @@ struct SubspaceConnections {
             float scale;
         } draws[kMaxConnections];
         InverseCdfTable::Draw firsts[kMaxConnections];
-        column.draw_strata(base, connections, firsts);
+        column.draw_strata(base, draw_count, firsts);
         int found = 0;
-        for (int n = 0; n < connections; ++n) {
+        for (int n = 0; n < draw_count; ++n) {
             const InverseCdfTable::Draw& first = firsts[n];
             const Subspace& subspace = index.subspaces[first.outcome];
             if (subspace.count == 0) continue;  // the subspace is empty: its share of the estimate is zero
             Draw& d = draws[found++];
             d = {&index.candidates[subspace.begin], subspace.count, alias_part(subspace.count, first.rest), first.rest,
-                 subspace.scale / first.probability};
+                 subspace.scale(t) / first.probability};
             __builtin_prefetch(&d.candidates[d.part]);
         }
         int count = 0;

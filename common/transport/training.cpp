@@ -194,7 +194,7 @@ class TrainingGenerator::Unit {
         return {generator_.scene_->emitters(),
                 {{{},
                   double(generator_.light_paths_per_iteration_),
-                  double(plan.connections),
+                  plan.connections.each([](int n) { return double(n); }),
                   0,
                   TypicalSurvival(generator_.roulette_),
                   plan.rays},

@@ -15,12 +15,11 @@ using namespace lightloom;
 
 int main(int argc, char** argv) {
     CLI::App app("Estimated against true relMSE");
-    std::string scene_path, resolution = "96x54", referee = "bdpt";
-    std::vector<std::string> algorithms{"path", "bdpt"};
+    std::string scene_path, resolution = "96x54", referee = "bdpt", algorithms = "path,bdpt";
     uint64_t iterations = 256, reference_iterations = 4096;
     int octaves = 3, seeds = 3;
     app.add_option("scene", scene_path)->required();
-    app.add_option("--algorithms", algorithms)->delimiter(',');
+    app.add_option("--algorithms", algorithms);
     app.add_option("--iterations", iterations)->check(CLI::Range(16, 1 << 20));
     app.add_option("--octaves", octaves)->check(CLI::Range(1, 12));
     app.add_option("--seeds", seeds)->check(CLI::Range(1, 1000));
@@ -36,7 +35,7 @@ int main(int argc, char** argv) {
     const auto reference = bench::value_or_exit(testing::make_tracked_reference(scene, referee, reference_iterations));
     std::printf("%s, reference: %llu iterations of %s, relMSE %.2g\n", scene_path.c_str(),
                 static_cast<unsigned long long>(reference_iterations), referee.c_str(), reference.relmse);
-    for (const std::string& algorithm : algorithms) {
+    for (const std::string& algorithm : client::split_algorithms(algorithms)) {
         std::vector<std::vector<testing::TrackedPoint>> tracks;
         for (int seed = 1; seed <= seeds; ++seed)
             tracks.push_back(

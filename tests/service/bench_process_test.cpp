@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -178,7 +179,10 @@ TEST_F(Bench, TablesOfTheCacheCostWhatMakingThemTook) {
             if (line["type"] == "run") ends[line["algorithm"].get<std::string>() + std::to_string(line["seed"].get<int>())] = line;
         return ends;
     };
-    const auto count = [&] { return std::distance(std::filesystem::directory_iterator(tables), {}); };
+    const auto count = [&] {
+        return std::count_if(std::filesystem::directory_iterator(tables), {},
+                             [](const auto& entry) { return entry.path().extension() == ".tables"; });
+    };
     auto measured = bench("measured.jsonl", {});
     EXPECT_EQ(count(), 1) << "what bench measures it does not keep";
     EXPECT_EQ(output().find('*'), std::string::npos) << output();

@@ -154,7 +154,7 @@ TEST_F(CommandLine, AlgorithmsAreListedWithEachParameterOnce) {
             for (const std::string_view choice : p.choices) EXPECT_NE(one.output.find(choice), std::string::npos) << choice;
         }
     }
-    for (const char* shared : {"\nrr-start=4\n", "\nrr-min=0.5\n", "\nheuristic=balance\n", "\nconnections=3\n"})
+    for (const char* shared : {"\nrr-start=4\n", "\nrr-min=0.5\n", "\nheuristic=balance\n", "\nconnections=5,2\n"})
         EXPECT_EQ(count(all, shared), 1u) << shared << all;
     std::istringstream lines(all);
     for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100u) << line;

@@ -51,7 +51,7 @@ class Look : public ::testing::Test {
         arguments.insert(arguments.end(), more.begin(), more.end());
         return arguments;
     }
-    static bool learns(const std::string& algorithm) { return AlgorithmSettings::parse(algorithm, {})->info().learning != nullptr; }
+    static bool learns(const std::string& algorithm) { return AlgorithmSettings::parse(algorithm, {})->learning() != nullptr; }
     static std::vector<std::string> algorithms() {
         std::vector<std::string> names;
         for (const AlgorithmInfo* row : catalog()) names.emplace_back(row->name);

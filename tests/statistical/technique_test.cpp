@@ -129,17 +129,19 @@ TEST(Techniques, LightSubPathsMayBeCutShort) {
     family.check();
 }
 
-/// Production parameters: Russian roulette and every choice that a row offers change the noise, never the mean.
+/// Production parameters: Russian roulette, connections by depth and every choice that a row offers change the noise, never the
+/// mean.
 TEST(Techniques, RouletteAndChoicesKeepTheMean) {
     TestFamily family;
     const auto scene = testing::glossy();
     for (const AlgorithmInfo* row : catalog()) {
         const std::string name(row->name);
-        std::vector<std::map<std::string, std::string>> variants{{},
-                                                                 {{"rr-min", "1"}},
-                                                                 {{"rr-start", "2"}, {"rr-min", "0.05"}},
-                                                                 {{"rr-start", "2"}, {"rr-min", "0.3"}},
-                                                                 {{"rr-start", "2"}, {"rr-min", "0.6"}}};
+        std::vector<std::map<std::string, std::string>> variants{
+            {},
+            testing::those_of(name, {{"rr-min", "1"}, {"connections", "3"}}),
+            {{"rr-start", "2"}, {"rr-min", "0.05"}},
+            {{"rr-start", "2"}, {"rr-min", "0.3"}},
+            testing::those_of(name, {{"rr-start", "2"}, {"rr-min", "0.6"}, {"connections", "1,4"}})};
         for (const ParameterInfo& p : row->parameters)
             for (size_t c = 0; c < p.choices.size(); ++c)
                 if (double(c) != p.default_value) variants.push_back({{std::string(p.name), std::string(p.choices[c])}});

@@ -38,23 +38,24 @@ inline Tables random_tables_for(const AlgorithmInfo& row, const Scene& scene, ui
 
 /// Options of a render besides its tables.
 struct CacheOptions {
-    int connections = 3;     ///< N
-    uint64_t paths = 1000;   ///< M
-    double light_paths = 1;  ///< N1 per pixel and iteration.
+    ByDepth<int> connections = 3;  ///< N
+    uint64_t paths = 1000;         ///< M
+    double light_paths = 1;        ///< N1 per pixel and iteration.
     bool ris_aware = false, correlation_aware = false;
 };
 
 /// The settings for these options of an algorithm with a light-vertex cache; options for which it has no parameter are
 /// left out.
 inline RenderSettings cache_settings(const std::string& algorithm, const CacheOptions& o, int max_depth) {
-    return settings_of(algorithm,
-                       those_of(algorithm, {{"emission", "learned"},
-                                            {"connections", std::to_string(o.connections)},
-                                            {"cache", std::to_string(o.paths)},
-                                            {"light-paths", std::to_string(o.light_paths)},
-                                            {"ris-aware", o.ris_aware ? "on" : "off"},
-                                            {"correlation-aware", o.correlation_aware ? "on" : "off"}}),
-                       0, max_depth);
+    return settings_of(
+        algorithm,
+        those_of(algorithm, {{"emission", "learned"},
+                             {"connections", std::to_string(o.connections.at_first) + "," + std::to_string(o.connections.later)},
+                             {"cache", std::to_string(o.paths)},
+                             {"light-paths", std::to_string(o.light_paths)},
+                             {"ris-aware", o.ris_aware ? "on" : "off"},
+                             {"correlation-aware", o.correlation_aware ? "on" : "off"}}),
+        0, max_depth);
 }
 
 }  // namespace lightloom::testing

@@ -121,6 +121,17 @@ TEST(AlgorithmChoice, ParsesSettingsAndNamesMistakes) {
     }
 }
 
+/// Values may have commas, too.
+TEST(AlgorithmChoice, ListsAreSplitBetweenAlgorithms) {
+    using Words = std::vector<std::string>;
+    EXPECT_EQ(split_algorithms("path"), Words{"path"});
+    EXPECT_EQ(split_algorithms("path,spcbpt:connections=5,2,lvcbpt:connections=1,4:cache=8,bdpt"),
+              (Words{"path", "spcbpt:connections=5,2", "lvcbpt:connections=1,4:cache=8", "bdpt"}));
+    EXPECT_EQ(split_algorithms("path,,bdpt,"), (Words{"path", "", "bdpt", ""}));
+    EXPECT_EQ(parse_algorithm("spcbpt:connections=5,2")->settings.named_text().at("connections"), "5,2");
+    for (const AlgorithmInfo* row : catalog()) EXPECT_FALSE(row->name[0] >= '0' && row->name[0] <= '9') << row->name;
+}
+
 BenchRun some_run() {
     BenchRun run;
     run.scene_digest = "s", run.reference_digest = "r", run.algorithm = *parse_algorithm("bdpt:heuristic=power"),

@@ -30,7 +30,10 @@ TEST(Catalog, RowsAreComplete) {
         std::set<std::string_view> parameters;
         for (const ParameterInfo& p : row->parameters) {
             EXPECT_TRUE(parameters.insert(p.name).second) << row->name << " has " << p.name << " twice";
-            EXPECT_TRUE(p.min_value <= p.default_value && p.default_value <= p.max_value) << row->name << " " << p.name;
+            for (const double v : {p.default_value.at_first, p.default_value.later})
+                EXPECT_TRUE(p.min_value <= v && v <= p.max_value) << row->name << " " << p.name;
+            EXPECT_TRUE(p.by_depth || p.default_value.at_first == p.default_value.later) << row->name << " " << p.name;
+            EXPECT_FALSE(p.by_depth && !p.choices.empty()) << row->name << " " << p.name;
             EXPECT_FALSE(p.help.empty()) << row->name << " " << p.name;
             if (!p.choices.empty()) {
                 EXPECT_TRUE(p.integer && p.min_value == 0 && p.max_value + 1 == double(p.choices.size()))
@@ -99,7 +102,12 @@ TEST(Settings, BadValuesAreRefusedByNameAndRange) {
         const std::string name(row->name);
         for (const ParameterInfo& p : row->parameters) {
             std::vector<std::string> bad{"",     "x",     "1x",  " 1",  "1 ",  "nan",   "inf",
-                                         "-inf", "1e999", "--1", "0x1", "1,5", "1e400", "on off"};
+                                         "-inf", "1e999", "--1", "0x1", "1;5", "1e400", "on off"};
+            const std::string good = p.text_of(p.max_value), low = std::to_string(p.min_value - 1);
+            for (const std::string& later : {std::string(), std::string("x"), " " + good, low, good + ",", good + "," + good})
+                bad.push_back(good + "," + later);
+            bad.insert(bad.end(), {"," + good, low + "," + good, ","});
+            if (!p.by_depth) bad.push_back(good + "," + good);
             bad.push_back(std::to_string(p.min_value - 1));
             bad.push_back(std::to_string(p.max_value * 2 + 1));
             if (p.integer) bad.push_back(std::to_string(p.min_value + 0.5));
@@ -110,7 +118,9 @@ TEST(Settings, BadValuesAreRefusedByNameAndRange) {
                 for (const std::string_view choice : p.choices) EXPECT_TRUE(mentions(refused, choice)) << refused.message();
             }
             // What is in range comes back as the same text.
-            for (const double value : {p.min_value, p.default_value, p.max_value}) {
+            std::vector<ByDepth<double>> values{p.min_value, p.default_value, p.max_value};
+            if (p.by_depth) values.insert(values.end(), {{p.min_value, p.max_value}, {p.max_value, p.min_value}});
+            for (const ByDepth<double>& value : values) {
                 const auto settings = AlgorithmSettings(small_settings(*row).algorithm).with(p.name, value);
                 const auto again = AlgorithmSettings::parse(name, settings.text());
                 ASSERT_TRUE(again.ok()) << again.status().message();
@@ -141,6 +151,27 @@ TEST(Settings, ChoicesHaveNamesForPeopleAndNumbersForDigests) {
         ASSERT_TRUE(again.ok()) << again.status().message();
         EXPECT_EQ(*again, all.completed()) << row->name;
     }
+}
+
+/// Two numbers that are equal are one, so that a setting has one text and one digest.
+TEST(Settings, NumbersByDepthAreOneOrTwo) {
+    const auto connections = [](const std::string& text) { return AlgorithmSettings::parse("spcbpt", {{"connections", text}}); };
+    EXPECT_EQ(connections("5,2")->value_by_depth("connections"), ByDepth<double>(5, 2));
+    EXPECT_EQ(connections("3")->value_by_depth("connections"), ByDepth<double>(3, 3));
+    EXPECT_EQ(*connections("3"), *connections("3,3"));
+    EXPECT_NE(*connections("5,2"), *connections("2,5"));
+    for (const auto& [text, canonical] :
+         {std::pair{"5,2", "5,2"}, {"4,4", "4"}, {"64", "64"}, {"1,64", "1,64"}, {"6e1,2", "60,2"}}) {
+        EXPECT_EQ(connections(text)->chosen_text().at("connections"), canonical);
+        EXPECT_EQ(connections(text)->chosen_named_text().at("connections"), canonical);
+    }
+    for (const char* bad : {"5,2,1", "5,", ",2", ",", "0,2", "5,0", "65", "65,2", "5,65", "5, 2", "5;2", "2.5,1", "5,x", ""})
+        EXPECT_EQ(connections(bad).status().message(),
+                  "parameter connections=" + std::string(bad) +
+                      " of 'spcbpt' must be an integer from 1 to 64, or two with a comma between them: at the camera's first "
+                      "hit, at later ones");
+    EXPECT_EQ(AlgorithmSettings::parse("spcbpt", {{"windows", "5,2"}}).status().message(),
+              "parameter windows=5,2 of 'spcbpt' must be an integer from 1 to 32");
 }
 
 TEST(Settings, RefusalsSuggestWhatIsNear) {

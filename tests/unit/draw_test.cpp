@@ -21,7 +21,7 @@ TEST(Draws, AreScaledByTheirProbability) {
     random.max_window = 4;
     random.spread = 3;
     const SubspaceTables tables = testing::random_tables(scene->emitters(), 21, random);
-    for (const int connections : {1, 3, 7}) {
+    for (const ByDepth<int>& connections : {ByDepth<int>(1), ByDepth<int>(3), ByDepth<int>(2, 7)}) {
         constexpr uint64_t kPaths = 25;
         const auto prepared = std::make_shared<const PreparedTables>(tables);
         const SpcbptAlgorithm<> algorithm{
@@ -41,10 +41,12 @@ TEST(Draws, AreScaledByTheirProbability) {
         }
         ASSERT_EQ(subspace_of.size(), state.index.candidates.size());
         ASSERT_GT(subspace_of.size(), 100u);
-        for (const uint32_t eye : {0u, tables.eye_count - 1}) {
+        for (const int t : {2, 3}) {
+            const uint32_t eye = t == 2 ? 0 : tables.eye_count - 1;
+            const int draws = connections(t);
             PathVertex v;
             v.label = uint16_t(eye);
-            Rng rng({5, Stage::kTraining, eye, uint64_t(connections)});
+            Rng rng({5, Stage::kTraining, eye, uint64_t(draws)});
             constexpr int kDraws = 400000;
             struct Sums {
                 double sum = 0, square = 0;
@@ -53,8 +55,8 @@ TEST(Draws, AreScaledByTheirProbability) {
             for (int d = 0; d < kDraws; ++d) {
                 LightPick picks[kMaxConnections];
                 const int count = algorithm.method.draw(
-                    state.cache, state.index, v, [&] { return rng.uniform2(); }, rng, 6, picks);
-                ASSERT_LE(count, connections);
+                    state.cache, state.index, v, t, [&] { return rng.uniform2(); }, rng, 6, picks);
+                ASSERT_LE(count, draws);
                 std::map<std::pair<const LightVertex*, int>, double> once;  // draws of one vertex are not independent
                 for (int n = 0; n < count; ++n)
                     once[{picks[n].y, picks[n].s}] += double(algorithm.method.inverse_density(picks[n]));
@@ -69,15 +71,15 @@ TEST(Draws, AreScaledByTheirProbability) {
                 const LightVertex* y = state.cache.at(place.first);
                 const double paths = double(kPaths) * tables.window[i];
                 const double r = double(scalar_of(y[place.second - 1].alpha));
-                const double all = double(state.index.subspaces[i].scale) * paths * connections;     // R_i
-                if (kDraws * connections * double(tables.column(eye)[i]) * r / all < 400) continue;  // too rarely to be normal
+                const double all = double(state.index.subspaces[i].scale(t)) * paths * draws;  // R_i
+                if (kDraws * draws * double(tables.column(eye)[i]) * r / all < 400) continue;  // too rarely to be normal
                 const Sums& s = found[y][int(place.second)];
                 const double mean = s.sum / kDraws, error = std::sqrt((s.square / kDraws - mean * mean) / kDraws);
                 ++tested;
                 worst = std::max(worst, std::fabs(mean - 1 / paths) / error);
             }
-            EXPECT_GT(tested, subspace_of.size() / 2) << connections << " connections, eye subspace " << eye;
-            EXPECT_LT(worst, 4.7) << connections << " connections, eye subspace " << eye;  // 1e-3 over some hundred prefixes
+            EXPECT_GT(tested, subspace_of.size() / 2) << draws << " connections, eye subspace " << eye;
+            EXPECT_LT(worst, 4.7) << draws << " connections, eye subspace " << eye;  // 1e-3 over some hundred prefixes
         }
     }
 }

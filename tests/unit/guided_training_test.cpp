@@ -47,7 +47,8 @@ std::vector<std::pair<std::string, double>> estimates(const TrainingData& data) 
             out[1].second += double(data.vertices[p.first_vertex + i].density) / double(data.light_samples);
     for (const TrainingPath& p : data.paths) {
         out[p.vertex_count + 1].second += double(p.estimate) / n;  // k = vertex_count - 1 stands at 4 + k - 2
-        double density = double(p.lens);                           // of a renderer with N Gamma / Q = 1
+        // Of a renderer with N Gamma / Q = 1 that does not splat: the density of splats is that of the guide's emission.
+        double density = 0;
         for (uint32_t i = 0; i < p.vertex_count; ++i) density += double(data.vertices[p.first_vertex + i].density);
         if (density > 0) out[2].second += double(p.square) / density / n;
         const double from_camera = double(data.vertices[p.first_vertex].density) + double(p.next_event);

@@ -26,7 +26,7 @@ const std::string kMain = "room.pbrt";
 /// No field has the value that a forgotten one would have.
 JobSpec full_spec() {
     JobSpec spec;
-    spec.algorithm = testing::algorithm_of("lvcbpt", {{"cache", "500"}, {"rr-min", "0.25"}}).completed();
+    spec.algorithm = testing::algorithm_of("lvcbpt", {{"cache", "500"}, {"connections", "3"}, {"rr-min", "0.25"}}).completed();
     spec.seed = ~0ull;
     spec.samples_per_pixel = 7;
     spec.time_limit_seconds = 1.5;
@@ -54,8 +54,12 @@ std::string replay(const JobSpec& spec) { return replay_command(spec, kMain, {{3
 // Other values than the given one, each different in another part of it.
 std::vector<AlgorithmSettings> others(const AlgorithmSettings& value) {
     std::vector<AlgorithmSettings> all{testing::algorithm_of("bdpt").completed()};
-    for (const ParameterInfo& p : value.info().parameters)
-        all.push_back(value.with(p.name, value.value(p.name) == p.max_value ? p.min_value : p.max_value));
+    for (const ParameterInfo& p : value.info().parameters) {
+        const ByDepth<double> now = value.value_by_depth(p.name);
+        const auto another = [&](double v) { return v == p.max_value ? p.min_value : p.max_value; };
+        all.push_back(value.with(p.name, p.by_depth ? ByDepth<double>(another(now.at_first), now.later) : another(now.at_first)));
+        if (p.by_depth) all.push_back(value.with(p.name, {now.at_first, another(now.later)}));
+    }
     return all;
 }
 std::array<bool, 1> others(bool value) { return {!value}; }
@@ -113,7 +117,7 @@ TEST(JobFields, EachDecidesWhatItsRolesSayAndTravels) {
 /// text, and the choice of a training set, which a time limit may not change.
 TEST(JobFields, WhichParametersWereChosenTravelsAndDecidesNothing) {
     JobSpec chosen = full_spec(), left = full_spec();
-    left.algorithm = testing::algorithm_of("lvcbpt", {{"cache", "500"}, {"rr-min", "0.25"}});
+    left.algorithm = testing::algorithm_of("lvcbpt", {{"cache", "500"}, {"connections", "3"}, {"rr-min", "0.25"}});
     ASSERT_FALSE(left == chosen);
     EXPECT_FALSE(same_request(left, chosen));
     EXPECT_EQ(left.spec_digest(), chosen.spec_digest());
@@ -146,27 +150,28 @@ TEST(JobFields, NoneIsInTheListTwice) {
 /// algorithm's parameters: all of them are written down, as they are in every accepted job.
 TEST(JobFields, TextsAreThoseOfEarlierVersions) {
     JobSpec spec = full_spec();
-    EXPECT_EQ(spec.spec_digest().hex(), "c2a44c4156a65c8dd4b471faf31bd9d3238610aca9c5fbe2bd106c4be9f9ee4f");
-    const std::string key = "b92aa6f6d2e5819e3c2546ed0b298730910bea65bf7cc124c028f6a1986223f3";
+    EXPECT_EQ(spec.spec_digest().hex(), "3a22c959de85c6aef0991ab7c80dc48fddb75727ab6f64544326261cb86a4c45");
+    const std::string key = "7ee3e2ca0df63dcfc3a8776bb8e742e6cad22533ae1a09d8eafa12c0845f1fe9";
     EXPECT_EQ(table_key(kIdentity, spec).hex(), key);
     EXPECT_EQ(
         manifest_spec(spec),
-        R"({"algorithm":"lvcbpt","parameters":{"cache":"500","connections":"3","heuristic":"balance","light-paths":"0.3",)"
-        R"("next-event":"1","rr-min":"0.25","rr-start":"4","training-paths":"20000"},"seed":18446744073709551615,"max_depth":9,)"
+        R"({"algorithm":"lvcbpt","parameters":{"cache":"500","connections":"3","emission":"power","heuristic":"balance",)"
+        R"("light-paths":"0.3","next-event":"1","rr-min":"0.25","rr-start":"4","training-paths":"20000"},"seed":18446744073709551615,"max_depth":9,)"
         R"("requested_samples_per_pixel":7,"time_limit_seconds":1.5,"noise_target":0.25,"layers":true,"scene":"room.pbrt",)"
         R"("scene_root":"4f48f7207cebf92638debb5694e4a8677350cf88a9e98e73c6c466b6b1d43890",)"
         R"("frame":{"width":64,"height":48,"crop":[1,2,33,44]}})");
     EXPECT_EQ(
         settings_json(spec).dump(),
-        R"({"algorithm":"lvcbpt","parameters":{"cache":"500","connections":"3","heuristic":"balance","light-paths":"0.3",)"
-        R"("next-event":"1","rr-min":"0.25","rr-start":"4","training-paths":"20000"},"seed":18446744073709551615,"max_depth":9})");
+        R"({"algorithm":"lvcbpt","parameters":{"cache":"500","connections":"3","emission":"power","heuristic":"balance",)"
+        R"("light-paths":"0.3","next-event":"1","rr-min":"0.25","rr-start":"4","training-paths":"20000"},"seed":18446744073709551615,"max_depth":9})");
     EXPECT_EQ(replay(spec),
-              "lightloom replay room.pbrt --algorithm lvcbpt --set cache=500 --set connections=3 --set heuristic=balance "
-              "--set light-paths=0.3 --set next-event=1 --set rr-min=0.25 --set rr-start=4 --set training-paths=20000 --seed "
+              "lightloom replay room.pbrt --algorithm lvcbpt --set cache=500 --set connections=3 --set emission=power "
+              "--set heuristic=balance --set light-paths=0.3 --set next-event=1 --set rr-min=0.25 --set rr-start=4 "
+              "--set training-paths=20000 --seed "
               "18446744073709551615 "
               "--max-depth 9 --resolution 64x48 --crop 1,33,2,44 --spp 7 --unit 3,1");
     spec.first_hit_layers = false;
-    EXPECT_EQ(spec.spec_digest().hex(), "ffc9b264aeb53e6c5b84b30e7a77030498bfc97d718e5e40a95311a1a7743127");
+    EXPECT_EQ(spec.spec_digest().hex(), "b67b12d7bb3ed3524ac56b1614af65ef23a17392b14ebfeda3856d6c7634f091");
     EXPECT_EQ(table_key(kIdentity, spec).hex(), key) << "tables know nothing of layers";
 }
 

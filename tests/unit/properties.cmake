@@ -1,6 +1,7 @@
 lightloom_test(subspace_weights_test LINK lt_transport)
 lightloom_test(light_cache_test LINK lt_transport)
 lightloom_test(draw_test LINK lt_transport)
+lightloom_test(depth_test LINK lt_transport)
 lightloom_test(paper_corrections_test LINK lt_core)
 lightloom_test(tables_test LINK lt_transport)
 lightloom_test(classifier_test LINK lt_tables)

@@ -42,8 +42,8 @@ struct Member {
 };
 using Family = std::vector<Member>;
 
-/// A row with its defaults, with each value of each of its choices, and with few and many connections; all with the same tables.
-/// Empty where single paths cannot be asked about.
+/// A row with its defaults, with each value of each of its choices, and with few and many connections, by depth or not; all with
+/// the same tables. Empty where single paths cannot be asked about.
 Family family_of(const AlgorithmInfo& row, const std::shared_ptr<const Scene>& scene, uint64_t seed) {
     const std::string name(row.name);
     auto parameters = testing::with_small_training(name, {});
@@ -51,7 +51,7 @@ Family family_of(const AlgorithmInfo& row, const std::shared_ptr<const Scene>& s
     std::vector<std::pair<std::string, std::string>> changes{{"", ""}};
     for (const ParameterInfo& p : row.parameters) {
         for (const std::string_view choice : p.choices) changes.emplace_back(p.name, choice);
-        if (p.name == "connections") changes.insert(changes.end(), {{"connections", "1"}, {"connections", "5"}});
+        if (p.name == "connections") changes.insert(changes.end(), {{"connections", "1,4"}, {"connections", "5"}});
     }
     const Tables all_tables = testing::random_tables_for(row, *scene, seed);
     Family family;

@@ -68,8 +68,8 @@ Inputs make() {
     for (const CameraVertex& v : in.camera_vertices) {
         LightPick picks[kMaxConnections];
         const int count = in.algorithm.method.draw(
-            in.state.cache, in.state.index, (*v.z)[size_t(v.t - 1)], [&] { return rng.uniform2(); }, rng, in.max_edges + 1 - v.t,
-            picks);
+            in.state.cache, in.state.index, (*v.z)[size_t(v.t - 1)], v.t, [&] { return rng.uniform2(); }, rng,
+            in.max_edges + 1 - v.t, picks);
         for (int n = 0; n < count; ++n) in.pairs.push_back({v, picks[n]});
     }
     return in;
