@@ -94,11 +94,11 @@ TEST_F(SuiteProcess, SurvivesKillsAtAnyMoment) {
 
 TEST_F(SuiteProcess, KeepsToItsBudgetAndSaysWhatItCut) {
     write_suite(R"({"seconds": 30})");
-    std::vector<std::string> arguments{"bench", path("suite.json"), "-o", path("r.jsonl"), "-t", "1", "--budget", "4s"};
+    std::vector<std::string> arguments{"bench", path("suite.json"), "-o", path("r.jsonl"), "-t", "1", "--budget", "6s"};
     const auto begin = std::chrono::steady_clock::now();
     ASSERT_EQ(run(arguments), 0) << output();
     // Loading, references and shares of techniques are in it; a loaded machine may take a little longer.
-    EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 8);
+    EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 12);
     EXPECT_EQ(count("r.jsonl", "run"), 12u);
     EXPECT_GE(count("r.jsonl", "cut"), 2u);
     EXPECT_NE(output().find("cut by --budget: cornell: time of each run 30 ->"), std::string::npos) << output();
