@@ -33,7 +33,7 @@ class SuiteProcess : public ::testing::Test {
         const std::string scenes = std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/";
         std::ofstream(path("suite.json"))
             << R"({"suite": "kill", "resolution": "24x18", "seeds": 3, "share_iterations": 1, "budgets": )" << budgets
-            << R"(, "algorithms": ["path", "spcbpt:training-paths=1000:cache=500"], "tables": "shared",
+            << R"(, "algorithms": ["path", "spcbpt:training-paths=1000:cache=500:light-subspaces=40:eye-subspaces=40"], "tables": "shared",
                    "reference": {"algorithm": "bdpt", "samples": 64}, "scenes": [{"file": ")"
             << scenes << R"(cornell.pbrt")" << more << R"(}, {"file": ")" << scenes
             << R"(ceiling-lamp.pbrt"}, {"file": "not-there.pbrt", "optional": true}]})";
@@ -142,8 +142,10 @@ TEST_F(SuiteProcess, LearningIsWithinTheBudgetOrTheRunIsLeftOut) {
     ASSERT_EQ(run({"bench", path("suite.json"), "-o", path("r.jsonl"), "-t", "1", "--budget", "4s"}), 0) << output();
     EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 12);
     EXPECT_EQ(count("r.jsonl", "run"), 6u) << "path alone";
-    EXPECT_NE(output().find("spcbpt:training-paths=4000000:cache=500 is not measured: it does not learn its tables within"),
-              std::string::npos)
+    EXPECT_NE(
+        output().find("spcbpt:training-paths=4000000:cache=500:light-subspaces=40:eye-subspaces=40 is not measured: it does not "
+                      "learn its tables within"),
+        std::string::npos)
         << output();
     for (const Json& line : lines("r.jsonl")) {
         if (line["type"] != "run") continue;
