@@ -14,6 +14,7 @@ inline constexpr double kPiD = 3.14159265358979323846;
 inline constexpr float kPi = 3.14159265358979323846f;
 inline constexpr float kInvPi = 0.31830988618379067154f;
 inline constexpr float kTwoPi = 6.28318530717958647692f;
+inline constexpr float kInvFourPi = 0.07957747154594766788f;
 
 namespace math {
 

@@ -4,6 +4,7 @@
 // the joint density is
 //     b P p + (1 - b) Q q,    Q = g P + (1 - g) L,    q = d p + (1 - d) l,
 // of which pdf_position() is the marginal b P + (1 - b) Q, and pdf_direction() the rest.
+#include "common/core/math.h"
 #include "common/scene/emitter.h"
 #include "common/scene/emitter_square.h"
 
@@ -28,7 +29,6 @@ float EmitterSet::learned_place(const Emitter& e, const Vec3& position, const Ve
     const float probability = learned_->probability(index);
     const uint32_t root = learned_->place(index);
     if (root == kUniformSquare || !has_square(e)) return probability * place_on_emitter(e, w);
-    constexpr float kInvFourPi = 0.07957747154594766788f;
     const float inv_area = e.kind == EmitterKind::kEnvironment ? kInvFourPi : e.inv_area;
     return probability * inv_area * learned_->density(root, emitter_square(e, position, w));
 }

@@ -3,10 +3,11 @@
 #include <cmath>
 #include <string>
 
+#include "common/core/math.h"
+
 namespace lightloom {
 namespace {
 
-constexpr float kInvFourPi = 0.07957747154594766788f;
 constexpr float kBelowOne = 0x1.fffffep-1f;
 
 Status check_tree(const std::vector<EmissionData::Node>& nodes, size_t cells) {

@@ -7,8 +7,6 @@
 namespace lightloom {
 namespace {
 
-constexpr float kInvFourPi = 0.07957747154594766788f;
-
 /// 1 - cos of the angle between unit vectors, without cancellation.
 float height_between(const Vec3& a, const Vec3& b) { return 0.5f * length_squared(a - b); }
 

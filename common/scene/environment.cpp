@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
+#include "common/core/math.h"
+
 namespace lightloom {
 namespace {
-
-constexpr float kUniformSphere = 0.07957747154594766788f;  // 1 / (4 pi)
 
 int texel_of(float c, int n) { return std::clamp(int(c * float(n)), 0, n - 1); }
 
@@ -58,13 +58,13 @@ float Environment::pdf_solid_angle(const Vec3& d) const {
     float pdf = 0;
     for (const Part& part : parts_) {
         if (part.image == nullptr) {
-            pdf += part.pmf * kUniformSphere;
+            pdf += part.pmf * kInvFourPi;
             continue;
         }
         const Vec2 uv = equal_area_sphere_to_square(normalize(part.to_light.vector(d)));
         const int w = part.image->width, h = part.image->height;
         const size_t texel = size_t(texel_of(uv.y, h)) * size_t(w) + size_t(texel_of(uv.x, w));
-        pdf += part.pmf * part.texels.pmf(texel) * float(part.texels.size()) * kUniformSphere;
+        pdf += part.pmf * part.texels.pmf(texel) * float(part.texels.size()) * kInvFourPi;
     }
     return pdf;
 }
