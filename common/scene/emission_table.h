@@ -1,7 +1,7 @@
 #pragma once
 // Where and in which direction light sub-paths should leave the lights, as it was learned from full paths: which
 // emitter, where on it, and in which direction, or, for infinite lights, which direction and where on the plane across
-// it. EmitterSet mixes it with emission in proportion to power. [Guided emission: Vorba et al. 2014, section 5; the
+// it. EmitterSet mixes it with emission in proportion to power. [Guided emission: Vorba et al. 2014; the
 // directional quadtrees: Müller, Gross and Novák 2017; common/path/README.md, "Learned emission"]
 
 #include <cstdint>
@@ -33,7 +33,7 @@ struct EmissionData {
     /// Of the others: the share whose place, and independently the share whose direction, is that of power.
     float power_places = 0, power_directions = 0;
     std::vector<float> emitters;   ///< Probability of every emitter, for the learned places.
-    std::vector<uint32_t> places;  ///< By emitter: root of the density over EmitterSquare; kUniformSquare: as by power.
+    std::vector<uint32_t> places;  ///< By emitter: root of the density over emitter_square(); kUniformSquare: as by power.
 
     /// A decision tree over places. Inner nodes: axis 0, 1 or 2, and the left child (the right one follows it); leaves:
     /// axis 3 and the number of a cell.

@@ -3,7 +3,7 @@
 // the picture, relative to the picture's brightness there.
 //
 // Cells of places: a k-d tree over x_0, split at the weighted median while the places are so far apart that directions to
-// the same x_1 differ. Each cell has a directional quadtree, which is refined where at least a hundredth of the cell's
+// the same x_1 differ. Each cell has a directional quadtree, which is refined where at least half a hundredth of the cell's
 // weight lies [Müller, Gross and Novák 2017, section 3.2, with fixed data in place of rounds]. Shares are smoothed by the
 // effective number of paths behind them, so that few paths teach little. Emitters are chosen by what their groups, halves
 // of a k-d tree over them, contribute; within the last group that the data tell apart, by power.
