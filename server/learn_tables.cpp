@@ -15,7 +15,7 @@ Result<AffordableSet> affordable_set(const JobSpec& spec, const TracedRound& pro
     const LearningPlan plan = learning_plan(spec.algorithm);
     const TimePoint begin = clock();
     TrainingReport report;
-    const auto tables = learn({probe.data, 0, {}, emitters, settings, {stop, {}}, &report});
+    const auto tables = learn({probe.data, 0, {}, emitters, settings, {stop, {}, {}}, &report});
     if (!tables.ok()) return tables.status();
     AffordableSet set;
     set.wanted = plan.samples;
@@ -64,15 +64,16 @@ Result<std::optional<LearnedTables>> learn_tables(JobSpec spec, const EmitterSet
         }
         port.learning_begins();
         TrainingReport report;
+        const uint64_t samples = round->data.samples;
         auto tables = learn({round->data,
                              round->round,
                              guide,
                              emitters,
                              render_settings(spec),
-                             {stop, [&](double share) { port.learning_goes_on(share); }},
+                             {stop, [&](double share) { port.learning_goes_on(share); }, [&] { round->data = {}; }},
                              &report});
         if (!tables.ok()) return tables.status();
-        info.training_samples += round->data.samples;
+        info.training_samples += samples;
         info.trace_seconds += round->seconds;
         info.classifier_seconds += report.classifier_seconds;
         info.energy_seconds += report.energy_seconds;

@@ -38,6 +38,9 @@ UnitTable::Failures TrainingRound::refuse(uint32_t unit) {
 
 Result<TrainingData> join(std::vector<TrainingRound::Part> parts, std::stop_token stop) {
     TrainingData all;
+    std::vector<const TrainingData*> data;
+    for (const TrainingRound::Part& part : parts) data.push_back(&part.data);
+    all.reserve_for(data);
     for (TrainingRound::Part& part : parts) {
         if (stop.stop_requested()) return Status(StatusCode::kCancelled, "stopped while training data were joined");
         LL_RETURN_IF_ERROR(all.append(part.data));

@@ -67,11 +67,12 @@ std::vector<double> block_brightness(const TrainingData& d) {
 SubPathEnd end_between(const TrainingVertex& v, const TrainingVertex& predecessor) {
     const Vec3 d = predecessor.position - v.position;
     const float length2 = length_squared(d);
-    return sub_path_end(v.position, v.normal, length2 > 0 ? d / std::sqrt(length2) : v.normal);
+    const Vec3 normal = v.normal;
+    return sub_path_end(v.position, normal, length2 > 0 ? d / std::sqrt(length2) : normal);
 }
 
-uint32_t source_label(const LightDivision& division, const EmitterSet& emitters, const TrainingVertex& x0) {
-    return division.label(emitters, x0.emitter, x0.position, x0.normal);
+uint32_t source_label(const LightDivision& division, const EmitterSet& emitters, const TrainingPath& p, const TrainingVertex& x0) {
+    return division.label(emitters, p.emitter, x0.position, x0.normal);
 }
 
 uint32_t used_labels(const SubspaceTree& tree) {
@@ -130,7 +131,8 @@ void measure_energy(const TrainingData& d, const EmitterSet& emitters, const Tra
         const TrainingVertex* v = &d.vertices[p.first_vertex];
         for (uint32_t i = 0; i < p.vertex_count; ++i) {
             if (!(v[i].density > 0)) continue;
-            const uint32_t label = i == 0 ? source_label(t->division, emitters, v[0]) : t->light_label(end_between(v[i], v[i - 1]));
+            const uint32_t label =
+                i == 0 ? source_label(t->division, emitters, p, v[0]) : t->light_label(end_between(v[i], v[i - 1]));
             sum[label] += double(v[i].density);
             count[label] += 1;
             vertices += 1;
@@ -152,45 +154,83 @@ void measure_energy(const TrainingData& d, const EmitterSet& emitters, const Tra
     t->vertices_per_path = vertices > 0 ? vertices / paths : 1;
 }
 
+/// Whether two neighbours among the paths are of one camera sample: then they have its first hit in common.
+bool share_camera_sample(const TrainingData& d, size_t x, size_t y) {
+    const auto first_hit = [&](const TrainingPath& p) {
+        return d.vertices[p.first_vertex + std::max(p.vertex_count, 2u) - 2].position;
+    };
+    return first_hit(d.paths[x]) == first_hit(d.paths[y]);
+}
+
+/// What Gamma is learned from, of the paths first .. last - 1; the number of a path's camera sample is that of the
+/// sample's first path.
+void add_to_dataset(const TrainingData& d, const std::vector<double>& brightness, const EmitterSet& emitters,
+                    const TrainingOptions& o, const SubspaceTables& t, size_t first, size_t last, GammaDataset* out) {
+    uint32_t part = uint32_t(std::upper_bound(d.part_ends.begin(), d.part_ends.end(), first) - d.part_ends.begin());
+    uint32_t sample = 0;
+    for (size_t x = first; x < last; ++x) {
+        const TrainingPath& p = d.paths[x];
+        while (part < d.part_ends.size() && x >= d.part_ends[part]) ++part;
+        const TrainingVertex* v = &d.vertices[p.first_vertex];
+        if (x == first || !share_camera_sample(d, x - 1, x)) sample = uint32_t(x);
+        if (!d.in_range(p)) continue;
+        GammaPath path;
+        path.batch = part;
+        path.sample = sample;
+        path.first_node = uint32_t(out->nodes.size());
+        for (uint32_t s = 1; s + 1 < p.vertex_count; ++s) {
+            if (!(v[s].density > 0)) continue;
+            GammaNode node;
+            node.light =
+                uint16_t(s == 1 ? source_label(t.division, emitters, p, v[0]) : t.light_label(end_between(v[s - 1], v[s - 2])));
+            node.eye = uint16_t(t.eye_label(end_between(v[s], v[s + 1])));
+            node.g = float(o.connections * double(v[s].density) / double(t.energy[node.light]));
+            if (node.g > 0 && std::isfinite(node.g)) out->nodes.push_back(node);
+        }
+        path.node_count = uint32_t(out->nodes.size()) - path.first_node;
+        if (path.node_count == 0) continue;
+        path.weight = float(double(p.square) / (brightness[p.block] * brightness[p.block]));
+        path.fixed = v[0].density + p.next_event + p.lens;
+        path.contribution = float(double(p.estimate) / brightness[p.block]);
+        if (!std::isfinite(path.weight) || !(path.weight > 0)) continue;
+        out->paths.push_back(path);
+    }
+}
+
 GammaDataset gamma_dataset(const TrainingData& d, const std::vector<double>& brightness, const EmitterSet& emitters,
                            const TrainingOptions& o, std::stop_token stop, const SubspaceTables& t) {
     GammaDataset out;
     out.light_count = t.light_count, out.eye_count = t.eye_count;
     out.source_count = t.division.cell_count();
     out.energy = t.energy;
-    std::vector<float> weights;
-    uint32_t part = 0, sample = 0;
-    Vec3 first_hit;  // the paths of one camera sample have it in common
-    for (size_t x = 0; x < d.paths.size(); ++x) {
-        if (stop.stop_requested()) return out;
-        const TrainingPath& p = d.paths[x];
-        while (part < d.part_ends.size() && x >= d.part_ends[part]) ++part;
-        const TrainingVertex* v = &d.vertices[p.first_vertex];
-        if (const Vec3& hit = v[std::max(p.vertex_count, 2u) - 2].position; !(hit == first_hit)) first_hit = hit, ++sample;
-        if (!d.in_range(p)) continue;
-        GammaPath path;
-        path.batch = part;
-        path.sample = sample;
-        path.first_node = uint32_t(out.nodes.size());
-        for (uint32_t s = 1; s + 1 < p.vertex_count; ++s) {
-            if (!(v[s].density > 0)) continue;
-            GammaNode node;
-            node.light =
-                uint16_t(s == 1 ? source_label(t.division, emitters, v[0]) : t.light_label(end_between(v[s - 1], v[s - 2])));
-            node.eye = uint16_t(t.eye_label(end_between(v[s], v[s + 1])));
-            node.g = float(o.connections * double(v[s].density) / double(t.energy[node.light]));
-            if (node.g > 0 && std::isfinite(node.g)) out.nodes.push_back(node);
-        }
-        path.node_count = uint32_t(out.nodes.size()) - path.first_node;
-        if (path.node_count == 0) continue;
-        path.weight = float(double(p.square) / (brightness[p.block] * brightness[p.block]));
-        path.fixed = v[0].density + p.next_event + p.lens;
-        path.contribution = float(double(p.estimate) / brightness[p.block]);
-        if (!std::isfinite(path.weight) || !(path.weight > 0)) continue;
-        out.paths.push_back(path);
-        weights.push_back(path.weight);
+    // Labels take most of the time. No part divides the paths of a camera sample.
+    constexpr size_t kPart = 1 << 15;
+    std::vector<size_t> begins{0};
+    for (size_t x = kPart; x < d.paths.size(); x = begins.back() + kPart) {
+        while (x < d.paths.size() && share_camera_sample(d, x - 1, x)) ++x;
+        begins.push_back(x);
     }
-    if (weights.size() > 100) {
+    begins.push_back(d.paths.size());
+    std::vector<GammaDataset> parts(begins.size() - 1);
+    fork_join(parts.size(), [&](size_t first, size_t last) {
+        for (size_t i = first; i < last && !stop.stop_requested(); ++i)
+            add_to_dataset(d, brightness, emitters, o, t, begins[i], begins[i + 1], &parts[i]);
+    });
+    if (stop.stop_requested()) return out;
+    size_t nodes = 0, paths = 0;
+    for (const GammaDataset& part : parts) nodes += part.nodes.size(), paths += part.paths.size();
+    out.nodes.reserve(nodes), out.paths.reserve(paths);
+    for (GammaDataset& part : parts) {
+        for (GammaPath path : part.paths) {
+            path.first_node += uint32_t(out.nodes.size());
+            out.paths.push_back(path);
+        }
+        out.nodes.insert(out.nodes.end(), part.nodes.begin(), part.nodes.end());
+        part = {};
+    }
+    if (out.paths.size() > 100) {
+        std::vector<float> weights;
+        for (const GammaPath& p : out.paths) weights.push_back(p.weight);
         const auto cut = weights.begin() + std::ptrdiff_t(double(weights.size() - 1) * kWeightCut);
         std::nth_element(weights.begin(), cut, weights.end());
         for (GammaPath& p : out.paths) p.weight = std::min(p.weight, *cut);
@@ -232,6 +272,10 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
     passed(kGammaBegins);
     const GammaDataset dataset = gamma_dataset(data, brightness, emitters, options, stop, tables);
     if (stop.stop_requested()) return cancelled;
+    for (const std::vector<TrainingPath>* list : {&data.paths, &data.light_paths})
+        for (const TrainingPath& p : *list) report->out_of_range += !data.in_range(p);
+    const uint64_t all_paths = data.paths.size() + data.light_paths.size();
+    if (control.data_read) control.data_read();
     report->paths = dataset.paths.size(), report->nodes = dataset.nodes.size();
     if (dataset.paths.empty())
         report->note +=
@@ -252,12 +296,9 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
         report->note = "the training set tells " + std::to_string(light) + " light and " + std::to_string(eye) +
                        " eye subspaces apart, of " + std::to_string(options.light_subspaces) + " and " +
                        std::to_string(options.eye_subspaces) + " asked for";
-    for (const std::vector<TrainingPath>* list : {&data.paths, &data.light_paths})
-        for (const TrainingPath& p : *list) report->out_of_range += !data.in_range(p);
     if (report->out_of_range > 0)
         report->note += (report->note.empty() ? "" : "; ") + std::to_string(report->out_of_range) + " of " +
-                        std::to_string(data.paths.size() + data.light_paths.size()) +
-                        " training paths left the range of single precision and were left out";
+                        std::to_string(all_paths) + " training paths left the range of single precision and were left out";
     LL_RETURN_IF_ERROR(tables.validate(emitters));
     report->light_subspaces = tables.light_count, report->eye_subspaces = tables.eye_count;
     return tables;

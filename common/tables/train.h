@@ -44,6 +44,9 @@ struct TrainingReport {
 struct TrainingControl {
     std::stop_token stop;
     std::function<void(double)> progress;  ///< Optional; called now and then with the approximate share of time passed.
+    /// Optional; called when the data are needed no more, while most of the training is still to come, so that their owner
+    /// may free them.
+    std::function<void()> data_read;
 };
 
 /// Returns kCancelled within about a second of a stop request, and otherwise valid tables, whatever the data hold.

@@ -49,12 +49,13 @@ class Reservoir {
         contribution_ = contribution;
         path_.vertex_count = uint32_t(k + 1);
         vertices_.resize(size_t(k) + 1);
-        vertices_[0] = {c.position, c.normal, 0, c.emitter};
+        path_.emitter = c.emitter;
+        vertices_[0] = {c.position, c.normal, 0};
         for (int i = 1; i < k; ++i) {
             const SubPathVertex& v = i < c.technique.light_vertices() ? c.y[i] : c.z[k - i];
-            vertices_[size_t(i)] = {v.p, v.ng, 0, 0};
+            vertices_[size_t(i)] = {v.p, v.ng, 0};
         }
-        vertices_[size_t(k)] = {c.z[0].p, {}, 0, 0};
+        vertices_[size_t(k)] = {c.z[0].p, {}, 0};
         view_throughput(c.y, c.technique.light_vertices(), c.z, &view);
         view_footprint(render.emitters[c.emitter], c.y, c.technique.light_vertices(), c.z, c.t, &view);
         const double inverse_own = double(c.inverse_density) * scale / double(c.survival);
@@ -122,9 +123,10 @@ void keep_light_path(const LightSubPath& y, int n, int max_edges, TrainingData* 
     TrainingPath path;
     path.first_vertex = uint32_t(data->vertices.size());
     path.vertex_count = uint32_t(n);
+    path.emitter = uint32_t(y[0].emitter);
     for (int i = 0; i < n; ++i) {
         const bool candidate = (i == 0 || y.has_smooth_lobe(i)) && i + 1 < max_edges;
-        data->vertices.push_back({y[i].p, y[i].ng, candidate ? scalar_of(y[i].alpha) : 0, i == 0 ? uint32_t(y[0].emitter) : 0});
+        data->vertices.push_back({y[i].p, y[i].ng, candidate ? scalar_of(y[i].alpha) : 0});
     }
     data->light_paths.push_back(path);
 }
@@ -244,7 +246,10 @@ class TrainingGenerator::Unit {
             }
         });
         if (stop_.stop_requested()) return Status(StatusCode::kCancelled, "training was cancelled");
-        for (const TrainingData& data : chunks) LL_RETURN_IF_ERROR(all.append(data));
+        for (TrainingData& data : chunks) {
+            LL_RETURN_IF_ERROR(all.append(data));
+            data = {};
+        }
         return all;
     }
 
@@ -355,7 +360,7 @@ Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, s
             LL_RETURN_IF_ERROR(data.append(*unit));
         }
         TrainingReport of_round;
-        auto learned = learn({data, round, guide, scene.emitters(), settings, {stop, {}}, &of_round});
+        auto learned = learn({data, round, guide, scene.emitters(), settings, {stop, {}, [&] { data = {}; }}, &of_round});
         if (!learned.ok()) return learned.status();
         tables = *std::move(learned);
         // The report describes the last round's tables, but its times are those of all rounds together.

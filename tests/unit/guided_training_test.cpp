@@ -139,7 +139,7 @@ TEST(GuidedTraining, InfiniteLightsLieInTheDirectionOfTheirLight) {
             for (const TrainingPath& p : data.paths) {
                 const TrainingVertex* v = &data.vertices[p.first_vertex];
                 // Light tracing starts from where its path started, which is the right place for it.
-                if (!scene->emitters()[v[0].emitter].is_infinite()) continue;
+                if (!scene->emitters()[p.emitter].is_infinite()) continue;
                 const Vec3 d = normalize(v[0].position - v[1].position);
                 EXPECT_NEAR(dot(d, v[0].normal), -1, 1e-4);
                 ++seen;
