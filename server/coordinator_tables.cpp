@@ -74,7 +74,7 @@ bool Coordinator::wait_for_maker(JobRecord& job) {
     if (!job.maker) return false;
     // The state is that before its own tracing, in case the job has to begin again.
     job.makes_tables = false;
-    job.training_begin = {};
+    job.training_begin = job.work_begin = {};
     discard_round(job);
     job.phase = PreparePhase::kWaitingForTables;
     log_info("{}: waits for the tables of {}", job.id, job.maker->id);
@@ -220,6 +220,8 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
     if (!problem.ok()) return reject_result(*job, *units, reference.key, *worker, problem);
     if (auto answer = repeated_result(*job, *units, reference.key, *worker, digest)) return *std::move(answer);
     workers_.unit_succeeded(*worker);
+    // A short unit may be over before a heartbeat tells of it.
+    if (job->work_begin == TimePoint()) job->work_begin = seconds_after(options_.clock(), -trace_seconds);
     TrainingRound& round = *job->round;
     round.add(reference.key.group, {*std::move(data), payload.size(), trace_seconds});
     // A set that is far too large is noticed before hours are spent on it.

@@ -107,6 +107,33 @@ TEST(GuidedTables, TracingIsTimedFromItsFirstLeaseAndEachRoundOnce) {
     ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
 }
 
+/// What waits does not: for workers before and between.
+TEST(GuidedTables, TheTimeThatTheyTakeCountsTowardsTheLimit) {
+    TableService service;
+    JobSpec timed = service.table_spec(0);  // its set is chosen, so that nothing is measured first
+    timed.time_limit_seconds = 10;
+    const std::string id = service.submit_training(timed);
+    service.now_ms += 60000;
+    const auto units = lease_all(service);
+    ASSERT_EQ(units.size(), 3u);
+    service.now_ms += 1000;  // until the scene is there
+    ASSERT_TRUE(service.coordinator->heartbeat(units[0].first, {{units[0].second.reference(), true}}).ok());
+    service.now_ms += 6000;
+    for (const auto& [worker, lease] : units)
+        EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
+    service.wait(id, [](const JobInfo& j) { return j.state == JobState::kRunning; });
+    service.now_ms += 5000;
+    const auto lease = service.lease(units[0].first).at(0);
+    ASSERT_TRUE(service.coordinator->heartbeat(units[0].first, {{lease.reference(), true}}).ok());
+    EXPECT_EQ(service.coordinator->get_job(id)->eta_seconds, 4);
+    service.now_ms += 1000;
+    EXPECT_EQ(service.coordinator->get_job(id)->eta_seconds, 3);
+    EXPECT_EQ(rendered_share(*service.coordinator->get_job(id)), 0.25);
+    service.now_ms += 3001;
+    EXPECT_EQ(service.deliver(units[0].first, lease).outcome, SubmitOutcome::kAccepted);
+    EXPECT_EQ(service.wait_end(id).samples_per_pixel_done, lease.unit.render.iteration_count);
+}
+
 TEST(GuidedTables, AreCancelledInTheSecondRoundWithoutATrace) {
     TableService service;
     const std::string id = service.submit_training(service.guided_spec());
