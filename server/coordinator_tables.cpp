@@ -62,8 +62,9 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
 
 std::shared_ptr<JobRecord> Coordinator::find_maker(const JobRecord& job) const {
     for (const auto& other : jobs_) {
-        // While it probes, a job does not know yet for which set.
-        const bool makes = other->makes_tables && !is_terminal(other->state) && other->phase != PreparePhase::kProbing;
+        // While it probes, or its set grows, a job does not know yet for which set.
+        const bool makes =
+            other->makes_tables && !is_terminal(other->state) && other->phase != PreparePhase::kProbing && !other->set_grows;
         if (other.get() != &job && makes && other->table_key == job.table_key) return other;
     }
     return nullptr;

@@ -58,6 +58,7 @@ struct JobRecord {
     std::shared_ptr<const std::string> guide_bytes;  ///< The bytes of the guide, in case the disk loses them.
     bool capped_by_time_limit = false;
     Digest table_key;                  ///< Key of the tables that the job needs; set before `makes_tables` or `maker`.
+    bool set_grows = false;            ///< Whether nobody knows yet which tables the job will make.
     bool makes_tables = false;         ///< Whether the job probes, traces and learns itself.
     bool may_wait = true;              ///< Whether it may wait for another job's tables: not after damage.
     std::shared_ptr<JobRecord> maker;  ///< The job that makes the same tables; this job waits for it.

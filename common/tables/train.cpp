@@ -4,6 +4,7 @@
 #include <cfloat>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "common/core/fork_join.h"
 #include "common/tables/train_classifier.h"
@@ -16,6 +17,8 @@ constexpr size_t kClassifierEnds = 200000;  ///< Enough for 1000 centroids and t
 /// The paths' weights are cut at this quantile. Otherwise a handful of paths would decide what Gamma is and how
 /// strongly its prior counts. The cut biases no image, because every Gamma gives the right mean.
 constexpr double kWeightCut = 0.99;
+
+constexpr double kSamplesPerBlock = 200;
 
 /// Fewest nodes per subspace, on average, with which the data can tell subspaces apart: four independent ones. The
 /// paths of one length that a camera sample keeps share a camera sub-path.
@@ -41,26 +44,37 @@ class Stopwatch {
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// Ibar of every block: its mean estimate, smoothed over 3 x 3 blocks, plus a tenth of the frame's mean.
+/// Ibar of every block: its mean estimate, smoothed, plus a tenth of the frame's mean. Blocks are joined until one has
+/// about kSamplesPerBlock samples, and then smoothed over 3 x 3.
 std::vector<double> block_brightness(const TrainingData& d) {
     const int w = d.blocks_x, h = d.blocks_y;
-    const double per_block = double(d.samples) / double(d.block_sum.size());
-    // A block whose sum is not finite counts as black here and gets its brightness from its neighbours.
-    const auto known = [](double s) { return std::isfinite(s) ? s : 0; };
+    const double per_block = double(std::max<uint64_t>(1, d.samples)) / double(d.block_sum.size());
+    const int side = std::clamp(int(std::ceil(std::sqrt(kSamplesPerBlock / per_block))), 1, std::max(w, h));
+    const int columns = (w + side - 1) / side, rows = (h + side - 1) / side;
+    std::vector<double> sum(size_t(columns * rows), 0.0), count(sum.size(), 0.0);
     double mean = 0;
-    for (const double s : d.block_sum) mean += known(s) / per_block;
-    mean /= double(d.block_sum.size());
-    std::vector<double> out(d.block_sum.size());
     for (int y = 0; y < h; ++y) {
         for (int x = 0; x < w; ++x) {
-            double sum = 0;
-            int count = 0;
-            for (int j = std::max(0, y - 1); j <= std::min(h - 1, y + 1); ++j)
-                for (int i = std::max(0, x - 1); i <= std::min(w - 1, x + 1); ++i, ++count)
-                    sum += known(d.block_sum[size_t(j * w + i)]);
-            out[size_t(y * w + x)] = sum / (count * per_block) + 0.1 * mean;
+            // A block whose sum is not finite counts as black here and gets its brightness from its neighbours.
+            const double s = d.block_sum[size_t(y * w + x)], known = std::isfinite(s) ? s / per_block : 0;
+            const size_t joined = size_t(y / side * columns + x / side);
+            sum[joined] += known, count[joined] += 1;
+            mean += known / double(d.block_sum.size());
         }
     }
+    std::vector<double> smooth(sum.size());
+    for (int y = 0; y < rows; ++y) {
+        for (int x = 0; x < columns; ++x) {
+            double total = 0, blocks = 0;
+            for (int j = std::max(0, y - 1); j <= std::min(rows - 1, y + 1); ++j)
+                for (int i = std::max(0, x - 1); i <= std::min(columns - 1, x + 1); ++i)
+                    total += sum[size_t(j * columns + i)], blocks += count[size_t(j * columns + i)];
+            smooth[size_t(y * columns + x)] = total / blocks + 0.1 * mean;
+        }
+    }
+    std::vector<double> out(d.block_sum.size());
+    for (int y = 0; y < h; ++y)
+        for (int x = 0; x < w; ++x) out[size_t(y * w + x)] = smooth[size_t(y / side * columns + x / side)];
     return out;
 }
 
@@ -275,6 +289,9 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
     for (const std::vector<TrainingPath>* list : {&data.paths, &data.light_paths})
         for (const TrainingPath& p : *list) report->out_of_range += !data.in_range(p);
     const uint64_t all_paths = data.paths.size() + data.light_paths.size();
+    std::optional<GammaDataset> judged;
+    if (options.judged && options.trainer == GammaTrainer::kMm)
+        judged = gamma_dataset(data, brightness, emitters, options, stop, *options.judged);
     if (control.data_read) control.data_read();
     report->paths = dataset.paths.size(), report->nodes = dataset.nodes.size();
     if (dataset.paths.empty())
@@ -286,6 +303,8 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
     gamma.seed = options.seed;
     gamma.stop = stop;
     gamma.progress = [&](double share) { passed(kGammaBegins + (1 - kGammaBegins) * share); };
+    if (judged) report->judged_loss = held_out_loss(*judged, options.judged->gamma, gamma);
+    judged.reset();
     tables.gamma = train_gamma(dataset, gamma, &report->gamma);
     if (stop.stop_requested()) return cancelled;
     report->gamma_seconds = watch.lap();

@@ -29,10 +29,14 @@ struct TrainingOptions {
     int reuse_windows = 1;      ///< J_max.
     double nominal_paths = 1;   ///< Light paths of the smallest cache that rendering will make.
     uint64_t seed = 0;
+    const SubspaceTables* judged = nullptr;  ///< Other tables of the scene, for TrainingReport::judged_loss.
 };
 
 struct TrainingReport {
     GammaReport gamma;
+    /// Loss of TrainingOptions::judged on the paths whose loss of the result is `gamma.loss` (trainer mm): what both have
+    /// not been trained with. 0 if there is nothing to judge.
+    double judged_loss = 0;
     uint32_t light_subspaces = 0, eye_subspaces = 0;  ///< Subspaces in the tables; at most as many as asked for.
     uint64_t paths = 0, nodes = 0;
     uint64_t out_of_range = 0;  ///< Paths and light sub-paths that were left out; see TrainingData::in_range().

@@ -232,22 +232,28 @@ class Steps {
     const std::function<void(double)>& report_;
 };
 
-std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& options, GammaReport* report) {
+/// The paths that train, and those that judge.
+std::pair<std::vector<uint32_t>, std::vector<uint32_t>> divide(const GammaDataset& data, const GammaOptions& options) {
     // A light sub-path with paths in both parts would confirm itself; therefore whole batches judge where there are
     // enough of them. Where there are few, camera samples judge. Those of a guided round then still share light
     // sub-paths with paths that train, and the prior comes out weaker.
     constexpr uint32_t kFewBatches = 5;
     uint32_t batches = 0;
     for (const GammaPath& p : data.paths) batches = std::max(batches, p.batch + 1);
-    std::vector<uint32_t> train, judge;
+    std::pair<std::vector<uint32_t>, std::vector<uint32_t>> parts;
     for (uint32_t x = 0; x < data.paths.size(); ++x) {
         const double batch = data.paths[x].batch;
         const uint64_t h = mix64(options.seed ^ mix64(data.paths[x].sample + 0x51ull));
         const bool judges = batches < kFewBatches
                                 ? double(h >> 11) * 0x1p-53 < options.held_out
                                 : std::floor((batch + 1) * options.held_out) > std::floor(batch * options.held_out);
-        (judges ? judge : train).push_back(x);
+        (judges ? parts.second : parts.first).push_back(x);
     }
+    return parts;
+}
+
+std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& options, GammaReport* report) {
+    const auto [train, judge] = divide(data, options);
     std::vector<uint32_t> all(data.paths.size());
     std::iota(all.begin(), all.end(), 0u);
 
@@ -377,19 +383,28 @@ std::vector<float> train_contribution(const GammaDataset& data, const GammaOptio
     return problem.mixed(b);
 }
 
+double path_loss(const GammaDataset& data, const std::vector<float>& gamma, size_t x) {
+    const GammaPath& p = data.paths[x];
+    double f = double(p.fixed);
+    for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n)
+        f += double(data.nodes[n].g) * double(gamma[size_t(data.nodes[n].eye) * data.light_count + data.nodes[n].light]);
+    return f > 0 ? double(p.weight) / f : 0;
+}
+
 }  // namespace
 
 double gamma_loss(const GammaDataset& data, const std::vector<float>& gamma, size_t first, size_t stride) {
     double sum = 0;
     size_t count = 0;
-    for (size_t x = first; x < data.paths.size(); x += stride, ++count) {
-        const GammaPath& p = data.paths[x];
-        double f = double(p.fixed);
-        for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n)
-            f += double(data.nodes[n].g) * double(gamma[size_t(data.nodes[n].eye) * data.light_count + data.nodes[n].light]);
-        if (f > 0) sum += double(p.weight) / f;
-    }
+    for (size_t x = first; x < data.paths.size(); x += stride, ++count) sum += path_loss(data, gamma, x);
     return count ? sum / double(count) : 0;
+}
+
+double held_out_loss(const GammaDataset& data, const std::vector<float>& gamma, const GammaOptions& options) {
+    double sum = 0;
+    const std::vector<uint32_t> judge = divide(data, options).second;
+    for (const uint32_t x : judge) sum += path_loss(data, gamma, x);
+    return judge.empty() ? 0 : sum / double(judge.size());
 }
 
 std::vector<float> train_gamma(const GammaDataset& data, const GammaOptions& options, GammaReport* report) {

@@ -40,6 +40,9 @@ inline constexpr int kTrainingLengths = 4, kTrainingPathsPerLength = 2;
 /// Most paths that a camera sample keeps; they are neighbours in TrainingData::paths.
 inline constexpr size_t kTrainingPathsPerSample = size_t(kTrainingLengths) * kTrainingPathsPerLength;
 
+/// Blocks into which the frame is divided, about; learning joins them where samples are few.
+inline constexpr uint64_t kTrainingBlocks = 2500;
+
 struct TrainingPath {
     uint32_t first_vertex = 0;
     uint32_t vertex_count = 0;  ///< k + 1, x_0 ... x_k; light sub-paths: y_0 ... y_{n-1}.

@@ -17,7 +17,6 @@ namespace {
 
 constexpr uint64_t kTrainingSeed = 0x7472'6169'6e69'6e67ull;
 constexpr uint64_t kChunk = kTrainingChunkSamples;
-constexpr double kSamplesPerBlock = 200;
 
 /// The affinity while nothing is learned: one draw per prefix and unit of its throughput.
 struct UnlearnedAffinity {
@@ -131,14 +130,13 @@ void keep_light_path(const LightSubPath& y, int n, int max_edges, TrainingData* 
     data->light_paths.push_back(path);
 }
 
-/// Divides the frame into blocks of about kSamplesPerBlock samples.
+/// Divides the frame into about kTrainingBlocks blocks. The size of the set does not matter: nobody may know it yet.
 struct Blocks {
     Rect crop;
     int edge = 1;
 
-    Blocks(const Rect& r, uint64_t samples) : crop(r) {
-        const double pixels = kSamplesPerBlock * double(r.area()) / double(std::max<uint64_t>(1, samples));
-        edge = std::max(1, int(std::ceil(std::sqrt(pixels))));
+    explicit Blocks(const Rect& r) : crop(r) {
+        edge = std::max(1, int(std::ceil(std::sqrt(double(r.area()) / double(kTrainingBlocks)))));
     }
     int columns() const { return (crop.width() + edge - 1) / edge; }
     int rows() const { return (crop.height() + edge - 1) / edge; }
@@ -177,7 +175,7 @@ class TrainingGenerator::Unit {
         : generator_(generator),
           work_(work),
           stop_(std::move(stop)),
-          blocks_(crop(), work.total_samples) {}
+          blocks_(crop()) {}
 
     Rect crop() const { return generator_.scene_->frame().crop; }
     double pixels() const { return double(crop().area()); }
@@ -347,11 +345,12 @@ Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, s
     if (!settings.algorithm.info().learning) return tables;
     const LearningPlan plan = learning_plan(settings.algorithm);
     *report = {};
+    TrainingData data;
     for (size_t round = 0; round < plan.rounds.size(); ++round) {
         const Tables guide = plan.rounds[round].guided ? tables : Tables();
         const Result<TrainingGenerator> generator = TrainingGenerator::create(scene, settings, guide);
         if (!generator.ok()) return generator.status();
-        TrainingData data;
+        if (!plan.rounds[round].guided || !plan.rounds[round - 1].guided) data = {};
         const uint64_t begin = plan.first_sample(round), end = begin + plan.rounds[round].samples;
         for (uint64_t first = begin; first < end; first += std::min(kTrainingUnitSamples, end - first)) {
             const Result<TrainingData> unit =
@@ -360,7 +359,10 @@ Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, s
             LL_RETURN_IF_ERROR(data.append(*unit));
         }
         TrainingReport of_round;
-        auto learned = learn({data, round, guide, scene.emitters(), settings, {stop, {}, [&] { data = {}; }}, &of_round});
+        const auto read = [&, last = round + 1 == plan.rounds.size()] {
+            if (last) data = {};
+        };
+        auto learned = learn({data, round, guide, scene.emitters(), settings, {stop, {}, read}, &of_round});
         if (!learned.ok()) return learned.status();
         tables = *std::move(learned);
         // The report describes the last round's tables, but its times are those of all rounds together.

@@ -164,7 +164,7 @@ TEST(GuidedTables, AGuideThatTheDiskHasLostIsRestored) {
     ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
 }
 
-/// One that can afford two rounds makes the tables of the spec that it records, as a job of that spec does.
+/// One whose set has grown makes the tables of the spec that it records, as a job of that spec does.
 TEST(GuidedTables, OfATimeLimitedJobAreThoseOfItsSpec) {
     TableService service;
     JobSpec timed = service.guided_spec(0);
@@ -174,17 +174,24 @@ TEST(GuidedTables, OfATimeLimitedJobAreThoseOfItsSpec) {
     const auto probe = lease_all(service);
     ASSERT_EQ(probe.size(), 1u);
     ASSERT_EQ(probe[0].second.unit.key.kind, UnitKind::kProbe);
-    // At such a rate 32768 samples fit, with the two workers of lease_all(); 65536 do not.
-    const std::string& payload = traced(probe[0].second);
-    service.give(probe[0].first, probe[0].second, payload, sha256(payload), 0.11);
+    service.give(probe[0].first, probe[0].second, traced(probe[0].second));
     JobInfo info = service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing; });
-    JobSpec recorded = service.guided_spec();
-    EXPECT_EQ(info.spec.algorithm.value("training-paths"), 32768);
-    recorded.algorithm = recorded.algorithm.with("training-paths", 32768);
-    for (const auto& [worker, lease] : deliver_pilot(service))
-        EXPECT_EQ(service.give(worker, lease, guided(service, lease)).outcome, SubmitOutcome::kAccepted);
+    const auto pilot = lease_all(service);
+    ASSERT_EQ(pilot.size(), 1u);
+    EXPECT_EQ(pilot[0].second.unit.training, (TrainingWork{0, kPilotSamples, kPilotSamples}));
+    // At such a rate another 16384 samples cost about 3 s, which is worth them, and 49152 about 8 s, which is not.
+    const std::string& payload = traced(pilot[0].second);
+    service.give(pilot[0].first, pilot[0].second, payload, sha256(payload), 2.0);
+    service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing && j.phase_total > kPilotSamples; });
+    const auto units = lease_all(service);
+    ASSERT_EQ(units.size(), 1u);
+    EXPECT_EQ(units[0].second.unit.training, (TrainingWork{kPilotSamples, kPilotSamples, 2 * kPilotSamples}));
+    EXPECT_EQ(service.give(units[0].first, units[0].second, guided(service, units[0].second)).outcome, SubmitOutcome::kAccepted);
     info = service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
     ASSERT_EQ(info.state, JobState::kRunning) << info.message;
+    EXPECT_EQ(info.spec.algorithm.value("training-paths"), 32768);
+    JobSpec recorded = service.guided_spec();
+    recorded.algorithm = recorded.algorithm.with("training-paths", 32768);
     EXPECT_TRUE(info.tables.capped_by_time_limit);
     EXPECT_EQ(info.tables.asset.digest, tables_alone(recorded));
     ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
