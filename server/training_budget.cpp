@@ -25,6 +25,10 @@ double expected_loss_per_doubling(double now, double before, double doublings) {
     return 1 - kGainThatIsLeft * (1 - measured);
 }
 
+uint64_t proportionate_training_samples(uint64_t image_samples, uint64_t wanted) {
+    return affordable_training_samples({.trace_seconds_per_sample = kTrainingSampleCost}, double(image_samples), wanted);
+}
+
 uint64_t affordable_training_samples(const TrainingRate& rate, double seconds, uint64_t wanted) {
     const auto fits = [&](uint64_t samples) {
         return double(samples) * (rate.trace_seconds_per_sample + rate.learn_seconds_per_sample) <= seconds;

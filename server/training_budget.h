@@ -1,6 +1,7 @@
 #pragma once
-// How much training a time-limited job can afford, and how much of it is worth its time. The answer depends on a clock;
-// it is therefore written into the job's spec before any unit of the image is leased, so that rendering that spec again
+// How much training a job can afford, and how much of it is worth its time. With a number of samples per pixel the answer
+// is a function of the job alone, so that the same job always gives the same bytes. With a time limit it depends on a clock;
+// it is then written into the job's spec before any unit of the image is leased, so that rendering that spec again
 // gives the same bytes.
 //
 // The trade: a job's error at its end is proportional to loss / (time that is left for rendering), where the loss is what
@@ -39,6 +40,14 @@ inline constexpr double kGuidedCost = 2;
 /// it. The probe cannot measure this: most of its own learning does not depend on the number of samples, and is counted
 /// separately. (Difficult interiors: 0.3 to 0.45 of tracing in two rounds.)
 inline constexpr double kLearningOverTracing = 0.35;
+
+/// Samples of the image that take as long as tracing a sample of a set that grows and learning from it (four interiors,
+/// 2^16 samples and more: 3.5 to 5).
+inline constexpr double kTrainingSampleCost = 4;
+
+/// The set of a job that renders `image_samples` camera samples: the largest power of two, or `wanted` itself, that takes no
+/// longer than rendering them; at least kMinTrainingSamples.
+uint64_t proportionate_training_samples(uint64_t image_samples, uint64_t wanted);
 
 struct TrainingRate {
     double trace_seconds_per_sample = 0;  ///< With all workers together.

@@ -166,7 +166,8 @@ TEST(GuidedTables, AGuideThatTheDiskHasLostIsRestored) {
 
 /// One whose set has grown makes the tables of the spec that it records, as a job of that spec does.
 TEST(GuidedTables, OfATimeLimitedJobAreThoseOfItsSpec) {
-    TableService service;
+    TempDirectory cache;
+    TableService service([&](CoordinatorOptions& options) { options.table_cache = cache.path; });
     JobSpec timed = service.guided_spec(0);
     timed.algorithm = without(timed.algorithm, "training-paths");
     timed.time_limit_seconds = 20;
@@ -194,6 +195,30 @@ TEST(GuidedTables, OfATimeLimitedJobAreThoseOfItsSpec) {
     recorded.algorithm = recorded.algorithm.with("training-paths", 32768);
     EXPECT_TRUE(info.tables.capped_by_time_limit);
     EXPECT_EQ(info.tables.asset.digest, tables_alone(recorded));
+    ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
+    // A job whose probe promises no more than that takes the same tables.
+    const std::string poorer = service.submit_training(timed);
+    const auto again = lease_all(service);
+    ASSERT_EQ(again.size(), 1u);
+    ASSERT_EQ(again[0].second.unit.key.kind, UnitKind::kProbe);
+    const std::string& probed = traced(again[0].second);
+    service.give(again[0].first, again[0].second, probed, sha256(probed), 0.6);
+    const JobInfo taken = service.wait(poorer, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
+    EXPECT_EQ(taken.tables.asset.digest, info.tables.asset.digest);
+    EXPECT_TRUE(taken.tables.from_cache);
+    EXPECT_TRUE(taken.tables.capped_by_time_limit);
+    EXPECT_EQ(taken.spec.algorithm.value("training-paths"), 32768);
+    ASSERT_TRUE(service.coordinator->cancel_job(poorer).ok());
+}
+
+/// Without a set of its own, a job with samples has one that its image decides.
+TEST(GuidedTables, OfAShortJobAreSmall) {
+    TableService service;
+    JobSpec brief = service.guided_spec(64);
+    brief.algorithm = without(brief.algorithm, "training-paths");
+    const std::string id = service.submit_training(brief);
+    EXPECT_EQ(service.coordinator->get_job(id)->spec.algorithm.value("training-paths"), 16384) << "32 x 32 x 64 / 4";
+    EXPECT_EQ(service.coordinator->get_job(id)->phase_total, 16384u);
     ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
 }
 

@@ -206,6 +206,15 @@ TEST(TrainingTrade, TakesTheLeastErrorOfTheWholeJob) {
     EXPECT_EQ(best_training_size(100, {}, 0.7, 20, 20), 100u);
 }
 
+TEST(TrainingTrade, PreparesForNoLongerThanItRenders) {
+    EXPECT_EQ(proportionate_training_samples(0, 500000), kMinTrainingSamples);
+    EXPECT_EQ(proportionate_training_samples(4 * 16384 - 1, 500000), 8192u);
+    EXPECT_EQ(proportionate_training_samples(4 * 16384, 500000), 16384u);
+    EXPECT_EQ(proportionate_training_samples(1999999, 500000), 262144u);
+    EXPECT_EQ(proportionate_training_samples(2000000, 500000), 500000u);
+    EXPECT_EQ(proportionate_training_samples(10, 700), 700u) << "less than the least that is worth anything";
+}
+
 TEST(TrainingTrade, ExpectsLessOfTheNextDoublingsThanTheLastOnesGave) {
     EXPECT_NEAR(expected_loss_per_doubling(0.64, 1, 2), 1 - kGainThatIsLeft * 0.2, 1e-12);
     EXPECT_EQ(expected_loss_per_doubling(2, 1, 2), 1);
