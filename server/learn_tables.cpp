@@ -21,15 +21,17 @@ Result<AffordableSet> affordable_set(const JobSpec& spec, const TracedRound& pro
                                      const std::stop_token& stop) {
     const RenderSettings settings = render_settings(spec);
     const LearningPlan plan = learning_plan(spec.algorithm);
-    const TimePoint begin = clock();
-    TrainingReport report;
-    const auto tables = learn({probe.data, 0, {}, emitters, settings, {stop, {}, {}}, &report});
-    if (!tables.ok()) return tables.status();
     AffordableSet set;
     set.wanted = plan.samples;
     set.probe_samples = probe.data.samples;
     set.probe_traced_seconds = probe.worker_seconds;
-    set.probe_learned_seconds = seconds_between(begin, clock());
+    if (!plan.grows || spec.time_limit_seconds < kShortLimit) {
+        const TimePoint begin = clock();
+        TrainingReport report;
+        const auto tables = learn({probe.data, 0, {}, emitters, settings, {stop, {}, {}}, &report});
+        if (!tables.ok()) return tables.status();
+        set.probe_learned_seconds = seconds_between(begin, clock());
+    }
     const double samples = double(std::max<uint64_t>(1, set.probe_samples));
     const uint32_t threads = std::max(1u, crew.most_threads);  // the largest worker may have traced the probe
     const auto affordable = [&](bool guided, double share, uint64_t most) {
@@ -133,7 +135,8 @@ Result<std::optional<LearnedTables>> learn_tables(JobSpec spec, const EmitterSet
             const double left = port.seconds_left();
             const uint64_t size = best_size(growth, end, wanted, spec.time_limit_seconds, left);
             log_info(
-                "{} training samples are there and {:.1f} s are left, each doubling is expected to leave {:.3f} of the loss: {}",
+                "{} training samples are there and {:.1f} s are left, the next doubling is expected to leave {:.3f} of the loss: "
+                "{}",
                 end, left, growth.loss_per_doubling, size == end ? "no more" : "on to " + std::to_string(size));
             growing = size != end && !larger_sets(size, wanted).empty();
             spec = with_samples(spec, size);

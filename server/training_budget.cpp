@@ -13,7 +13,10 @@ uint64_t best_training_size(uint64_t present, const std::vector<LargerSet>& sets
     for (const LargerSet& set : sets) {
         const double rest = left - set.seconds;
         if (!(rest >= (1 - kLongestShare) * limit)) continue;
-        const double error = std::pow(loss_per_doubling, std::log2(double(set.samples) / double(present))) / rest;
+        double loss = 1, gain = 1 - loss_per_doubling;
+        for (double doublings = std::log2(double(set.samples) / double(present)); doublings > 0; doublings -= 1, gain *= kGainDecay)
+            loss *= std::pow(1 - gain, std::min(doublings, 1.0));
+        const double error = loss / rest;
         if (error < least) least = error, best = set.samples;
     }
     return best;

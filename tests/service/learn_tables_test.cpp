@@ -194,12 +194,12 @@ TEST(LearnTables, ALimitWithoutRoomForAGuideHasASetOfOneRound) {
 
 TEST(TrainingTrade, TakesTheLeastErrorOfTheWholeJob) {
     const std::vector<LargerSet> sets{{200, 1}, {400, 3}, {800, 7}};
-    // 20 s left; of the loss a doubling leaves ...
+    // 20 s left; of the loss the next doubling leaves ...
     EXPECT_EQ(best_training_size(100, sets, 1, 20, 20), 100u);
     EXPECT_EQ(best_training_size(100, sets, 0.96, 20, 20), 100u) << "0.96 / 19 > 1 / 20";
     EXPECT_EQ(best_training_size(100, sets, 0.94, 20, 20), 200u);
-    EXPECT_EQ(best_training_size(100, sets, 0.88, 20, 20), 400u) << "0.88^2 / 17 = 0.0456, 0.88 / 19 = 0.0463";
-    EXPECT_EQ(best_training_size(100, sets, 0.7, 20, 20), 800u);
+    EXPECT_EQ(best_training_size(100, sets, 0.8, 20, 20), 400u) << "0.8 0.88 / 17 = 0.0414, 0.8 / 19 = 0.0421";
+    EXPECT_EQ(best_training_size(100, sets, 0.3, 20, 20), 800u) << "0.3 0.58 0.748 / 13 = 0.0100, 0.3 0.58 / 17 = 0.0102";
     EXPECT_EQ(best_training_size(100, sets, 0.7, 20, 14), 400u) << "half of the limit is for rendering";
     EXPECT_EQ(best_training_size(100, sets, 0.7, 20, 10.5), 100u);
     EXPECT_EQ(best_training_size(100, sets, 0.7, 20, 0), 100u);
