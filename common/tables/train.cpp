@@ -52,11 +52,11 @@ double emission_ratio(const TrainingOptions& o, const TrainingPath& p, const Tra
     const Vec3 normal = v[0].normal;
     Vec3 w = normal;
     if (!a.is_infinite() && p.vertex_count > 1) w = normalize(v[1].position - v[0].position);
-    double ratio = double(rendered.pdf_position(b, v[0].position, w)) / double(traced.pdf_position(a, v[0].position, w));
-    if (p.vertex_count > 1) {
-        ratio *= double(rendered.pdf_direction(b, v[0].position, normal, w, v[1].position));
-        ratio /= double(traced.pdf_direction(a, v[0].position, normal, w, v[1].position));
-    }
+    const Vec3& x1 = v[p.vertex_count > 1 ? 1 : 0].position;
+    const EmissionDensities before = traced.emission_densities(a, v[0].position, normal, w, x1);
+    const EmissionDensities after = rendered.emission_densities(b, v[0].position, normal, w, x1);
+    double ratio = double(after.position) / double(before.position);
+    if (p.vertex_count > 1) ratio *= double(after.direction) / double(before.direction);
     return std::isfinite(ratio) ? ratio : 1;
 }
 
