@@ -28,7 +28,7 @@ namespace {
 constexpr const char* kFooter = R"(Examples:
   lightloom render room.pbrt                                  the scene's own Integrator and samples per pixel, to room.exr
   lightloom render room.pbrt -o out.exr --png out.png --algorithm bdpt --spp 64
-  lightloom render room.pbrt --time 60                        stop after a minute of rendering
+  lightloom render room.pbrt --time 60                        stop after a minute of learning and rendering
   lightloom render room.pbrt --noise 0.01                     stop when the estimated relMSE is 0.01
   lightloom render room.pbrt --spp 4 --resolution 320x180     a quick look
   lightloom render room.pbrt --pyramid -o room-techniques --resolution 320x180   which technique gives what

@@ -112,7 +112,8 @@ void add_output_settings(cli::App command, JobOptions& options) {
                          ->check(whole_number_between(1, JobSpec::kMaxSamplesPerPixel));
     command
         .add_option("--time", options.time_seconds,
-                    "Stop after so many seconds of rendering, at a number of samples that --spp can reproduce")
+                    "Stop after so many seconds of learning and rendering, at a number of samples that --spp can reproduce; "
+                    "reading the scene and waiting for a service's workers come on top")
         ->type_name("SECONDS")
         ->check(number_between(0.001, 30 * 86400.0))
         ->excludes(spp);

@@ -12,6 +12,7 @@
 #include "common/cli/help.h"
 #include "common/cli/log.h"
 #include "common/cli/start.h"
+#include "common/core/large_blocks.h"
 #include "common/transport/catalog.h"
 #include "common/work/identity.h"
 
@@ -37,6 +38,7 @@ lightloom::OptionWords option_words() {
 
 int main(int argc, char** argv) {
     using namespace lightloom::client;
+    lightloom::give_back_large_blocks();
     CLI::App app{"Lightloom: renders scenes whose light is hard to find, on one machine or many.", "lightloom"};
     app.formatter(std::make_shared<lightloom::HelpFormatter>());
     lightloom::add_version_option(app, lightloom::kBuildId);

@@ -1,7 +1,7 @@
 #pragma once
 // One rendering in this process that grows by full-frame groups, for measuring: its seconds are those of light transport,
 // without import, scene build, merging, metrics or services. Its groups, units and sums are those of a job, so its image has
-// the bytes that `lightloom render` writes for as many samples.
+// the bytes that `lightloom render` writes for as many samples and training paths.
 
 #include <cstdint>
 #include <limits>

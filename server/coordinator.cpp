@@ -355,8 +355,7 @@ void Coordinator::tick(std::stop_token stop) {
                 leases_expired(*job, *units, expired);
                 if (is_terminal(job->state)) continue;
             }
-            const double limit = job->spec.time_limit_seconds;
-            if (limit > 0 && job->rendering && !job->closed && seconds_between(job->first_render, now) >= limit) {
+            if (job->spec.time_limit_seconds > 0 && job->rendering && !job->closed && job->seconds_left(now) <= 0) {
                 job->closed = true;
                 finish_if_complete(*job);
             }

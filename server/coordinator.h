@@ -40,7 +40,7 @@ struct CoordinatorOptions {
     uint64_t waiting_bytes = uint64_t(512) << 20;  ///< Most memory of partials that wait for earlier groups.
     std::filesystem::path table_cache;             ///< Tables of earlier jobs; empty: none are kept.
     uint64_t table_cache_bytes = uint64_t(4) << 30;
-    uint64_t training_bytes = uint64_t(8) << 30;  ///< Most training data of one job: 5e6 samples of a hard interior.
+    uint64_t training_bytes = uint64_t(8) << 30;  ///< Most training data of one job: 7e6 samples of a hard interior.
     size_t max_jobs = 10000;                      ///< Most jobs that have not ended.
     size_t kept_jobs = 1000;                      ///< Ended jobs that are remembered; the oldest are forgotten, their files stay.
 };

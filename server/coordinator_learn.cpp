@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "common/cli/log_line.h"
+#include "common/transport/parameters.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
 #include "server/learn_tables.h"
@@ -27,7 +28,7 @@ class Coordinator::Tracing final : public TracingPort {
           emitter_count_(emitter_count),
           stop_(std::move(stop)) {}
 
-    Result<TracedRound> collect() override {
+    Result<TracedRound> collect(TrainingData earlier) override {
         std::unique_lock lock(coordinator_.mutex_);
         for (;;) {
             coordinator_.work_changed_.wait_for(lock, kPoll, [&] { return !alive() || job_.round->complete(); });
@@ -47,7 +48,7 @@ class Coordinator::Tracing final : public TracingPort {
             for (uint32_t i = 0; i < parts.size(); ++i)
                 if (Status s = parts[i].data.validate(emitter_count_); !s.ok()) bad.emplace_back(i, std::move(s));
             if (bad.empty()) {
-                auto data = join(std::move(parts), stop_);
+                auto data = join(std::move(earlier), std::move(parts), stop_);
                 if (!data.ok()) return data.status();
                 traced.data = *std::move(data);
                 lock.lock();
@@ -70,10 +71,16 @@ class Coordinator::Tracing final : public TracingPort {
         return coordinator_.workers_.crew(coordinator_.options_.clock());
     }
 
+    double seconds_left() const override {
+        const std::lock_guard lock(coordinator_.mutex_);
+        return job_.seconds_left(coordinator_.options_.clock());
+    }
+
     Result<bool> settle(const AffordableSet& set) override {
-        log_info("{}: the time limit has room for {} of {} training samples; {} traced in {:.3f} s, learned in {:.3f} s", job_.id,
-                 set.samples, set.wanted, set.probe_samples, set.probe_traced_seconds, set.probe_learned_seconds);
-        const bool smaller = set.samples < set.wanted;
+        log_info("{}: the time limit has room for {}{} of {} training samples; {} traced in {:.3f} s, learned in {:.3f} s", job_.id,
+                 set.grows ? "about " : "", set.samples, set.wanted, set.probe_samples, set.probe_traced_seconds,
+                 set.probe_learned_seconds);
+        const bool smaller = set.samples < set.wanted && !set.grows;
         SceneFacts facts;
         {
             const std::lock_guard lock(coordinator_.mutex_);
@@ -84,12 +91,19 @@ class Coordinator::Tracing final : public TracingPort {
         }
         // A smaller set makes other tables, which have not been looked up yet; those of the whole set may exist by now.
         if (coordinator_.adopt_cached_tables(job_, set.spec, facts)) return false;
+        if (set.grows && adopt_smaller(set, facts)) return false;
         const std::lock_guard lock(coordinator_.mutex_);
         if (!alive()) return over();
         job_.spec = set.spec;
-        if (job_.may_wait && coordinator_.wait_for_maker(job_)) return false;
+        const bool whole = !set.grows || set.samples == set.wanted;
+        if (job_.may_wait && whole && coordinator_.wait_for_maker(job_)) return false;
+        job_.set_grows = set.grows;
         job_.training_begin = coordinator_.options_.clock();
-        coordinator_.open_first_round(job_);
+        if (set.grows) {
+            coordinator_.open_training(job_, UnitKind::kTraining, 0, {0, kPilotSamples, kPilotSamples});
+        } else {
+            coordinator_.open_first_round(job_);
+        }
         return true;
     }
 
@@ -135,6 +149,24 @@ class Coordinator::Tracing final : public TracingPort {
     }
 
   private:
+    /// Adopts tables of an earlier job whose set ended where this one's may end, and is not smaller than the guess.
+    bool adopt_smaller(const AffordableSet& set, const SceneFacts& facts) {
+        std::vector<uint64_t> sizes = larger_sets(kGuideSamples, set.wanted);
+        sizes.insert(sizes.begin(), {kPilotSamples, 2 * kPilotSamples, kGuideSamples});
+        for (auto size = sizes.rbegin(); size != sizes.rend() && *size >= set.samples; ++size) {
+            if (*size >= set.wanted) continue;  // it was looked up
+            JobSpec spec = set.spec;
+            spec.algorithm = spec.algorithm.with(kTrainingPaths, double(*size));
+            {
+                const std::lock_guard lock(coordinator_.mutex_);
+                job_.capped_by_time_limit = true;
+            }
+            if (coordinator_.adopt_cached_tables(job_, spec, facts)) return true;
+        }
+        const std::lock_guard lock(coordinator_.mutex_);
+        job_.capped_by_time_limit = false;
+        return false;
+    }
     /// Sets the tables that units of the next round read. The caller holds the mutex.
     void replace_guide(const AssetReference& guide, std::shared_ptr<const std::string> bytes) {
         const Digest old = std::exchange(job_.guide, guide).digest;
@@ -175,6 +207,9 @@ Status Coordinator::finish_tables(JobRecord& job, LearnedTables learned) {
     SceneFacts facts;  // empty if the job ended meanwhile; its tables are kept all the same
     {
         const std::lock_guard lock(mutex_);
+        job.set_grows = false;
+        job.table_key = info.cache_key;
+        job.capped_by_time_limit = job.capped_by_time_limit || info.capped_by_time_limit;
         info.capped_by_time_limit = job.capped_by_time_limit;
         facts = std::move(job.facts);
     }

@@ -34,6 +34,11 @@ void Coordinator::open_training(JobRecord& job, UnitKind kind, uint32_t round, c
 }
 
 Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait) {
+    if (const LearningPlan plan = learning_plan(spec.algorithm);
+        plan.grows && spec.samples_per_pixel > 0 && !job.submitted.algorithm.chosen(kTrainingPaths)) {
+        const uint64_t image_samples = uint64_t(spec.frame.crop.area()) * spec.samples_per_pixel;
+        spec.algorithm = spec.algorithm.with(kTrainingPaths, double(proportionate_training_samples(image_samples, plan.samples)));
+    }
     if (adopt_cached_tables(job, spec, facts)) return {};
     const std::lock_guard lock(mutex_);
     if (job.state != JobState::kPreparing) return {};
@@ -62,8 +67,9 @@ Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts fact
 
 std::shared_ptr<JobRecord> Coordinator::find_maker(const JobRecord& job) const {
     for (const auto& other : jobs_) {
-        // While it probes, a job does not know yet for which set.
-        const bool makes = other->makes_tables && !is_terminal(other->state) && other->phase != PreparePhase::kProbing;
+        // While it probes, or its set grows, a job does not know yet for which set.
+        const bool makes =
+            other->makes_tables && !is_terminal(other->state) && other->phase != PreparePhase::kProbing && !other->set_grows;
         if (other.get() != &job && makes && other->table_key == job.table_key) return other;
     }
     return nullptr;
@@ -74,7 +80,7 @@ bool Coordinator::wait_for_maker(JobRecord& job) {
     if (!job.maker) return false;
     // The state is that before its own tracing, in case the job has to begin again.
     job.makes_tables = false;
-    job.training_begin = {};
+    job.training_begin = job.work_begin = {};
     discard_round(job);
     job.phase = PreparePhase::kWaitingForTables;
     log_info("{}: waits for the tables of {}", job.id, job.maker->id);
@@ -220,6 +226,8 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
     if (!problem.ok()) return reject_result(*job, *units, reference.key, *worker, problem);
     if (auto answer = repeated_result(*job, *units, reference.key, *worker, digest)) return *std::move(answer);
     workers_.unit_succeeded(*worker);
+    // A short unit may be over before a heartbeat tells of it.
+    if (job->work_begin == TimePoint()) job->work_begin = seconds_after(options_.clock(), -trace_seconds);
     TrainingRound& round = *job->round;
     round.add(reference.key.group, {*std::move(data), payload.size(), trace_seconds});
     // A set that is far too large is noticed before hours are spent on it.

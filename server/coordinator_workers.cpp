@@ -117,7 +117,9 @@ Result<std::vector<UnitReference>> Coordinator::heartbeat(const std::string& wor
         }
         held.insert(item.unit);
         if (item.rendering) worker->in_work = item.unit;
-        if (item.rendering && item.unit.key.kind == UnitKind::kRender && !job->rendering) {
+        const bool render = item.unit.key.kind == UnitKind::kRender;
+        if (item.rendering && !render && job->work_begin == TimePoint()) job->work_begin = options_.clock();
+        if (item.rendering && render && !job->rendering) {
             job->rendering = true;
             job->first_render = options_.clock();
             changed(*job);

@@ -22,7 +22,7 @@ void tell_rendering(const JobRecord& job, TimePoint now, JobInfo* info) {
     if (over) {
         info->eta_seconds = 0;
     } else if (job.spec.time_limit_seconds > 0) {
-        info->eta_seconds = std::max(0.0, job.spec.time_limit_seconds - info->render_seconds);
+        info->eta_seconds = std::max(0.0, job.seconds_left(now));
     } else if (info->unit_total > 0) {
         info->eta_seconds = seconds_left(info->render_seconds, info->unit_done, info->unit_total).value_or(info->eta_seconds);
     }
@@ -59,6 +59,12 @@ void tell_preparation(const JobRecord& job, TimePoint now, JobInfo* info) {
 std::optional<double> JobRecord::Learning::seconds_left(TimePoint now) const {
     if (!(share > 0)) return std::nullopt;
     return std::max(0.0, seconds_between(begin, heard) * (1 - share) / share - seconds_between(heard, now));
+}
+
+double JobRecord::seconds_left(TimePoint now) const {
+    const bool learns = state == JobState::kPreparing && work_begin != TimePoint();
+    const double learned = learns ? seconds_between(work_begin, now) : learning_seconds;
+    return spec.time_limit_seconds - learned - (rendering ? seconds_between(first_render, now) : 0);
 }
 
 JobInfo JobRecord::info(TimePoint now) const {

@@ -58,11 +58,14 @@ struct JobRecord {
     std::shared_ptr<const std::string> guide_bytes;  ///< The bytes of the guide, in case the disk loses them.
     bool capped_by_time_limit = false;
     Digest table_key;                  ///< Key of the tables that the job needs; set before `makes_tables` or `maker`.
+    bool set_grows = false;            ///< Whether nobody knows yet which tables the job will make.
     bool makes_tables = false;         ///< Whether the job probes, traces and learns itself.
     bool may_wait = true;              ///< Whether it may wait for another job's tables: not after damage.
     std::shared_ptr<JobRecord> maker;  ///< The job that makes the same tables; this job waits for it.
     TimePoint training_begin;          ///< When the first training unit was leased; unset before.
-    TimePoint round_begin;             ///< The same for the open round.
+    TimePoint work_begin;         ///< When a worker began with the job's first training unit, its scene being there; unset before.
+    double learning_seconds = 0;  ///< From `work_begin` until the tables existed: counts towards the time limit.
+    TimePoint round_begin;        ///< The same for the open round.
     struct Learning {
         TimePoint begin;   ///< Begin of the phase kLearning.
         double share = 0;  ///< Share of the phase that is done, approximately.
@@ -77,6 +80,9 @@ struct JobRecord {
     int running_tasks = 0;
 
     JobInfo info(TimePoint now) const;
+    /// What is left of the time limit; only for a job that has one. Neither reading the scene nor waiting, for workers or for
+    /// the tables of another job, takes any of it.
+    double seconds_left(TimePoint now) const;
     /// The units that can be leased now, or null.
     UnitTable* open_units();
     /// The same if the unit is of their kind and round, otherwise null: a late result of one round does not belong to

@@ -15,6 +15,7 @@
 #include "common/cli/numbers.h"
 #include "common/cli/start.h"
 #include "common/core/atomic_file.h"
+#include "common/core/large_blocks.h"
 #include "common/work/identity.h"
 #include "server/data_lock.h"
 #include "server/grpc_services.h"
@@ -64,6 +65,7 @@ class OwnWorker {
 
 int main(int argc, char** argv) {
     using namespace lightloom;
+    give_back_large_blocks();
     cli::Program app{"The coordinator of Lightloom: accepts jobs, leases their units to workers and merges the results.",
                      "lightloom-server"};
     app.footer(kFooter);

@@ -36,8 +36,10 @@ UnitTable::Failures TrainingRound::refuse(uint32_t unit) {
     return units_.reopen(key(unit));
 }
 
-Result<TrainingData> join(std::vector<TrainingRound::Part> parts, std::stop_token stop) {
-    TrainingData all;
+Result<TrainingData> join(TrainingData all, std::vector<TrainingRound::Part> parts, std::stop_token stop) {
+    std::vector<const TrainingData*> data;
+    for (const TrainingRound::Part& part : parts) data.push_back(&part.data);
+    all.reserve_for(data);
     for (TrainingRound::Part& part : parts) {
         if (stop.stop_requested()) return Status(StatusCode::kCancelled, "stopped while training data were joined");
         LL_RETURN_IF_ERROR(all.append(part.data));
@@ -55,7 +57,7 @@ uint64_t largest_training_payload(const JobSpec& spec, const TrainingWork& work)
     // The bound counts the paths that samples keep, one more for each sample's light sub-path, and the light sub-paths,
     // all of the greatest length, and a sum per block of the frame.
     const FrameLayout& frame = spec.frame;
-    const uint64_t most_blocks = work.total_samples + uint64_t(frame.crop.width() + frame.crop.height() + 1);
+    const uint64_t most_blocks = kTrainingBlocks + uint64_t(frame.crop.width() + frame.crop.height() + 1);
     const uint64_t blocks = std::min(uint64_t(frame.crop.area()), most_blocks);
     const uint64_t path = sizeof(TrainingPath) + uint64_t(spec.max_depth + 3) * sizeof(TrainingVertex);
     const uint64_t paths = (kTrainingPathsPerSample + 1) * work.sample_count + energy_paths(spec, work);

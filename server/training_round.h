@@ -60,9 +60,9 @@ class TrainingRound {
     double traced_seconds_ = 0;
 };
 
-/// Joins all parts into one set, in the order of their units, whatever the order in which they came. kCancelled after a
+/// Appends all parts to `all`, in the order of their units, whatever the order in which they came. kCancelled after a
 /// stop request.
-Result<TrainingData> join(std::vector<TrainingRound::Part> parts, std::stop_token stop);
+Result<TrainingData> join(TrainingData all, std::vector<TrainingRound::Part> parts, std::stop_token stop);
 
 /// Number of light sub-paths with which a unit measures Q. The spec is complete and valid.
 uint64_t energy_paths(const JobSpec& spec, const TrainingWork& work);

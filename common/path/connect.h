@@ -38,7 +38,7 @@ inline void view_camera_suffix(const PathVertex* z, int t, int k, PathView* view
 enum class ViewDetail : uint8_t { kFull, kLightEnd, kSubspace };
 
 /// Sets start[] of a path whose x_0, at `position`, lies on `e` and emits along `w`; fwd[0] must be set.
-/// `direction_pdf` is pdf_direction().
+/// `direction_pdf` is that of EmitterSet::emission_densities().
 inline void view_start(const EmitterSet& emitters, const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w,
                        float direction_pdf, PathView* view) {
     const float inv_position = float(1 / view->fwd[0]);
@@ -77,9 +77,11 @@ Rgb emitter_hit(const Scene& scene, const PathVertex* z, int t, PathView* view) 
     view->k = k;
     view_suffix<detail>(z, t, k, view);
     view->delta[0] = view->discrete_source = false;
-    view->fwd[0] = emitters.pdf_position(e, v.p, v.wo);
-    if (k >= 2) {
-        const float direction_pdf = emitters.pdf_direction(e, v.p, v.ng, v.wo, z[t - 2].p);
+    if (k == 1) {
+        view->fwd[0] = emitters.pdf_position(e, v.p, v.wo);
+    } else {
+        const auto [position_pdf, direction_pdf] = emitters.emission_densities(e, v.p, v.ng, v.wo, z[t - 2].p);
+        view->fwd[0] = position_pdf;
         if constexpr (detail == ViewDetail::kSubspace) view_start(emitters, e, v.p, v.ng, v.wo, direction_pdf, view);
         view->fwd[1] = double(direction_pdf) * v.to_previous;
         view->next_event = emitters.pdf_next_event(e, z[t - 2].p, v.p, v.ng, -v.wo);
@@ -100,9 +102,11 @@ Rgb environment_hit(const Scene& scene, const PathVertex* z, int t, const WalkRa
     view_suffix<detail>(z, t, k, view);
     view->delta[0] = view->discrete_source = false;
     view->rev[0] = ray.pdf;
-    view->fwd[0] = emitters.pdf_position(e, {}, -ray.direction);
-    if (k >= 2) {
-        const float direction_pdf = emitters.pdf_direction(e, {}, {}, -ray.direction, z[t - 1].p);
+    if (k == 1) {
+        view->fwd[0] = emitters.pdf_position(e, {}, -ray.direction);
+    } else {
+        const auto [position_pdf, direction_pdf] = emitters.emission_densities(e, {}, {}, -ray.direction, z[t - 1].p);
+        view->fwd[0] = position_pdf;
         if constexpr (detail == ViewDetail::kSubspace) view_start(emitters, e, {}, {}, -ray.direction, direction_pdf, view);
         view->fwd[1] = double(direction_pdf) * abs_dot(z[t - 1].ng, ray.direction);
         view->next_event = emitters.pdf_next_event(e, {}, {}, {}, ray.direction);
@@ -131,11 +135,11 @@ Rgb next_event(const Scene& scene, const PathVertex* z, int t, const NextEventSa
     view->delta[0] = view->delta[1] = false;
     view->discrete_source = e.is_discrete();
     view->rev[0] = e.can_be_hit() ? double(s.pdf_fwd) * light.geometry : 0.0;
-    view->fwd[0] = emitters.pdf_position(e, light.position, -light.wi);
+    const auto [position_pdf, direction_pdf] = emitters.emission_densities(e, light.position, light.normal, -light.wi, v.p);
+    view->fwd[0] = position_pdf;
     view->next_event = light.pdf;
     const float receiver = abs_dot(v.ng, light.wi);
     const float inv_d2 = e.is_infinite() ? 1.0f : 1 / length_squared(light.position - v.p);
-    const float direction_pdf = emitters.pdf_direction(e, light.position, light.normal, -light.wi, v.p);
     view->fwd[1] = double(direction_pdf) * (receiver * inv_d2);
     if constexpr (detail == ViewDetail::kSubspace) {
         view_start(emitters, e, light.position, light.normal, -light.wi, direction_pdf, view);

@@ -3,7 +3,7 @@
 //     L, l   places and departures as learned,    g, d  power_places, power_directions
 // the joint density is
 //     b P p + (1 - b) Q q,    Q = g P + (1 - g) L,    q = d p + (1 - d) l,
-// of which pdf_position() is the marginal b P + (1 - b) Q, and pdf_direction() the rest.
+// of which EmissionDensities::position is the marginal b P + (1 - b) Q, and direction the rest.
 #include "common/core/math.h"
 #include "common/scene/emitter.h"
 #include "common/scene/emitter_square.h"
@@ -49,19 +49,19 @@ float EmitterSet::pdf_position(const Emitter& e, const Vec3& position, const Vec
     return data.power_share * by_power + (1 - data.power_share) * learned;
 }
 
-float EmitterSet::pdf_direction(const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w, const Vec3& x1) const {
-    const float by_power = departure_by_power(e, normal, w);
+EmissionDensities EmitterSet::emission_densities(const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w,
+                                                 const Vec3& x1) const {
+    const float place_power = place_by_power(e, w), by_power = departure_by_power(e, normal, w);
     if (!learned_) [[likely]]
-        return by_power;
+        return {place_power, by_power};
     const EmissionData& data = learned_->data();
-    const float place_power = place_by_power(e, w);
     const float place = data.power_places * place_power + (1 - data.power_places) * learned_place(e, position, w);
     const float learned =
         data.power_directions * by_power + (1 - data.power_directions) * learned_departure(e, position, normal, w, x1);
     // The marginal may exceed the range of single precision's reciprocal; ratios of both shares do not.
     const float of_power = data.power_share * place_power, of_learned = (1 - data.power_share) * place;
     const float marginal = of_power + of_learned;
-    return marginal > 0 ? (of_power / marginal) * by_power + (of_learned / marginal) * learned : 0;
+    return {marginal, marginal > 0 ? (of_power / marginal) * by_power + (of_learned / marginal) * learned : 0};
 }
 
 void EmitterSet::sample_learned(double pick, Vec2 u_position, Vec2 u_direction, EmissionSample* out) const {

@@ -178,8 +178,8 @@ bool EmitterSet::sample_emission(double pick, Vec2 u_position, Vec2 u_direction,
         sample_learned(pick, u_position, u_direction, out);
     }
     const Emitter& e = emitters_[out->emitter];
-    out->pdf_position = pdf_position(e, out->position, out->direction);
-    out->pdf_direction = pdf_direction(e, out->position, out->normal, out->direction, out->position);
+    const EmissionDensities densities = emission_densities(e, out->position, out->normal, out->direction, out->position);
+    out->pdf_position = densities.position, out->pdf_direction = densities.direction;
     if (!(out->pdf_position > 0)) return false;
     if (!(out->pdf_direction > 0)) return true;
     const float cosine = e.is_area() ? abs_dot(out->normal, out->direction) : 1;

@@ -61,6 +61,13 @@ struct EmissionSample {
     float pdf_direction = 0;  ///< Solid angle for finite lights; area on the disc facing the scene, m^-2, for infinite ones.
 };
 
+/// Densities of the start of a light sub-path.
+struct EmissionDensities {
+    float position = 0;   ///< Of x_0; native measure, probability of the emitter included.
+    float direction = 0;  ///< Given x_0: solid angle for finite lights; for infinite ones, whose x_0 is the direction, area
+                          ///< across the ray, m^-2.
+};
+
 /// A point x_0 that was chosen from a reference point.
 struct NextEventSample {
     uint32_t emitter = 0;
@@ -124,9 +131,10 @@ class EmitterSet {
     /// pL of x_0: density of sample_emission() for the point at `position`, native measure, probability of the emitter
     /// included. `w` as above (environment).
     float pdf_position(const Emitter& e, const Vec3& position, const Vec3& w) const;
-    /// Density of the emission direction `w` given x_0 at `position`, whose geometric normal is `normal`: solid angle for
-    /// finite lights. For infinite ones, whose x_0 is `w`, it is the density of the ray through `x1` per area across it.
-    float pdf_direction(const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w, const Vec3& x1) const;
+    /// pdf_position() of x_0, and the density of the emission direction `w` given x_0; `normal` is the geometric one there. `x1` is
+    /// a point that the light passes.
+    EmissionDensities emission_densities(const Emitter& e, const Vec3& position, const Vec3& normal, const Vec3& w,
+                                         const Vec3& x1) const;
     /// Density of sample_next_event() at x_0, native measure, pmf included. `position`, `normal` at x_0; `wi` from the
     /// reference point to it.
     float pdf_next_event(const Emitter& e, const Vec3& reference, const Vec3& position, const Vec3& normal, const Vec3& wi) const;

@@ -29,14 +29,19 @@ struct TrainingOptions {
     double reuse_target = 200;     ///< M0: prefixes that a subspace should hold.
     int reuse_windows = 1;         ///< J_max.
     double nominal_paths = 1;      ///< Light paths of the smallest cache that rendering will make.
-    /// How light left the lights where the data were traced, and how it will in the render; null: both alike.
+    /// How light left the lights where the data were traced (those of the last round, if there are several), and how it
+    /// will in the render; null: both alike.
     const EmitterSet* traced = nullptr;
     const EmitterSet* rendered = nullptr;
     uint64_t seed = 0;
+    const SubspaceTables* judged = nullptr;  ///< Other tables of the scene, for TrainingReport::judged_loss.
 };
 
 struct TrainingReport {
     GammaReport gamma;
+    /// Loss of TrainingOptions::judged on the paths whose loss of the result is `gamma.loss` (trainer mm): what both have
+    /// not been trained with. 0 if there is nothing to judge.
+    double judged_loss = 0;
     uint32_t light_subspaces = 0, eye_subspaces = 0;  ///< Subspaces in the tables; at most as many as asked for.
     uint64_t paths = 0, nodes = 0;
     uint64_t out_of_range = 0;  ///< Paths and light sub-paths that were left out; see TrainingData::in_range().
@@ -48,9 +53,13 @@ struct TrainingReport {
 struct TrainingControl {
     std::stop_token stop;
     std::function<void(double)> progress;  ///< Optional; called now and then with the approximate share of time passed.
+    /// Optional; called when the data are needed no more, while most of the training is still to come, so that their owner
+    /// may free them.
+    std::function<void()> data_read;
 };
 
-/// Brightness of every block: its mean estimate, smoothed over 3 x 3 blocks, plus a tenth of the frame's mean.
+/// Brightness of every block: its mean estimate, smoothed, plus a tenth of the frame's mean. Blocks are joined until one
+/// has about 200 samples, and then smoothed over 3 x 3.
 std::vector<double> block_brightness(const TrainingData& data);
 
 /// Returns kCancelled within about a second of a stop request, and otherwise valid tables, whatever the data hold.

@@ -284,8 +284,9 @@ EmissionData train_emission(const TrainingData& data, const std::vector<double>&
         float weight = float(double(p.estimate) / brightness[p.block]);
         if (p.vertex_count == 3) weight *= kDirectLight;
         if (!(weight > 0) || !std::isfinite(weight)) continue;
-        const bool infinite = emitters[v[0].emitter].is_infinite();
-        lessons.push_back({infinite ? v[0].normal : v[0].position, v[1].position, v[0].emitter, weight});
+        const bool infinite = emitters[p.emitter].is_infinite();
+        const Vec3 travel = v[0].normal;
+        lessons.push_back({infinite ? travel : v[0].position, v[1].position, p.emitter, weight});
     }
     if (lessons.empty() || stop.stop_requested()) return {};
     join_equal(&lessons);

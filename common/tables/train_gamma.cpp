@@ -29,7 +29,8 @@ struct Level {
 };
 
 /// The training problem on one level: evaluates and improves a matrix B (column-major). Columns that no path uses are
-/// left alone: the loss does not depend on them, and nothing but the prior is known of them.
+/// left alone: the loss does not depend on them, and nothing but the prior is known of them. A node's entry of B and its
+/// gain are derived from its finest labels wherever they are needed: stored, they would be the largest arrays of all.
 class LevelProblem {
   public:
     LevelProblem(const GammaDataset& data, uint32_t bits, double mix) : data_(&data), level_(data, bits), mix_(mix) {
@@ -38,27 +39,18 @@ class LevelProblem {
         const double total = std::accumulate(energy_.begin(), energy_.end(), 0.0);
         floor_.reserve(energy_.size());
         for (const double q : energy_) floor_.push_back(0.5 / level_.light_count + 0.5 * q / total);
-        cells_.reserve(data.nodes.size());
-        gains_.reserve(data.nodes.size());
-        std::vector<bool> named(level_.eye_count);
-        for (const GammaNode& n : data.nodes) {
-            const uint32_t i = level_.light(n.light), j = level_.eye(n.eye);
-            named[j] = true;
-            cells_.push_back(j * level_.light_count + i);
-            // g holds 1 / Q of the finest subspace; Gamma_IJ Q_i / Q_I is its lifted entry [common/path/README.md, "Nested
-            // families"].
-            gains_.push_back(float(double(n.g) * double(data.energy[n.light]) / energy_[i]));
+        // g holds 1 / Q of the finest subspace; Gamma_IJ Q_i / Q_I is its lifted entry [common/path/README.md, "Nested
+        // families"].
+        for (uint32_t i = 0; i < data.light_count; ++i) {
+            const double share = double(data.energy[i]) / energy_[level_.light(i)];
+            row_.push_back(level_.light(i));
+            gain_.push_back(float((1 - mix) * share));
+            floor_gain_.push_back(float(mix * share * floor_[row_.back()]));
         }
+        std::vector<bool> named(level_.eye_count);
+        for (const GammaNode& n : data.nodes) named[level_.eye(n.eye)] = true;
         for (uint32_t j = 0; j < level_.eye_count; ++j)
             if (named[j]) columns_.push_back(j);
-        fixed_.reserve(data.paths.size());
-        for (const GammaPath& p : data.paths) {
-            double floor_share = 0;
-            for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n)
-                floor_share += double(gains_[n]) * floor_[level_.light(data.nodes[n].light)];
-            fixed_.push_back(double(p.fixed) + mix * floor_share);
-        }
-        for (float& gain : gains_) gain *= float(1 - mix);
     }
     const Level& level() const { return level_; }
     size_t size() const { return size_t(level_.light_count) * level_.eye_count; }
@@ -97,33 +89,43 @@ class LevelProblem {
         return gamma;
     }
     double loss(const std::vector<float>& b, const std::vector<uint32_t>& paths) const {
-        double sum = 0;
-        for (const uint32_t x : paths) {
-            const double f = density(x, b);
-            if (f > 0) sum += double(data_->paths[x].weight) / f;
-        }
-        return paths.empty() ? 0 : sum / double(paths.size());
+        // The parts do not depend on the number of threads, and neither does their sum.
+        std::vector<double> parts((paths.size() + kLossPart - 1) / kLossPart);
+        fork_join(parts.size(), [&](size_t first, size_t last) {
+            for (size_t part = first; part < last; ++part) {
+                const size_t end = std::min(paths.size(), (part + 1) * kLossPart);
+                for (size_t x = part * kLossPart; x < end; ++x) {
+                    const double f = density(paths[x], b);
+                    if (f > 0) parts[part] += double(data_->paths[paths[x]].weight) / f;
+                }
+            }
+        });
+        return paths.empty() ? 0 : std::accumulate(parts.begin(), parts.end(), 0.0) / double(paths.size());
     }
     /// Negative gradient of the loss' sum with respect to B, in the columns that paths use; the others of `out` are not
-    /// touched.
+    /// touched. `out` may become larger than B: what lies behind is working memory.
     void gradient(const std::vector<float>& b, const uint32_t* begin, const uint32_t* end, std::vector<double>* out) const {
+        const size_t paths = size_t(end - begin);
+        // A sum is cleared and added up for each slice, which few paths are not worth. No thread count may decide here:
+        // the order of a sum would depend on it.
+        const size_t nodes = size_t(double(data_->nodes.size()) * double(paths) / double(std::max<size_t>(1, data_->paths.size())));
+        const size_t slices = std::clamp(nodes / (2 * size()), size_t(1), kMostSlices);
+        out->resize(std::max(out->size(), slices * size()));
+        fork_join(slices, [&](size_t first, size_t last) {
+            for (size_t slice = first; slice < last; ++slice)
+                add_gradient(b, begin + paths * slice / slices, begin + paths * (slice + 1) / slices, &(*out)[slice * size()]);
+        });
+        if (slices == 1) return;
         for_columns(columns_.size(), [&](size_t k) {
             double* column = &(*out)[size_t(columns_[k]) * level_.light_count];
-            std::fill(column, column + level_.light_count, 0.0);
+            for (size_t slice = 1; slice < slices; ++slice)
+                for (uint32_t i = 0; i < level_.light_count; ++i) column[i] += column[slice * size() + i];
         });
-        for (const uint32_t* x = begin; x != end; ++x) {
-            const GammaPath& p = data_->paths[*x];
-            const double f = density(*x, b);
-            if (!(f > 0)) continue;
-            const double scale = double(p.weight) / (f * f);
-            for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n) (*out)[cells_[n]] += scale * double(gains_[n]);
-        }
     }
     /// One majorise-minimise step per column: B <- sqrt(B^2 G + lambda Gbar pi^2), normalised [common/path/README.md, "Trainer"].
     /// `g` is working memory for a gradient.
     void improve(std::vector<float>* b, const std::vector<float>& prior, double lambda, const std::vector<uint32_t>& paths,
                  std::vector<double>* g) const {
-        g->resize(b->size());
         gradient(*b, paths.data(), paths.data() + paths.size(), g);
         std::vector<double> sums(columns_.size());
         for_columns(columns_.size(), [&](size_t k) {
@@ -151,11 +153,33 @@ class LevelProblem {
             for (size_t j = first; j < last; ++j) body(j);
         });
     }
+    /// Most parts of the paths whose gradients are summed at the same time, each in a matrix of its own.
+    static constexpr size_t kMostSlices = 4;
+    static constexpr size_t kLossPart = 4096;
+
+    size_t cell(const GammaNode& n) const { return size_t(level_.eye(n.eye)) * level_.light_count + row_[n.light]; }
+    /// F of a path.
     double density(uint32_t path, const std::vector<float>& b) const {
         const GammaPath& p = data_->paths[path];
-        double f = fixed_[path];
-        for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n) f += double(gains_[n]) * double(b[cells_[n]]);
+        double f = double(p.fixed);
+        for (uint32_t k = p.first_node; k < p.first_node + p.node_count; ++k) {
+            const GammaNode& n = data_->nodes[k];
+            f += double(n.g) * (double(gain_[n.light]) * double(b[cell(n)]) + double(floor_gain_[n.light]));
+        }
         return f;
+    }
+    void add_gradient(const std::vector<float>& b, const uint32_t* begin, const uint32_t* end, double* out) const {
+        for (const uint32_t column : columns_) std::fill_n(out + size_t(column) * level_.light_count, level_.light_count, 0.0);
+        for (const uint32_t* x = begin; x != end; ++x) {
+            const GammaPath& p = data_->paths[*x];
+            const double f = density(*x, b);
+            if (!(f > 0)) continue;
+            const double scale = double(p.weight) / (f * f);
+            for (uint32_t k = p.first_node; k < p.first_node + p.node_count; ++k) {
+                const GammaNode& n = data_->nodes[k];
+                out[cell(n)] += scale * double(n.g) * double(gain_[n.light]);
+            }
+        }
     }
     uint32_t finest_light(uint32_t i) const {
         return i < level_.coarse_sources ? i << level_.bits : data_->source_count + ((i - level_.coarse_sources) << level_.bits);
@@ -167,9 +191,9 @@ class LevelProblem {
     std::vector<double> energy_;
     std::vector<double> floor_;      ///< What the mix adds to an entry, by light label.
     std::vector<uint32_t> columns_;  ///< Columns that a path uses, ascending.
-    std::vector<uint32_t> cells_;    ///< By node: its entry of B.
-    std::vector<float> gains_;       ///< By node: dF / dB.
-    std::vector<double> fixed_;      ///< By path: F for B = 0.
+    // By finest light label: its label on this level, and by how much B and the mix raise F per unit of g.
+    std::vector<uint32_t> row_;
+    std::vector<float> gain_, floor_gain_;
 };
 
 constexpr double kStrengths[] = {0.01, 0.1, 1, 10, 100};
@@ -180,37 +204,56 @@ constexpr int kCoarseSteps = 4, kStepsPerStrength = 4, kFinalSteps = 3;
 /// is on the fine levels.
 constexpr uint32_t kFineBits = 2;
 
-/// Counts the steps on the finest levels, which take nearly all the time, and reports the share that is done.
+/// Counts the steps on the finest levels, which take nearly all the time, and reports the share that is done. A level
+/// seldom tries more than three strengths, so that share is as if each tried three.
 class Steps {
   public:
     Steps(uint32_t coarsest_bits, const std::function<void(double)>& report)
-        : total_((int(std::min(coarsest_bits, kFineBits)) + 1) * int(std::size(kStrengths)) * kStepsPerStrength + kFinalSteps),
+        : levels_(int(std::min(coarsest_bits, kFineBits)) + 1),
           report_(report) {}
     void done_on(uint32_t bits) {
-        if (bits <= kFineBits && report_) report_(double(++done_) / total_);
+        if (bits > kFineBits) return;
+        done_ = std::min(done_ + 1, level_ * kPerLevel + kPerLevel);
+        tell();
+    }
+    void level_done(uint32_t bits) {
+        if (bits > kFineBits) return;
+        done_ = ++level_ * kPerLevel;
+        tell();
     }
 
   private:
-    int total_, done_ = 0;
+    static constexpr int kPerLevel = 3 * kStepsPerStrength;
+    void tell() const {
+        if (report_) report_(double(done_) / (levels_ * kPerLevel + kFinalSteps));
+    }
+
+    int levels_, level_ = 0, done_ = 0;
     const std::function<void(double)>& report_;
 };
 
-std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& options, GammaReport* report) {
+/// The paths that train, and those that judge.
+std::pair<std::vector<uint32_t>, std::vector<uint32_t>> divide(const GammaDataset& data, const GammaOptions& options) {
     // A light sub-path with paths in both parts would confirm itself; therefore whole batches judge where there are
     // enough of them. Where there are few, camera samples judge. Those of a guided round then still share light
     // sub-paths with paths that train, and the prior comes out weaker.
     constexpr uint32_t kFewBatches = 5;
     uint32_t batches = 0;
     for (const GammaPath& p : data.paths) batches = std::max(batches, p.batch + 1);
-    std::vector<uint32_t> train, judge;
+    std::pair<std::vector<uint32_t>, std::vector<uint32_t>> parts;
     for (uint32_t x = 0; x < data.paths.size(); ++x) {
         const double batch = data.paths[x].batch;
         const uint64_t h = mix64(options.seed ^ mix64(data.paths[x].sample + 0x51ull));
         const bool judges = batches < kFewBatches
                                 ? double(h >> 11) * 0x1p-53 < options.held_out
                                 : std::floor((batch + 1) * options.held_out) > std::floor(batch * options.held_out);
-        (judges ? judge : train).push_back(x);
+        (judges ? parts.second : parts.first).push_back(x);
     }
+    return parts;
+}
+
+std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& options, GammaReport* report) {
+    const auto [train, judge] = divide(data, options);
     std::vector<uint32_t> all(data.paths.size());
     std::iota(all.begin(), all.end(), 0u);
 
@@ -223,21 +266,36 @@ std::vector<float> train_mm(const GammaDataset& data, const GammaOptions& option
     report->uniform_loss = problem.loss(prior, judge);
     double best_loss = report->uniform_loss;
     std::vector<double> room;
+    int tried = int(std::size(kStrengths)) / 2;  // index of the strength that the last level took
     while (true) {
         const bool finest = bits == 0;
         std::vector<float> best_b = prior;
         double level_loss = HUGE_VAL, strength = 0;
-        for (const double lambda : kStrengths) {
-            if (bits > kFineBits && lambda != kCoarseStrength) continue;
+        const auto try_strength = [&](double lambda) {
             std::vector<float> candidate = b;
-            for (int i = 0; i < (bits > kFineBits ? kCoarseSteps : kStepsPerStrength); ++i) {
-                if (options.stop.stop_requested()) return b;
+            for (int i = 0; i < (bits > kFineBits ? kCoarseSteps : kStepsPerStrength) && !options.stop.stop_requested(); ++i) {
                 problem.improve(&candidate, prior, lambda, train, &room);
                 steps.done_on(bits);
             }
             const double loss = problem.loss(candidate, judge);
-            if (loss < level_loss) level_loss = loss, strength = lambda, best_b = std::move(candidate);
+            const bool better = loss < level_loss;
+            if (better) level_loss = loss, strength = lambda, best_b = std::move(candidate);
+            return better;
+        };
+        if (bits > kFineBits) {
+            try_strength(kCoarseStrength);
+        } else {
+            // The best strength of one level is near that of the level before, and the loss has one minimum in between.
+            const int begin = tried;
+            try_strength(kStrengths[begin]);
+            for (const int way : {-1, 1}) {
+                int next = begin + way;
+                while (next >= 0 && next < int(std::size(kStrengths)) && try_strength(kStrengths[next])) tried = next, next += way;
+                if (tried != begin) break;
+            }
         }
+        if (options.stop.stop_requested()) return b;
+        steps.level_done(bits);
         if (level_loss < best_loss) {
             best_loss = level_loss;
             report->prior_strength = strength;
@@ -325,19 +383,28 @@ std::vector<float> train_contribution(const GammaDataset& data, const GammaOptio
     return problem.mixed(b);
 }
 
+double path_loss(const GammaDataset& data, const std::vector<float>& gamma, size_t x) {
+    const GammaPath& p = data.paths[x];
+    double f = double(p.fixed);
+    for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n)
+        f += double(data.nodes[n].g) * double(gamma[size_t(data.nodes[n].eye) * data.light_count + data.nodes[n].light]);
+    return f > 0 ? double(p.weight) / f : 0;
+}
+
 }  // namespace
 
 double gamma_loss(const GammaDataset& data, const std::vector<float>& gamma, size_t first, size_t stride) {
     double sum = 0;
     size_t count = 0;
-    for (size_t x = first; x < data.paths.size(); x += stride, ++count) {
-        const GammaPath& p = data.paths[x];
-        double f = double(p.fixed);
-        for (uint32_t n = p.first_node; n < p.first_node + p.node_count; ++n)
-            f += double(data.nodes[n].g) * double(gamma[size_t(data.nodes[n].eye) * data.light_count + data.nodes[n].light]);
-        if (f > 0) sum += double(p.weight) / f;
-    }
+    for (size_t x = first; x < data.paths.size(); x += stride, ++count) sum += path_loss(data, gamma, x);
     return count ? sum / double(count) : 0;
+}
+
+double held_out_loss(const GammaDataset& data, const std::vector<float>& gamma, const GammaOptions& options) {
+    double sum = 0;
+    const std::vector<uint32_t> judge = divide(data, options).second;
+    for (const uint32_t x : judge) sum += path_loss(data, gamma, x);
+    return judge.empty() ? 0 : sum / double(judge.size());
 }
 
 std::vector<float> train_gamma(const GammaDataset& data, const GammaOptions& options, GammaReport* report) {

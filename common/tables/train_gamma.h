@@ -61,6 +61,9 @@ struct GammaReport {
 /// Returns Gamma, column-major (eye * light_count + light); every column sums to one, every entry is positive.
 std::vector<float> train_gamma(const GammaDataset& data, const GammaOptions& options, GammaReport* report);
 
+/// The loss of any Gamma over the paths of a dataset that only judge where the trainer is mm.
+double held_out_loss(const GammaDataset& data, const std::vector<float>& gamma, const GammaOptions& options);
+
 /// The loss of a Gamma over the paths first, first + stride, ... of a dataset, divided by their number.
 double gamma_loss(const GammaDataset& data, const std::vector<float>& gamma, size_t first = 0, size_t stride = 1);
 

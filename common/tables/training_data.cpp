@@ -8,7 +8,7 @@ namespace lightloom {
 namespace {
 
 struct Header {
-    char magic[8] = {'L', 'L', 'T', 'R', 'A', 'I', 'N', '3'};
+    char magic[8] = {'L', 'L', 'T', 'R', 'A', 'I', 'N', '4'};
     int32_t blocks_x = 0, blocks_y = 0;
     uint64_t samples = 0, light_samples = 0, path_count = 0, light_path_count = 0, vertex_count = 0;
 };
@@ -53,6 +53,13 @@ Status TrainingData::append(const TrainingData& other, uint64_t max_vertices) {
     return {};
 }
 
+void TrainingData::reserve_for(const std::vector<const TrainingData*>& parts) {
+    size_t more_paths = paths.size(), more_light = light_paths.size(), more_vertices = vertices.size();
+    for (const TrainingData* part : parts)
+        more_paths += part->paths.size(), more_light += part->light_paths.size(), more_vertices += part->vertices.size();
+    paths.reserve(more_paths), light_paths.reserve(more_light), vertices.reserve(more_vertices);
+}
+
 Status TrainingData::validate(size_t emitter_count) const {
     if (blocks_x < 1 || blocks_y < 1 || block_sum.size() != size_t(blocks_x) * size_t(blocks_y))
         return data_loss("the training data have no frame");
@@ -60,15 +67,14 @@ Status TrainingData::validate(size_t emitter_count) const {
     for (const std::vector<TrainingPath>* list : {&paths, &light_paths}) {
         for (const TrainingPath& p : *list) {
             if (p.vertex_count < 1 || uint64_t(p.first_vertex) + p.vertex_count > vertices.size() || p.block >= block_sum.size() ||
-                vertices[p.first_vertex].emitter >= emitter_count)
+                p.emitter >= emitter_count)
                 return data_loss("the training data have a malformed path");
         }
     }
-    // Classifiers sort by these values, so that none may be NaN.
-    const auto finite = [](const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
-    for (const TrainingVertex& v : vertices)
-        if (!finite(v.position) || !finite(v.normal))
-            return data_loss("the training data have a vertex whose position or normal is not finite");
+    // Classifiers sort by positions, so that none may be NaN. Every packed normal is one.
+    for (const auto& [p, normal, density] : vertices)
+        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+            return data_loss("the training data have a vertex whose position is not finite");
     return {};
 }
 

@@ -21,16 +21,17 @@
 #include <string_view>
 #include <vector>
 
+#include "common/core/packed_normal.h"
 #include "common/core/result.h"
 #include "common/core/vec.h"
 
 namespace lightloom {
 
+/// There are some fifty of them per camera sample, which is nearly all of the data: hence 20 bytes.
 struct TrainingVertex {
     Vec3 position;
-    Vec3 normal;           ///< Geometric; x_0 of an infinite light: direction of travel. The lens has none.
-    float density = 0;     ///< Paths: see above. Light sub-paths: scalar throughput; 0 where not connectible.
-    uint32_t emitter = 0;  ///< Set for x_0 only.
+    PackedNormal normal;  ///< Geometric; x_0 of an infinite light: direction of travel. The lens has none.
+    float density = 0;    ///< Paths: see above. Light sub-paths: scalar throughput; 0 where not connectible.
 };
 
 /// Lengths of camera sub-paths that are told apart, and paths that a camera sample keeps of each.
@@ -39,10 +40,14 @@ inline constexpr int kTrainingLengths = 4, kTrainingPathsPerLength = 2;
 /// Most paths that a camera sample keeps; they are neighbours in TrainingData::paths.
 inline constexpr size_t kTrainingPathsPerSample = size_t(kTrainingLengths) * kTrainingPathsPerLength;
 
+/// Blocks into which the frame is divided, about; learning joins them where samples are few.
+inline constexpr uint64_t kTrainingBlocks = 2500;
+
 struct TrainingPath {
     uint32_t first_vertex = 0;
     uint32_t vertex_count = 0;  ///< k + 1, x_0 ... x_k; light sub-paths: y_0 ... y_{n-1}.
     uint32_t block = 0;         ///< Index of the pixel's block in the frame. Light sub-paths: 0.
+    uint32_t emitter = 0;       ///< Of x_0.
     float estimate = 0, square = 0;
     float next_event = 0, lens = 0;  ///< Densities; see above. Light sub-paths: 0.
 };
@@ -62,6 +67,9 @@ struct TrainingData {
     /// Appends another unit's data of the same frame; kInvalidArgument for data of another frame, kResourceExhausted
     /// above `max_vertices`.
     Status append(const TrainingData& other, uint64_t max_vertices = kMaxVertices);
+    /// Makes room for as much as all of `parts` hold, so that appending them copies nothing twice. Until it is filled the
+    /// room takes addresses, but no memory.
+    void reserve_for(const std::vector<const TrainingData*>& parts);
     /// Checks everything that training relies on. Estimates, squares, densities and sums may exceed the range of their
     /// type in an extreme scene; see in_range().
     Status validate(size_t emitter_count) const;

@@ -6,16 +6,13 @@
 namespace lightloom {
 namespace {
 
-/// Share of the training set that is traced first, with emission by power.
-constexpr double kEmissionPilot = 0.3;
-
 constexpr const TablePart* kParts[] = {&EmissionPart::kPart};
 
 bool wanted(const AlgorithmSettings& settings) { return learns_emission(settings); }
 
 LearningPlan plan(const AlgorithmSettings& s) {
     const uint64_t samples = uint64_t(s.value(kTrainingPaths));
-    return {.samples = samples, .energy_paths = 0, .rounds = rounds_with_pilot(samples, kEmissionPilot)};
+    return {.samples = samples, .energy_paths = 0, .rounds = growing_rounds(samples)};
 }
 
 Result<Tables> learn_table(const LearnRequest& request) {

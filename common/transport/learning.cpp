@@ -24,12 +24,21 @@ Result<Tables> learn(const LearnRequest& request) {
     return tables;
 }
 
-std::vector<LearningRound> rounds_with_pilot(uint64_t samples, double pilot_share) {
-    const uint64_t units = samples / kTrainingUnitSamples;
-    if (pilot_share <= 0 || units < 2) return {{samples}};
-    const uint64_t pilot =
-        kTrainingUnitSamples * std::clamp(uint64_t(std::llround(pilot_share * double(units))), uint64_t(1), units - 1);
-    return {{pilot}, {samples - pilot, true}};
+std::vector<LearningRound> growing_rounds(uint64_t samples) {
+    if (samples < 2 * kPilotSamples) return {{samples}};
+    if (samples < 2 * kGuideSamples) return {{kPilotSamples}, {samples - kPilotSamples, true}};
+    return {{kPilotSamples}, {kGuideSamples - kPilotSamples, true}, {samples - kGuideSamples, true}};
+}
+
+std::vector<uint64_t> larger_sets(uint64_t samples, uint64_t most) {
+    std::vector<uint64_t> sizes;
+    if (samples == kPilotSamples) {
+        for (uint64_t n = 2 * samples; n <= std::min(most, kGuideSamples); n *= 2) sizes.push_back(n);
+    } else if (samples == kGuideSamples && most >= 2 * samples) {
+        for (uint64_t n = 2 * samples; n < most; n *= 2) sizes.push_back(n);
+        sizes.push_back(most);
+    }
+    return sizes;
 }
 
 }  // namespace lightloom

@@ -23,12 +23,11 @@ constexpr ParameterInfo kParameters[] = {
      "light sub-paths that count the vertices per path before rendering, and from which emission=learned learns"},
 };
 constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &SubspaceTables::kPart};
-constexpr double kPilot = 0.3;  ///< Share of the training set that is traced with emission by power before emission is learned.
 
 LearningPlan plan(const AlgorithmSettings& s) {
     const uint64_t samples = uint64_t(s.value(kTrainingPaths));
     return {.samples = samples,
-            .rounds = rounds_with_pilot(samples, learns_emission(s) ? kPilot : 0),
+            .rounds = learns_emission(s) ? growing_rounds(samples) : std::vector<LearningRound>{{samples}},
             .connections = CacheParameters::of(s).connections};
 }
 

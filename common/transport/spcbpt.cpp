@@ -24,11 +24,11 @@ constexpr ParameterInfo kParameters[] = {
     {"eye-subspaces", 1000, 1, 16384, true, "N_E: upper bound of the eye subspaces [Su et al. 2022, section 8.1]"},
     {"source-share", 0.2, 0, 1, false, "share of N_L that divides the lights themselves [Su et al. 2022, section 7.2.1]"},
     {kTrainingPaths, 500000, 1, 1e8, true,
-     "D: camera samples of the training set, each with a light sub-path [Su et al. 2022: 1e6]"},
+     "D: camera samples of the training set, each with a light sub-path; at most, where a job settles it [Su et al. 2022: 1e6]"},
     {"energy-paths", 1, 0.01, 16, false,
      "M' over D: light sub-paths that measure Q, per camera sample of the training set [Su et al. 2022: 2]"},
-    {"pilot", 0.2, 0, 1, false,
-     "share of the training set that is traced first, to guide the tracing of the rest; 0: no second round [own; measured]"},
+    {"pilot", 1, 0, 1, true,
+     "the first paths of the training set, which nothing guides, guide the tracing of the rest [own; measured]", kSwitch},
     {"direction-weight", 0.05, 0, 10, false, "k_d: weight of directions in the distance of sub-paths [Su et al. 2022, eq. 18]"},
     {"mix", 0.1, 0.001, 1, false,
      "share of Gamma that is not learned: half uniform, half in proportion to Q "
@@ -59,9 +59,11 @@ Correction correction_of(const AlgorithmSettings& s) {
 
 LearningPlan plan(const AlgorithmSettings& s) {
     const uint64_t samples = uint64_t(s.value(kTrainingPaths));
+    const bool grows = s.value("pilot") != 0;
     return {.samples = samples,
             .energy_paths = s.value("energy-paths"),
-            .rounds = rounds_with_pilot(samples, s.value("pilot")),
+            .rounds = grows ? growing_rounds(samples) : std::vector<LearningRound>{{samples}},
+            .grows = grows,
             .connections = CacheParameters::of(s).connections,
             .correction = correction_of(s),
             .rays = next_event_beside_cache_of(s)};
@@ -82,6 +84,8 @@ Result<Tables> learn(const LearnRequest& r) {
     options.reuse_target = s.value("reuse-target");
     options.nominal_paths = double(p.minimum_paths);
     options.seed = r.settings.seed;
+    const auto guide = r.guide.get<SubspaceTables>();
+    options.judged = r.judges_guide ? guide.get() : nullptr;
     EmissionLesson emission = learn_emission(r);
     emission.tell(&options);
     auto tables = train_tables(r.data, r.emitters, options, r.control, r.report);

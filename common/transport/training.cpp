@@ -18,7 +18,6 @@ namespace {
 
 constexpr uint64_t kTrainingSeed = 0x7472'6169'6e69'6e67ull;
 constexpr uint64_t kChunk = kTrainingChunkSamples;
-constexpr double kSamplesPerBlock = 200;
 
 /// The affinity while nothing is learned: one draw per prefix and unit of its throughput.
 struct UnlearnedAffinity {
@@ -50,12 +49,13 @@ class Reservoir {
         contribution_ = contribution;
         path_.vertex_count = uint32_t(k + 1);
         vertices_.resize(size_t(k) + 1);
-        vertices_[0] = {c.position, c.normal, 0, c.emitter};
+        path_.emitter = c.emitter;
+        vertices_[0] = {c.position, c.normal, 0};
         for (int i = 1; i < k; ++i) {
             const SubPathVertex& v = i < c.technique.light_vertices() ? c.y[i] : c.z[k - i];
-            vertices_[size_t(i)] = {v.p, v.ng, 0, 0};
+            vertices_[size_t(i)] = {v.p, v.ng, 0};
         }
-        vertices_[size_t(k)] = {c.z[0].p, {}, 0, 0};
+        vertices_[size_t(k)] = {c.z[0].p, {}, 0};
         view_throughput(c.y, c.technique.light_vertices(), c.z, &view);
         view_footprint(render.emitters[c.emitter], c.y, c.technique.light_vertices(), c.z, c.t, &view);
         const double inverse_own = double(c.inverse_density) * scale / double(c.survival);
@@ -123,21 +123,21 @@ void keep_light_path(const LightSubPath& y, int n, int max_edges, TrainingData* 
     TrainingPath path;
     path.first_vertex = uint32_t(data->vertices.size());
     path.vertex_count = uint32_t(n);
+    path.emitter = uint32_t(y[0].emitter);
     for (int i = 0; i < n; ++i) {
         const bool candidate = (i == 0 || y.has_smooth_lobe(i)) && i + 1 < max_edges;
-        data->vertices.push_back({y[i].p, y[i].ng, candidate ? scalar_of(y[i].alpha) : 0, i == 0 ? uint32_t(y[0].emitter) : 0});
+        data->vertices.push_back({y[i].p, y[i].ng, candidate ? scalar_of(y[i].alpha) : 0});
     }
     data->light_paths.push_back(path);
 }
 
-/// Divides the frame into blocks of about kSamplesPerBlock samples.
+/// Divides the frame into about kTrainingBlocks blocks. The size of the set does not matter: nobody may know it yet.
 struct Blocks {
     Rect crop;
     int edge = 1;
 
-    Blocks(const Rect& r, uint64_t samples) : crop(r) {
-        const double pixels = kSamplesPerBlock * double(r.area()) / double(std::max<uint64_t>(1, samples));
-        edge = std::max(1, int(std::ceil(std::sqrt(pixels))));
+    explicit Blocks(const Rect& r) : crop(r) {
+        edge = std::max(1, int(std::ceil(std::sqrt(double(r.area()) / double(kTrainingBlocks)))));
     }
     int columns() const { return (crop.width() + edge - 1) / edge; }
     int rows() const { return (crop.height() + edge - 1) / edge; }
@@ -184,7 +184,7 @@ class TrainingGenerator::Unit {
         : generator_(generator),
           work_(work),
           stop_(std::move(stop)),
-          blocks_(crop(), work.total_samples) {}
+          blocks_(crop()) {}
 
     Rect crop() const { return generator_.scene_->frame().crop; }
     double pixels() const { return double(crop().area()); }
@@ -253,7 +253,10 @@ class TrainingGenerator::Unit {
             }
         });
         if (stop_.stop_requested()) return Status(StatusCode::kCancelled, "training was cancelled");
-        for (const TrainingData& data : chunks) LL_RETURN_IF_ERROR(all.append(data));
+        for (TrainingData& data : chunks) {
+            LL_RETURN_IF_ERROR(all.append(data));
+            data = {};
+        }
         return all;
     }
 
@@ -351,11 +354,12 @@ Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, s
     if (!settings.algorithm.learning()) return tables;
     const LearningPlan plan = learning_plan(settings.algorithm);
     *report = {};
+    TrainingData data;
     for (size_t round = 0; round < plan.rounds.size(); ++round) {
         const Tables guide = plan.rounds[round].guided ? tables : Tables();
         const Result<TrainingGenerator> generator = TrainingGenerator::create(scene, settings, guide);
         if (!generator.ok()) return generator.status();
-        TrainingData data;
+        if (!plan.rounds[round].guided || !plan.rounds[round - 1].guided) data = {};
         const uint64_t begin = plan.first_sample(round), end = begin + plan.rounds[round].samples;
         for (uint64_t first = begin; first < end; first += std::min(kTrainingUnitSamples, end - first)) {
             const Result<TrainingData> unit =
@@ -364,7 +368,10 @@ Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, s
             LL_RETURN_IF_ERROR(data.append(*unit));
         }
         TrainingReport of_round;
-        auto learned = learn({data, round, guide, scene.emitters(), settings, {stop, {}}, &of_round});
+        const auto read = [&, last = round + 1 == plan.rounds.size()] {
+            if (last) data = {};
+        };
+        auto learned = learn({data, round, guide, scene.emitters(), settings, {stop, {}, read}, &of_round});
         if (!learned.ok()) return learned.status();
         tables = *std::move(learned);
         // The report describes the last round's tables, but its times are those of all rounds together.

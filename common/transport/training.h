@@ -20,8 +20,7 @@ inline constexpr uint64_t kTrainingChunkSamples = 512;
 
 /// Traces training units of one scene. Without a guide it pairs camera with light sub-paths, which needs no tables;
 /// with the tables of an earlier round as guide its light leaves where that round found it useful, and it makes subspace
-/// connections where the algorithm has them, which find far more of the light that is hard to find. The tables of the render are
-/// learned from the last round alone: its paths have the smaller variance, and the few paths of a pilot would outweigh them.
+/// connections where the algorithm has them, which find far more of the light that is hard to find.
 class TrainingGenerator {
   public:
     /// `scene` must outlive the generator. The algorithm must be one that learns.

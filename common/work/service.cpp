@@ -76,7 +76,9 @@ double rendered_share(const JobInfo& job) {
     if (job.state == JobState::kSucceeded || job.state == JobState::kFinishing) return 1;
     double done = 0;
     if (job.unit_total > 0) done = double(job.unit_done) / double(job.unit_total);
-    if (job.spec.time_limit_seconds > 0) done = job.render_seconds / job.spec.time_limit_seconds;
+    // Learning has taken a part of the limit before.
+    if (job.spec.time_limit_seconds > 0 && job.render_seconds > 0 && job.eta_seconds >= 0)
+        done = job.render_seconds / (job.render_seconds + job.eta_seconds);
     done = std::max(done, noise_share(job).value_or(0));
     return std::clamp(done, 0.0, 1.0);
 }

@@ -192,7 +192,7 @@ TEST(TrainingRound, CountsWhatCameAndForgetsWhatIsRefused) {
     finish(1);
 
     // In the order of the units, not in that of their arrival.
-    const auto all = join(round.take(), {});
+    const auto all = join({}, round.take(), {});
     ASSERT_TRUE(all.ok()) << all.status().message();
     EXPECT_EQ(all->samples, 3u);
     ASSERT_EQ(all->paths.size(), 3u);
@@ -201,7 +201,7 @@ TEST(TrainingRound, CountsWhatCameAndForgetsWhatIsRefused) {
     stopped.request_stop();
     std::vector<TrainingRound::Part> parts;
     parts.push_back(part_of(0, 1, 1));
-    EXPECT_EQ(join(std::move(parts), stopped.get_token()).status().code(), StatusCode::kCancelled);
+    EXPECT_EQ(join({}, std::move(parts), stopped.get_token()).status().code(), StatusCode::kCancelled);
 }
 
 TEST(Reducer, APartialThatLeavesTheRangeAfterWaitingIsTheOneRefused) {

@@ -256,32 +256,28 @@ TEST(TrainingBudget, AProbeIsTimedOnAWarmWorker) {
     EXPECT_LT(port.first_trace_seconds, kColdSeconds);
 }
 
-/// What the probe cost, and what the chosen set will cost at that rate, fit into the tenth.
+/// What the probe cost, and what the chosen set will cost at that rate, fit into the tenth where a set does not grow.
 TEST(TrainingBudget, ProbeAndTrainingTakeATenthOfTheLimitAtMost) {
-    for (const bool guided : {false, true}) {
-        for (const double limit : {10.0, 25.0, 60.0}) {
-            TableService service;
-            JobSpec timed = guided ? service.guided_spec(0) : service.table_spec(0);
-            timed.time_limit_seconds = limit;
-            timed.algorithm = without(timed.algorithm, "training-paths");
-            const std::string id = service.submit_training(timed);
-            const std::string worker = service.add_worker();
-            const auto probe = service.lease(worker);
-            ASSERT_EQ(probe.size(), 1u);
-            ASSERT_EQ(probe[0].unit.key.kind, UnitKind::kProbe);
-            constexpr double kSeconds = 0.1;  // which give() says that the tracing took
-            const double per_sample = kSeconds / double(probe[0].unit.training.sample_count);
-            service.give(worker, probe[0], traced(probe[0]));
-            const JobInfo info = service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing; });
-            const double chosen = info.spec.algorithm.value("training-paths");
-            const auto fits = [&](double samples) {
-                const bool two_rounds = guided && samples > double(kTrainingUnitSamples);  // a smaller set has no pilot
-                const double cost = samples * per_sample * (1 + kLearningOverTracing) * (two_rounds ? kGuidedCost : 1);
-                return kSeconds + cost <= kTrainingShare * limit;
-            };
-            EXPECT_TRUE(fits(chosen)) << guided << ' ' << limit;
-            EXPECT_FALSE(fits(2 * chosen)) << guided << ' ' << limit;
-        }
+    for (const double limit : {10.0, 25.0, 60.0}) {
+        TableService service;
+        JobSpec timed = service.table_spec(0);
+        timed.time_limit_seconds = limit;
+        timed.algorithm = without(timed.algorithm, "training-paths");
+        const std::string id = service.submit_training(timed);
+        const std::string worker = service.add_worker();
+        const auto probe = service.lease(worker);
+        ASSERT_EQ(probe.size(), 1u);
+        ASSERT_EQ(probe[0].unit.key.kind, UnitKind::kProbe);
+        constexpr double kSeconds = 0.1;  // which give() says that the tracing took
+        const double per_sample = kSeconds / double(probe[0].unit.training.sample_count);
+        service.give(worker, probe[0], traced(probe[0]));
+        const JobInfo info = service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing; });
+        const double chosen = info.spec.algorithm.value("training-paths");
+        const auto fits = [&](double samples) {
+            return kSeconds + samples * per_sample * (1 + kLearningOverTracing) <= kTrainingShare * limit;
+        };
+        EXPECT_TRUE(fits(chosen)) << limit;
+        EXPECT_FALSE(fits(2 * chosen)) << limit;
     }
 }
 

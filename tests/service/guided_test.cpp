@@ -107,6 +107,33 @@ TEST(GuidedTables, TracingIsTimedFromItsFirstLeaseAndEachRoundOnce) {
     ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
 }
 
+/// What waits does not: for workers before and between.
+TEST(GuidedTables, TheTimeThatTheyTakeCountsTowardsTheLimit) {
+    TableService service;
+    JobSpec timed = service.table_spec(0);  // its set is chosen, so that nothing is measured first
+    timed.time_limit_seconds = 10;
+    const std::string id = service.submit_training(timed);
+    service.now_ms += 60000;
+    const auto units = lease_all(service);
+    ASSERT_EQ(units.size(), 3u);
+    service.now_ms += 1000;  // until the scene is there
+    ASSERT_TRUE(service.coordinator->heartbeat(units[0].first, {{units[0].second.reference(), true}}).ok());
+    service.now_ms += 6000;
+    for (const auto& [worker, lease] : units)
+        EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
+    service.wait(id, [](const JobInfo& j) { return j.state == JobState::kRunning; });
+    service.now_ms += 5000;
+    const auto lease = service.lease(units[0].first).at(0);
+    ASSERT_TRUE(service.coordinator->heartbeat(units[0].first, {{lease.reference(), true}}).ok());
+    EXPECT_EQ(service.coordinator->get_job(id)->eta_seconds, 4);
+    service.now_ms += 1000;
+    EXPECT_EQ(service.coordinator->get_job(id)->eta_seconds, 3);
+    EXPECT_EQ(rendered_share(*service.coordinator->get_job(id)), 0.25);
+    service.now_ms += 3001;
+    EXPECT_EQ(service.deliver(units[0].first, lease).outcome, SubmitOutcome::kAccepted);
+    EXPECT_EQ(service.wait_end(id).samples_per_pixel_done, lease.unit.render.iteration_count);
+}
+
 TEST(GuidedTables, AreCancelledInTheSecondRoundWithoutATrace) {
     TableService service;
     const std::string id = service.submit_training(service.guided_spec());
@@ -137,9 +164,10 @@ TEST(GuidedTables, AGuideThatTheDiskHasLostIsRestored) {
     ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
 }
 
-/// One that can afford two rounds makes the tables of the spec that it records, as a job of that spec does.
+/// One whose set has grown makes the tables of the spec that it records, as a job of that spec does.
 TEST(GuidedTables, OfATimeLimitedJobAreThoseOfItsSpec) {
-    TableService service;
+    TempDirectory cache;
+    TableService service([&](CoordinatorOptions& options) { options.table_cache = cache.path; });
     JobSpec timed = service.guided_spec(0);
     timed.algorithm = without(timed.algorithm, "training-paths");
     timed.time_limit_seconds = 20;
@@ -147,19 +175,50 @@ TEST(GuidedTables, OfATimeLimitedJobAreThoseOfItsSpec) {
     const auto probe = lease_all(service);
     ASSERT_EQ(probe.size(), 1u);
     ASSERT_EQ(probe[0].second.unit.key.kind, UnitKind::kProbe);
-    // At such a rate 32768 samples fit, with the two workers of lease_all(); 65536 do not.
-    const std::string& payload = traced(probe[0].second);
-    service.give(probe[0].first, probe[0].second, payload, sha256(payload), 0.11);
+    service.give(probe[0].first, probe[0].second, traced(probe[0].second));
     JobInfo info = service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing; });
-    JobSpec recorded = service.guided_spec();
-    EXPECT_EQ(info.spec.algorithm.value("training-paths"), 32768);
-    recorded.algorithm = recorded.algorithm.with("training-paths", 32768);
-    for (const auto& [worker, lease] : deliver_pilot(service))
-        EXPECT_EQ(service.give(worker, lease, guided(service, lease)).outcome, SubmitOutcome::kAccepted);
+    const auto pilot = lease_all(service);
+    ASSERT_EQ(pilot.size(), 1u);
+    EXPECT_EQ(pilot[0].second.unit.training, (TrainingWork{0, kPilotSamples, kPilotSamples}));
+    // At such a rate another 16384 samples cost about 3 s, which is worth them, and 49152 about 8 s, which is not.
+    const std::string& payload = traced(pilot[0].second);
+    service.give(pilot[0].first, pilot[0].second, payload, sha256(payload), 2.0);
+    service.wait(id, [](const JobInfo& j) { return j.phase == PreparePhase::kTracing && j.phase_total > kPilotSamples; });
+    const auto units = lease_all(service);
+    ASSERT_EQ(units.size(), 1u);
+    EXPECT_EQ(units[0].second.unit.training, (TrainingWork{kPilotSamples, kPilotSamples, 2 * kPilotSamples}));
+    EXPECT_EQ(service.give(units[0].first, units[0].second, guided(service, units[0].second)).outcome, SubmitOutcome::kAccepted);
     info = service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
     ASSERT_EQ(info.state, JobState::kRunning) << info.message;
+    EXPECT_EQ(info.spec.algorithm.value("training-paths"), 32768);
+    JobSpec recorded = service.guided_spec();
+    recorded.algorithm = recorded.algorithm.with("training-paths", 32768);
     EXPECT_TRUE(info.tables.capped_by_time_limit);
     EXPECT_EQ(info.tables.asset.digest, tables_alone(recorded));
+    ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
+    // A job whose probe promises no more than that takes the same tables.
+    const std::string poorer = service.submit_training(timed);
+    const auto again = lease_all(service);
+    ASSERT_EQ(again.size(), 1u);
+    ASSERT_EQ(again[0].second.unit.key.kind, UnitKind::kProbe);
+    const std::string& probed = traced(again[0].second);
+    service.give(again[0].first, again[0].second, probed, sha256(probed), 0.6);
+    const JobInfo taken = service.wait(poorer, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
+    EXPECT_EQ(taken.tables.asset.digest, info.tables.asset.digest);
+    EXPECT_TRUE(taken.tables.from_cache);
+    EXPECT_TRUE(taken.tables.capped_by_time_limit);
+    EXPECT_EQ(taken.spec.algorithm.value("training-paths"), 32768);
+    ASSERT_TRUE(service.coordinator->cancel_job(poorer).ok());
+}
+
+/// Without a set of its own, a job with samples has one that its image decides.
+TEST(GuidedTables, OfAShortJobAreSmall) {
+    TableService service;
+    JobSpec brief = service.guided_spec(64);
+    brief.algorithm = without(brief.algorithm, "training-paths");
+    const std::string id = service.submit_training(brief);
+    EXPECT_EQ(service.coordinator->get_job(id)->spec.algorithm.value("training-paths"), 16384) << "32 x 32 x 64 / 4";
+    EXPECT_EQ(service.coordinator->get_job(id)->phase_total, 16384u);
     ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
 }
 

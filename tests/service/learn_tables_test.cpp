@@ -16,12 +16,12 @@ class FakeTracing : public TracingPort {
         work = first == UnitKind::kTraining ? plan.work(0) : TrainingWork{0, kFirstSamples, plan.samples};
     }
 
-    Result<TracedRound> collect() override {
+    Result<TracedRound> collect(TrainingData earlier) override {
         asked += kind == UnitKind::kProbe ? "probe " : "round" + std::to_string(number) + " ";
         if (asked.ends_with(stops_at)) stop.request_stop();
         if (asked.ends_with(fails_at)) return data_loss("boom");
         const auto generator = TrainingGenerator::create(*golden(), render_settings(spec), guide);
-        TracedRound round{kind, number, work, {}, worker_seconds, 2};
+        TracedRound round{kind, number, work, std::move(earlier), number == 1 ? guided_worker_seconds : worker_seconds, 2};
         const uint64_t end = work.first_sample + work.sample_count;
         for (uint64_t first = work.first_sample; first < end; first += kTrainingUnitSamples) {
             const auto unit = generator->trace({first, std::min(kTrainingUnitSamples, end - first), work.total_samples}, {});
@@ -30,11 +30,13 @@ class FakeTracing : public TracingPort {
         return round;
     }
     WorkerRegistry::Crew crew() const override { return {2, 1}; }
+    double seconds_left() const override { return left; }
     Result<bool> settle(const AffordableSet& set) override {
         asked += "settle ";
         settled = set;
         spec = set.spec;
-        kind = UnitKind::kTraining, work = plan_of(spec).work(0);
+        kind = UnitKind::kTraining;
+        work = set.grows ? TrainingWork{0, kPilotSamples, kPilotSamples} : plan_of(spec).work(0);
         if (asked.ends_with(fails_at)) return data_loss("boom");
         return goes_on;
     }
@@ -65,7 +67,7 @@ class FakeTracing : public TracingPort {
     std::optional<AffordableSet> settled;
     std::string asked, fails_at = "nothing", stops_at = "nothing";
     std::stop_source stop;
-    double share = 0, worker_seconds = 1;
+    double share = 0, worker_seconds = 1, guided_worker_seconds = 1, left = 0;
     bool goes_on = true;
 };
 
@@ -132,6 +134,94 @@ TEST(LearnTables, WhatLearningFromTheProbeTookIsNotThereForTracing) {
     ASSERT_TRUE(learn(tracing, slow).ok());
     EXPECT_EQ(tracing.settled->probe_learned_seconds, 0.25);
     EXPECT_EQ(tracing.settled->samples, 8192u) << "half of the second that the tracing has left: room for 9637";
+}
+
+/// A job without a set of its own, which takes next to nothing to trace and has 18 s left.
+FakeTracing growing() {
+    const TableService service;
+    JobSpec spec = complete(service.guided_spec(0));
+    // With so many subspaces more paths always teach more.
+    spec.algorithm = without(spec.algorithm, "training-paths").with("light-subspaces", 300).with("eye-subspaces", 200).completed();
+    spec.time_limit_seconds = 20;
+    FakeTracing tracing(spec, UnitKind::kProbe);
+    tracing.worker_seconds = 0.01;
+    tracing.left = 18;
+    return tracing;
+}
+
+/// Its tables are those of the spec that it ends with, as a single machine makes them.
+void expect_grown(const FakeTracing& tracing, const Result<std::optional<LearnedTables>>& learned, uint64_t samples) {
+    ASSERT_TRUE(learned.ok() && learned->has_value()) << learned.status().message();
+    ASSERT_TRUE(tracing.settled.has_value());
+    EXPECT_TRUE(tracing.settled->grows);
+    EXPECT_EQ((*learned)->spec.algorithm.value("training-paths"), double(samples));
+    EXPECT_EQ((*learned)->info.training_samples, samples);
+    EXPECT_TRUE((*learned)->info.capped_by_time_limit);
+    EXPECT_EQ(sha256(serialize((*learned)->tables)), tables_alone((*learned)->spec));
+}
+
+TEST(LearnTables, ASetGrowsWhileItIsWorthItsTime) {
+    FakeTracing tracing = growing();
+    // Above half of the limit there is a millisecond. The last round takes 0.7 of it for 131072 samples, and would take 2
+    // for 262144.
+    tracing.spec.time_limit_seconds = 36;
+    tracing.left = 18.001;
+    tracing.worker_seconds = 1e-5;
+    tracing.guided_worker_seconds = 0.001;
+    const auto learned = learn(tracing);
+    EXPECT_EQ(tracing.asked, "probe settle round0 learn guide round1 learn guide round2 learn ");
+    expect_grown(tracing, learned, 2 * kGuideSamples);
+}
+
+TEST(LearnTables, ASetStopsGrowingWhereNoTimeIsLeft) {
+    FakeTracing tracing = growing();
+    tracing.left = 10.001;  // nothing fits above half of the limit
+    const auto learned = learn(tracing);
+    EXPECT_EQ(tracing.asked, "probe settle round0 learn ");
+    expect_grown(tracing, learned, kPilotSamples);
+}
+
+TEST(LearnTables, ALimitWithoutRoomForAGuideHasASetOfOneRound) {
+    FakeTracing tracing = growing();
+    tracing.worker_seconds = 6;
+    const auto learned = learn(tracing);
+    ASSERT_TRUE(learned.ok() && learned->has_value()) << learned.status().message();
+    EXPECT_FALSE(tracing.settled->grows);
+    EXPECT_EQ(tracing.asked, "probe settle round0 learn ");
+    EXPECT_LT((*learned)->info.training_samples, kPilotSamples);
+    EXPECT_EQ(sha256(serialize((*learned)->tables)), tables_alone((*learned)->spec));
+}
+
+TEST(TrainingTrade, TakesTheLeastErrorOfTheWholeJob) {
+    const std::vector<LargerSet> sets{{200, 1}, {400, 3}, {800, 7}};
+    // 20 s left; of the loss the next doubling leaves ...
+    EXPECT_EQ(best_training_size(100, sets, 1, 20, 20), 100u);
+    EXPECT_EQ(best_training_size(100, sets, 0.96, 20, 20), 100u) << "0.96 / 19 > 1 / 20";
+    EXPECT_EQ(best_training_size(100, sets, 0.94, 20, 20), 200u);
+    EXPECT_EQ(best_training_size(100, sets, 0.8, 20, 20), 400u) << "0.8 0.88 / 17 = 0.0414, 0.8 / 19 = 0.0421";
+    EXPECT_EQ(best_training_size(100, sets, 0.3, 20, 20), 800u) << "0.3 0.58 0.748 / 13 = 0.0100, 0.3 0.58 / 17 = 0.0102";
+    EXPECT_EQ(best_training_size(100, sets, 0.7, 20, 14), 400u) << "half of the limit is for rendering";
+    EXPECT_EQ(best_training_size(100, sets, 0.7, 20, 10.5), 100u);
+    EXPECT_EQ(best_training_size(100, sets, 0.7, 20, 0), 100u);
+    EXPECT_EQ(best_training_size(100, {}, 0.7, 20, 20), 100u);
+}
+
+TEST(TrainingTrade, PreparesForNoLongerThanItRenders) {
+    EXPECT_EQ(proportionate_training_samples(0, 500000), kMinTrainingSamples);
+    EXPECT_EQ(proportionate_training_samples(4 * 16384 - 1, 500000), 8192u);
+    EXPECT_EQ(proportionate_training_samples(4 * 16384, 500000), 16384u);
+    EXPECT_EQ(proportionate_training_samples(1999999, 500000), 262144u);
+    EXPECT_EQ(proportionate_training_samples(2000000, 500000), 500000u);
+    EXPECT_EQ(proportionate_training_samples(10, 700), 700u) << "less than the least that is worth anything";
+}
+
+TEST(TrainingTrade, ExpectsLessOfTheNextDoublingsThanTheLastOnesGave) {
+    EXPECT_NEAR(expected_loss_per_doubling(0.64, 1, 2), 1 - kGainThatIsLeft * 0.2, 1e-12);
+    EXPECT_EQ(expected_loss_per_doubling(2, 1, 2), 1);
+    for (const double nothing : {0.0, -1.0, double(NAN), double(INFINITY)}) {
+        EXPECT_EQ(expected_loss_per_doubling(nothing, 1, 2), kTypicalLossPerDoubling);
+        EXPECT_EQ(expected_loss_per_doubling(1, nothing, 2), kTypicalLossPerDoubling);
+    }
 }
 
 TEST(LearnTables, NothingIsLearnedWhereTheTablesExist) {

@@ -189,7 +189,9 @@ TEST(Processes, TrainingIsSharedOutAndAWorkerKilledDuringItCostsTimeOnly) {
     GrpcJobPort jobs = service.jobs();
     ASSERT_TRUE(wait_until(60, [&] {
         const auto list = jobs.list_jobs();
-        return list.ok() && !list->empty() && list->front().phase_done > 0;
+        // The first round is a single unit; it is to die over one of several.
+        return list.ok() && !list->empty() && list->front().phase == PreparePhase::kTracing && list->front().unit_leased > 0 &&
+               list->front().phase_done > kPilotSamples;
     }));
     victim->signal(SIGKILL);
     EXPECT_EQ(victim->wait(), 128 + SIGKILL);

@@ -78,7 +78,7 @@ TEST(Tables, DamagedTrainingDataAreRefusedAndTheUnitIsLeasedAgain) {
     EXPECT_EQ(service.give(worker, lease, "nonsense").outcome, SubmitOutcome::kRejected);
     // A light that the scene does not have shows once the scene is built.
     TrainingData data = *parse_training_data(traced(lease));
-    data.vertices[data.paths[0].first_vertex].emitter = 1000000;
+    data.paths[0].emitter = 1000000;
     EXPECT_EQ(service.give(worker, lease, serialize(data)).outcome, SubmitOutcome::kAccepted);
     for (size_t i = 1; i < 3; ++i)
         EXPECT_EQ(service.give(held[i].first, held[i].second, traced(held[i].second)).outcome, SubmitOutcome::kAccepted);

@@ -211,7 +211,7 @@ TEST(TableFuzz, CountedEnergyIsTheExpectedOne) {
                 const TrainingVertex* v = &data.vertices[p.first_vertex];
                 for (uint32_t i = 0; i < p.vertex_count; ++i) {
                     if (!(v[i].density > 0)) continue;
-                    const uint32_t label = i == 0 ? labeller.source(v[0].emitter, v[0].position, v[0].normal)
+                    const uint32_t label = i == 0 ? labeller.source(p.emitter, v[0].position, v[0].normal)
                                                   : tables.light_label(sub_path_end(v[i].position, v[i].normal,
                                                                                     normalize(v[i - 1].position - v[i].position)));
                     sum[label] += double(v[i].density);

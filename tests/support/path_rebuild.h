@@ -91,11 +91,13 @@ inline std::optional<std::vector<PathVertex>> rebuild_light(const Scene& scene, 
     const Vec3 first = path.infinite ? path.x[0].ng : normalize(path.x[1].p - path.x[0].p);
     PathVertex y0 = path.x[0];
     if (!path.infinite && !e.is_area()) y0.ng = first;
-    y0.fwd = emitters.pdf_position(e, y0.p, first);
+    const Vec3 x1 = path.x.size() > 1 ? path.x[1].p : y0.p;
+    const EmissionDensities densities = emitters.emission_densities(e, y0.p, y0.ng, first, x1);
+    y0.fwd = densities.position;
     y0.rev = 0;
     WalkRay ray;
     ray.direction = first;
-    ray.pdf = emitters.pdf_direction(e, y0.p, y0.ng, first, path.x.size() > 1 ? path.x[1].p : y0.p);
+    ray.pdf = densities.direction;
     if (!(y0.fwd > 0 && ray.pdf > 0)) return std::nullopt;
     ray.from_infinite = e.is_infinite();
     ray.previous_hittable = e.can_be_hit();

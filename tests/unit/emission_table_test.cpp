@@ -50,7 +50,7 @@ std::vector<testing::Sample> light_of(const EmitterSet& set, uint64_t seed) {
             if (!set.sample_emission(pick, u, v, &s)) continue;
             const Emitter& e = set[s.emitter];
             const Vec3 x1 = s.position + s.direction * 2.5f;
-            const float seen = set.pdf_direction(e, s.position, s.normal, s.direction, x1);
+            const float seen = set.emission_densities(e, s.position, s.normal, s.direction, x1).direction;
             differ += std::fabs(seen / s.pdf_direction - 1) > 1e-3f;
             // What passes by the scene is no one's light; emission by power has none of it.
             if (e.is_infinite() && length_squared(cross(s.position - kCentre, s.direction)) > kRadius * kRadius) continue;

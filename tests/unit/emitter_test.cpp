@@ -54,7 +54,8 @@ TEST(Emission, IsDrawnWithItsDensities) {
             if (!set.sample_emission(pick, u, v, &s) || s.emitter != 0) continue;
             ++drawn;
             EXPECT_FLOAT_EQ(s.pdf_position, set.pdf_position(e, s.position, s.direction)) << c.name;
-            EXPECT_FLOAT_EQ(s.pdf_direction, set.pdf_direction(e, s.position, s.normal, s.direction, s.position)) << c.name;
+            EXPECT_FLOAT_EQ(s.pdf_direction, set.emission_densities(e, s.position, s.normal, s.direction, s.position).direction)
+                << c.name;
             int position = 0, direction = 0;
             if (e.kind == EmitterKind::kTriangle) position = quarter_of(e, s.position);
             if (e.kind == EmitterKind::kSphere) {
@@ -101,7 +102,8 @@ TEST(Emission, IsDrawnWithItsDensities) {
             for (int d = 0; d < direction_bins; ++d) {
                 double direction = 0;
                 if (e.is_infinite()) {
-                    direction = double(set.pdf_direction(e, {}, {}, e.normal, {})) * kPiD * kRadius * kRadius / direction_bins;
+                    direction = double(set.emission_densities(e, {}, {}, e.normal, {}).direction) * kPiD * kRadius * kRadius /
+                                direction_bins;
                 } else {
                     // Only images depend on the azimuth.
                     const int n = e.has_direction_map() ? 256 : 64, azimuths = e.has_direction_map() ? n : 1;
@@ -111,8 +113,8 @@ TEST(Emission, IsDrawnWithItsDensities) {
                         const Vec3 axis = e.is_area() ? Vec3{0, 0, 1} : e.kind == EmitterKind::kSpot ? e.normal : Vec3{0, 0, 1};
                         const double r = std::sqrt(1 - z * z), angle = 2 * kPiD * turns;
                         const Vec3 w = Frame(axis).to_world({float(r * std::cos(angle)), float(r * std::sin(angle)), float(z)});
-                        direction +=
-                            double(set.pdf_direction(e, {}, axis, w, {})) * 4 * kPiD / (double(direction_bins) * n * azimuths);
+                        direction += double(set.emission_densities(e, {}, axis, w, {}).direction) * 4 * kPiD /
+                                     (double(direction_bins) * n * azimuths);
                     }
                 }
                 total += expected[size_t(p * direction_bins + d)] = position * direction;

@@ -140,7 +140,7 @@ TEST(GuidedTraining, InfiniteLightsLieInTheDirectionOfTheirLight) {
             for (const TrainingPath& p : data.paths) {
                 const TrainingVertex* v = &data.vertices[p.first_vertex];
                 // Light tracing starts from where its path started, which is the right place for it.
-                if (!scene->emitters()[v[0].emitter].is_infinite()) continue;
+                if (!scene->emitters()[p.emitter].is_infinite()) continue;
                 const Vec3 d = normalize(v[0].position - v[1].position);
                 EXPECT_NEAR(dot(d, v[0].normal), -1, 1e-4);
                 ++seen;
@@ -195,20 +195,35 @@ TEST(GuidedTraining, ASampleKeepsTwoPathsOfEveryLength) {
     EXPECT_LE(data.paths.size(), (kTrainingPathsPerSample + 1) * kTraced);
 }
 
-TEST(GuidedTraining, TwoRoundsAreMadeOfWholeUnits) {
-    const auto pilot = [&](uint64_t samples, double share) {
-        const auto settings = settings_of(1).algorithm.with("training-paths", double(samples)).with("pilot", share);
-        const LearningPlan plan = settings.info().learning->plan(settings);
-        EXPECT_EQ(plan.samples, samples);
-        EXPECT_EQ(plan.first_sample(plan.rounds.size()), samples);
-        for (size_t round = 0; round < plan.rounds.size(); ++round) EXPECT_EQ(plan.rounds[round].guided, round > 0);
-        return plan.rounds.size() < 2 ? 0 : plan.rounds[0].samples;
+/// Tables of a set that has grown are those of a set that had its size from the beginning.
+TEST(GuidedTraining, RoundsBeforeTheLastAreThoseOfEveryLargerSet) {
+    const auto plan_of = [&](uint64_t samples, double pilot) {
+        const auto settings = settings_of(1).algorithm.with("training-paths", double(samples)).with("pilot", pilot);
+        return learning_plan(settings);
     };
-    EXPECT_EQ(pilot(500000, 0), 0u);
-    EXPECT_EQ(pilot(500000, 0.2), 6 * kTrainingUnitSamples);
-    EXPECT_EQ(pilot(500000, 1), 29 * kTrainingUnitSamples);  // something is left for the second round
-    EXPECT_EQ(pilot(40000, 0.001), kTrainingUnitSamples);
-    EXPECT_EQ(pilot(20000, 0.2), 0u);  // too small for two
+    EXPECT_EQ(plan_of(500000, 0).rounds.size(), 1u);
+    EXPECT_FALSE(plan_of(500000, 0).grows);
+    constexpr uint64_t kSizes[] = {
+        1, kPilotSamples, 2 * kPilotSamples - 1, 2 * kPilotSamples, kGuideSamples, 100000, 2 * kGuideSamples, 500000, 100000000};
+    for (const uint64_t smaller : kSizes) {
+        const LearningPlan plan = plan_of(smaller, 1);
+        EXPECT_EQ(plan.samples, smaller);
+        EXPECT_TRUE(plan.grows);
+        for (size_t round = 0; round < plan.rounds.size(); ++round) {
+            EXPECT_EQ(plan.rounds[round].guided, round > 0);
+            EXPECT_EQ(plan.first_sample(round) % kTrainingUnitSamples, 0u);
+        }
+        for (const uint64_t larger : larger_sets(smaller, 500000)) {
+            const LearningPlan grown = plan_of(larger, 1);
+            ASSERT_EQ(grown.rounds.size(), plan.rounds.size() + 1) << smaller << ' ' << larger;
+            for (size_t round = 0; round < plan.rounds.size(); ++round)
+                EXPECT_EQ(grown.rounds[round].samples, plan.rounds[round].samples) << smaller << ' ' << larger;
+        }
+    }
+    EXPECT_EQ(larger_sets(kPilotSamples, 500000), (std::vector<uint64_t>{32768, 65536}));
+    EXPECT_EQ(larger_sets(kGuideSamples, 500000), (std::vector<uint64_t>{131072, 262144, 500000}));
+    EXPECT_TRUE(larger_sets(kGuideSamples, 100000).empty());
+    EXPECT_TRUE(larger_sets(2 * kPilotSamples, 500000).empty());
 }
 
 /// Only tables with subspaces can guide, and only algorithms with tables learn.

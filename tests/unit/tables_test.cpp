@@ -227,6 +227,23 @@ TEST(Tables, EveryBadTableIsRefusedByName) {
     }
 }
 
+TEST(TrainingData, NormalsOf32BitsPointWhereTheyDid) {
+    Rng rng({1, Stage::kTraining, 0, 0});
+    for (int i = 0; i < 20000; ++i) {
+        // Axes and planes of the octahedron, too, where the projection folds.
+        const auto coordinate = [&] { return rng.below(4) == 0 ? 0.0f : 2 * float(rng.uniform_double()) - 1; };
+        const Vec3 v{coordinate(), coordinate(), coordinate()};
+        if (!(length_squared(v) > 0)) continue;
+        const PackedNormal packed = v;
+        const Vec3 n = normalize(v), back = packed;
+        EXPECT_LT(length(back - n), 7e-5f) << v.x << ' ' << v.y << ' ' << v.z;
+        EXPECT_NEAR(length(back), 1, 1e-6f);
+    }
+    const float infinity = std::numeric_limits<float>::infinity();
+    for (const Vec3& none : {Vec3{0, 0, 0}, Vec3{infinity, 0, 0}, Vec3{0, kNan, 0}})
+        EXPECT_EQ(Vec3(PackedNormal(none)), (Vec3{0, 0, 1}));
+}
+
 TEST(TrainingData, SerializedAndParsedAreTheSame) {
     for (const auto make : {testing::diffuse_box, testing::environment_lit, testing::caustic_of_a_point_light}) {
         const auto scene = make();
@@ -307,7 +324,7 @@ TEST(TrainingData, BadPathsAreRefused) {
         {"vertices that wrap around", [](TrainingData& d) { d.paths[0].first_vertex = 0xffffffffu; }},
         {"light path beyond", [](TrainingData& d) { d.light_paths[0].vertex_count = 1u << 30; }},
         {"block beyond", [](TrainingData& d) { d.paths[0].block = uint32_t(d.block_sum.size()); }},
-        {"emitter beyond", [&](TrainingData& d) { d.vertices[d.paths[0].first_vertex].emitter = uint32_t(emitters); }},
+        {"emitter beyond", [&](TrainingData& d) { d.paths[0].emitter = uint32_t(emitters); }},
         {"vertex nowhere", [](TrainingData& d) { d.vertices[1].position.y = kNan; }},
     };
     for (const auto& [name, change] : mutations) {
