@@ -94,7 +94,7 @@ void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, Tab
     const std::lock_guard lock(mutex_);
     if (job.state != JobState::kPreparing) return;
     job.prepared = options_.clock();
-    if (job.work_begin != TimePoint()) job.learning_seconds = seconds_between(job.work_begin, job.prepared);
+    job.stop_clock(job.prepared);
     job.spec = std::move(spec);
     job.layers = std::move(facts.layers);
     job.units = std::move(units);

@@ -81,6 +81,7 @@ bool Coordinator::wait_for_maker(JobRecord& job) {
     // The state is that before its own tracing, in case the job has to begin again.
     job.makes_tables = false;
     job.training_begin = job.work_begin = {};
+    job.learning_seconds = 0;
     discard_round(job);
     job.phase = PreparePhase::kWaitingForTables;
     log_info("{}: waits for the tables of {}", job.id, job.maker->id);

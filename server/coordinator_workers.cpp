@@ -65,6 +65,7 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
                 continue;
         }
         worker.held.insert({job->id, unit->key});
+        if (!render && job->learning_seconds > 0 && job->work_begin == TimePoint()) job->work_begin = now;  // it goes on
         if (render) return UnitLease{job->id, job->spec, *unit, job->tables.asset};
         return UnitLease{job->id, job->spec, *unit, job->guide};
     }

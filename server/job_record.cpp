@@ -1,6 +1,7 @@
 #include "server/job_record.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace lightloom {
 namespace {
@@ -63,8 +64,16 @@ std::optional<double> JobRecord::Learning::seconds_left(TimePoint now) const {
 
 double JobRecord::seconds_left(TimePoint now) const {
     const bool learns = state == JobState::kPreparing && work_begin != TimePoint();
-    const double learned = learns ? seconds_between(work_begin, now) : learning_seconds;
+    const double learned = learning_seconds + (learns ? seconds_between(work_begin, now) : 0);
     return spec.time_limit_seconds - learned - (rendering ? seconds_between(first_render, now) : 0);
+}
+
+void JobRecord::stop_clock(TimePoint now) {
+    if (work_begin != TimePoint()) learning_seconds += seconds_between(std::exchange(work_begin, {}), now);
+}
+
+bool JobRecord::waits_for_workers() const {
+    return state == JobState::kPreparing && round && !round->complete() && round->units().leased_count() == 0;
 }
 
 JobInfo JobRecord::info(TimePoint now) const {

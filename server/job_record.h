@@ -63,8 +63,10 @@ struct JobRecord {
     bool may_wait = true;              ///< Whether it may wait for another job's tables: not after damage.
     std::shared_ptr<JobRecord> maker;  ///< The job that makes the same tables; this job waits for it.
     TimePoint training_begin;          ///< When the first training unit was leased; unset before.
-    TimePoint work_begin;         ///< When a worker began with the job's first training unit, its scene being there; unset before.
-    double learning_seconds = 0;  ///< From `work_begin` until the tables existed: counts towards the time limit.
+    /// Since when, without a break, workers trace for the job or it learns, the first worker's scene being there; unset while it
+    /// waits.
+    TimePoint work_begin;
+    double learning_seconds = 0;  ///< What such times before took together: counts towards the time limit.
     TimePoint round_begin;        ///< The same for the open round.
     struct Learning {
         TimePoint begin;   ///< Begin of the phase kLearning.
@@ -83,6 +85,10 @@ struct JobRecord {
     /// What is left of the time limit; only for a job that has one. Neither reading the scene nor waiting, for workers or for
     /// the tables of another job, takes any of it.
     double seconds_left(TimePoint now) const;
+    /// Ends the time since `work_begin`, which counts from now on as taken.
+    void stop_clock(TimePoint now);
+    /// Whether the open round waits for workers: other jobs may have them all.
+    bool waits_for_workers() const;
     /// The units that can be leased now, or null.
     UnitTable* open_units();
     /// The same if the unit is of their kind and round, otherwise null: a late result of one round does not belong to

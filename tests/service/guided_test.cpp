@@ -134,6 +134,43 @@ TEST(GuidedTables, TheTimeThatTheyTakeCountsTowardsTheLimit) {
     EXPECT_EQ(service.wait_end(id).samples_per_pixel_done, lease.unit.render.iteration_count);
 }
 
+/// Neither does the time in which an older job has all workers.
+TEST(GuidedTables, TheTimeBetweenTheirUnitsIsNotTheJobs) {
+    TableService service;
+    const std::string older = service.submit_training(service.guided_spec());
+    JobSpec timed = service.table_spec(0);
+    timed.time_limit_seconds = 10;
+    const std::string younger = service.submit_training(timed);
+    // The pilot of the older job is one unit, so that the other worker begins with the younger one.
+    const std::string first = service.add_worker(), second = service.add_worker();
+    const UnitLease pilot = service.lease(first).at(0);
+    ASSERT_EQ(pilot.job_id, older);
+    const auto trace_one = [&](const UnitLease& lease) {
+        ASSERT_EQ(lease.job_id, younger);
+        ASSERT_TRUE(service.coordinator->heartbeat(second, {{lease.reference(), true}}).ok());
+        service.now_ms += 1000;
+        const std::string& payload = traced(lease);
+        EXPECT_EQ(service.give(second, lease, payload, sha256(payload), 1).outcome, SubmitOutcome::kAccepted);
+    };
+    for (int unit = 0; unit < 3; ++unit) {
+        trace_one(service.lease(second).at(0));
+        if (unit == 2 || HasFatalFailure()) break;
+        std::this_thread::sleep_for(std::chrono::milliseconds(200));  // the coordinator looks fifty times a second
+        for (int i = 0; i < 6; ++i) {
+            service.now_ms += 9000;
+            ASSERT_TRUE(service.coordinator->heartbeat(first, {{pilot.reference(), true}}).ok());
+        }
+    }
+    ASSERT_FALSE(HasFatalFailure());
+    service.wait(younger, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
+    const UnitLease lease = service.lease(second).at(0);
+    ASSERT_EQ(lease.job_id, younger);
+    ASSERT_TRUE(service.coordinator->heartbeat(second, {{lease.reference(), true}}).ok());
+    EXPECT_EQ(service.coordinator->get_job(younger)->eta_seconds, 7);
+    ASSERT_TRUE(service.coordinator->cancel_job(younger).ok());
+    ASSERT_TRUE(service.coordinator->cancel_job(older).ok());
+}
+
 TEST(GuidedTables, AreCancelledInTheSecondRoundWithoutATrace) {
     TableService service;
     const std::string id = service.submit_training(service.guided_spec());
