@@ -64,7 +64,7 @@ EmissionDensities EmitterSet::emission_densities(const Emitter& e, const Vec3& p
     return {marginal, marginal > 0 ? (of_power / marginal) * by_power + (of_learned / marginal) * learned : 0};
 }
 
-void EmitterSet::sample_learned(double pick, Vec2 u_position, Vec2 u_direction, EmissionSample* out) const {
+void EmitterSet::sample_learned(double pick, Vec2 u_position, Vec2 u_direction, EmissionSample* out, Vec3* passed) const {
     const EmissionData& data = learned_->data();
     // All choices between shares are made before the rest of the numbers is used, because places use them differently.
     const bool by_power = happens(double(data.power_share), &pick);
@@ -89,11 +89,14 @@ void EmitterSet::sample_learned(double pick, Vec2 u_position, Vec2 u_direction, 
     if (departs_by_power || e.has_direction_map()) {
         sample_departure(rest, u_direction, out);
     } else if (e.is_infinite()) {
-        start_before_scene(learned_->sample_crossing(out->direction, u_direction), out);
+        // The origin of the ray, at the border of the scene, is rounded too coarsely to tell where it crosses a small cell.
+        *passed = learned_->sample_crossing(out->direction, u_direction);
+        return start_before_scene(*passed, out);
     } else {
         out->direction = learned_->sample_direction(out->position, u_direction);
         if (!e.is_area()) out->normal = out->direction;
     }
+    *passed = out->position;
 }
 
 }  // namespace lightloom

@@ -9,6 +9,8 @@ namespace lightloom {
 namespace {
 
 constexpr float kBelowOne = 0x1.fffffep-1f;
+/// Bound of the relative error with which a place on the square across a ray is known.
+constexpr float kRounding = 1e-6f;
 
 Status check_tree(const std::vector<EmissionData::Node>& nodes, size_t cells) {
     if (nodes.empty()) return data_loss("the emission table has no tree of places");
@@ -145,8 +147,12 @@ float EmissionTable::pdf_crossing(const Vec3& w, const Vec3& point) const {
     const Vec3 d = point - cell.pivot;
     const float width = 2 * cell.half;
     const Vec2 p{dot(d, frame.s) / width + 0.5f, dot(d, frame.t) / width + 0.5f};
-    if (!(p.x >= 0 && p.x < 1 && p.y >= 0 && p.y < 1)) return 0;
-    return density(cell.root, p) / (width * width);
+    // Rounding takes places at the border across it. By power alone they would have a density that may be millions of times too
+    // small, and a sub-path that passes there would be as much too bright.
+    const float slack = kRounding * (1 + (length(d) + length(cell.pivot)) / width);
+    if (!(p.x >= -slack && p.x < 1 + slack && p.y >= -slack && p.y < 1 + slack)) return 0;
+    const Vec2 inside{clamp(p.x, 0.0f, kBelowOne), clamp(p.y, 0.0f, kBelowOne)};
+    return density(cell.root, inside) / (width * width);
 }
 
 }  // namespace lightloom

@@ -170,15 +170,17 @@ void EmitterSet::sample_departure(float rest, Vec2 u, EmissionSample* out) const
 bool EmitterSet::sample_emission(double pick, Vec2 u_position, Vec2 u_direction, EmissionSample* out) const {
     if (emitters_.empty()) return false;
     float rest = 0;
+    Vec3 passed;
     out->alpha = {};
     if (!learned_) [[likely]] {
         sample_place(pick, u_position, out, &rest);
         sample_departure(rest, u_direction, out);
+        passed = out->position;
     } else {
-        sample_learned(pick, u_position, u_direction, out);
+        sample_learned(pick, u_position, u_direction, out, &passed);
     }
     const Emitter& e = emitters_[out->emitter];
-    const EmissionDensities densities = emission_densities(e, out->position, out->normal, out->direction, out->position);
+    const EmissionDensities densities = emission_densities(e, out->position, out->normal, out->direction, passed);
     out->pdf_position = densities.position, out->pdf_direction = densities.direction;
     if (!(out->pdf_position > 0)) return false;
     if (!(out->pdf_direction > 0)) return true;

@@ -147,8 +147,8 @@ class EmitterSet {
     void sample_on_emitter(Vec2 u, EmissionSample* out, float rest) const;
     /// The choice of the direction of a finite light or of the ray of an infinite one.
     void sample_departure(float rest, Vec2 u, EmissionSample* out) const;
-    /// Both choices with the learned table.
-    void sample_learned(double pick, Vec2 u_position, Vec2 u_direction, EmissionSample* out) const;
+    /// Both choices with the learned table. `passed` receives a point that the light passes.
+    void sample_learned(double pick, Vec2 u_position, Vec2 u_direction, EmissionSample* out, Vec3* passed) const;
     /// Puts the origin of an infinite light's ray through `point` before the scene.
     void start_before_scene(const Vec3& point, EmissionSample* out) const;
     // The densities by power alone, and those that were learned alone.

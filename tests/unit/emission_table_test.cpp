@@ -120,6 +120,39 @@ TEST(LearnedEmission, PointsAndSquaresAreInverse) {
     }
 }
 
+/// A table for a single emitter, with one density for its places and one cell.
+EmissionData table_of(std::vector<SquareNode> squares, uint32_t place, const EmissionData::Cell& cell) {
+    EmissionData data;
+    data.power_share = 0.1f, data.power_places = 0.15f, data.power_directions = 0.1f;
+    data.emitters = {1};
+    data.places = {place};
+    data.finite = data.infinite = {EmissionData::make_leaf(0)};
+    data.cells = {cell};
+    data.squares = std::move(squares);
+    return data;
+}
+
+/// Where the origin of a ray is far from what its cell lights, rounding moves the place at which the ray crosses the cell. The area
+/// that rays cross is the sum of their reciprocal densities.
+TEST(LearnedEmission, ACellFarSmallerThanTheSceneIsCrossedEverywhereAlike) {
+    constexpr float kWide = 1e4f, kHalf = 10;
+    EmitterSet set({testing::distant()}, {}, {}, kWide);
+    const Vec3 pivot{30, -20, 50};
+    set.guide_emission(std::make_shared<const EmissionTable>(table_of({}, kUniformSquare, {kUniformSquare, pivot, kHalf})));
+    constexpr int kSamples = 1000000;
+    double area = 0;
+    Rng rng({7, Stage::kTraining, 0, 0});
+    for (int i = 0; i < kSamples; ++i) {
+        EmissionSample s;
+        const double pick = rng.uniform_double();
+        const Vec2 u = rng.uniform2(), v = rng.uniform2();
+        ASSERT_TRUE(set.sample_emission(pick, u, v, &s));
+        const Vec3 at = Frame(s.direction).to_local(s.position - pivot);
+        if (std::max(std::fabs(at.x), std::fabs(at.y)) < kHalf + 0.01f) area += 1 / double(s.pdf_direction) / kSamples;
+    }
+    EXPECT_NEAR(area, 4 * kHalf * kHalf, 2);
+}
+
 TEST(LearnedEmission, ComesBackFromItsBytesAndRefusesOthers) {
     const EmitterSet set = with_a_lamp({"triangle", testing::triangle(false), 0}, EnvironmentCase(0));
     const EmissionData data = testing::random_emission(set, 5, kCentre, kRadius);
