@@ -6,18 +6,27 @@
 #include "common/scene/sampling.h"
 
 namespace lightloom {
+namespace {
+
+double dot_in_double(const Vec3& a, const Vec3& b) {
+    return double(a.x) * double(b.x) + double(a.y) * double(b.y) + double(a.z) * double(b.z);
+}
+
+}  // namespace
 
 Vec2 emitter_square(const Emitter& e, const Vec3& position, const Vec3& w) {
     switch (e.kind) {
         case EmitterKind::kTriangle: {
+            // The edges of a narrow triangle are nearly parallel: single precision would leave little of the determinant.
             const Vec3 d = position - e.position;
-            const float a = dot(e.edge1, e.edge1), b = dot(e.edge1, e.edge2), c = dot(e.edge2, e.edge2);
-            const float p = dot(d, e.edge1), q = dot(d, e.edge2);
-            const float determinant = a * c - b * b;
+            const double a = dot_in_double(e.edge1, e.edge1), b = dot_in_double(e.edge1, e.edge2),
+                         c = dot_in_double(e.edge2, e.edge2);
+            const double p = dot_in_double(d, e.edge1), q = dot_in_double(d, e.edge2);
+            const double determinant = a * c - b * b;
             if (!(determinant > 0)) return {};
-            const float b1 = (c * p - b * q) / determinant, b2 = (a * q - b * p) / determinant;
-            const float sum = b1 + b2;
-            return {clamp(sum * sum, 0.0f, 1.0f), sum > 0 ? clamp(b2 / sum, 0.0f, 1.0f) : 0};
+            const double b1 = (c * p - b * q) / determinant, b2 = (a * q - b * p) / determinant;
+            const double sum = b1 + b2;
+            return {clamp(float(sum * sum), 0.0f, 1.0f), sum > 0 ? clamp(float(b2 / sum), 0.0f, 1.0f) : 0};
         }
         case EmitterKind::kSphere: {
             const Vec3 n = (position - e.position) / e.radius;

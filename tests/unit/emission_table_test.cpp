@@ -153,6 +153,40 @@ TEST(LearnedEmission, ACellFarSmallerThanTheSceneIsCrossedEverywhereAlike) {
     EXPECT_NEAR(area, 4 * kHalf * kHalf, 2);
 }
 
+/// A facet of a fluorescent tube, and a slit.
+TEST(LearnedEmission, PlacesOnNarrowTrianglesHaveTheDensityWithWhichTheyAreDrawn) {
+    for (const float width : {2.5e-3f, 4e-4f}) {
+        Emitter e = testing::triangle(false);
+        e.position = {0.3f, 2.1f, -0.4f};
+        e.edge1 = {1.2f, 0, 0.3f};
+        e.edge2 = e.edge1 + normalize(Vec3{-0.3f, 0, 1.2f}) * width;
+        e.normal = {0, -1, 0};
+        e.inv_area = 2 / length(cross(e.edge1, e.edge2));
+        EmitterSet set({e}, {}, kCentre, kRadius);
+        std::vector<SquareNode> squares(4);
+        for (uint32_t i = 0; i < 4; ++i) {
+            squares[i] = {.share = {0.7f, 0.1f, 0.1f, 0.1f}, .child = {}};
+            if (i < 3) squares[i].child[0] = i + 1;
+        }
+        set.guide_emission(std::make_shared<const EmissionTable>(table_of(squares, 0, {})));
+        Rng rng({8, Stage::kTraining, 0, 0});
+        constexpr int kSamples = 400000;
+        double area = 0, far = 0;
+        for (int i = 0; i < kSamples; ++i) {
+            EmissionSample s;
+            const double pick = rng.uniform_double();
+            const Vec2 u = rng.uniform2(), v = rng.uniform2();
+            ASSERT_TRUE(set.sample_emission(pick, u, v, &s));
+            area += 1 / double(s.pdf_position) / kSamples;
+            Vec3 normal;
+            const Vec2 back = emitter_square(e, point_in_square(e, u, &normal), {});
+            far += (std::fabs(back.x - u.x) > 0.01f) / double(kSamples);
+        }
+        EXPECT_NEAR(area * double(e.inv_area), 1, 0.015) << width;
+        EXPECT_LT(far, 0.001) << width;
+    }
+}
+
 TEST(LearnedEmission, ComesBackFromItsBytesAndRefusesOthers) {
     const EmitterSet set = with_a_lamp({"triangle", testing::triangle(false), 0}, EnvironmentCase(0));
     const EmissionData data = testing::random_emission(set, 5, kCentre, kRadius);
