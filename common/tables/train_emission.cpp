@@ -284,9 +284,10 @@ EmissionData train_emission(const TrainingData& data, const std::vector<double>&
         float weight = float(double(p.estimate) / brightness[p.block]);
         if (p.vertex_count == 3) weight *= kDirectLight;
         if (!(weight > 0) || !std::isfinite(weight)) continue;
-        const bool infinite = emitters[p.emitter].is_infinite();
-        const Vec3 travel = v[0].normal;
-        lessons.push_back({infinite ? travel : v[0].position, v[1].position, p.emitter, weight});
+        const Emitter& e = emitters[p.emitter];
+        // A threshold may lie at the very direction of a distant light: a packed one would miss it.
+        const Vec3 travel = e.kind == EmitterKind::kDistant ? e.normal : Vec3(v[0].normal);
+        lessons.push_back({e.is_infinite() ? travel : v[0].position, v[1].position, p.emitter, weight});
     }
     if (lessons.empty() || stop.stop_requested()) return {};
     join_equal(&lessons);

@@ -7,6 +7,8 @@
 
 #include "common/scene/emitter_square.h"
 #include "common/tables/emission_part.h"
+#include "common/tables/train.h"
+#include "common/tables/train_emission.h"
 #include "emitter_cases.h"
 #include "tests/support/random_emission.h"
 #include "tests/support/statistics.h"
@@ -184,6 +186,40 @@ TEST(LearnedEmission, PlacesOnNarrowTrianglesHaveTheDensityWithWhichTheyAreDrawn
         }
         EXPECT_NEAR(area * double(e.inv_area), 1, 0.015) << width;
         EXPECT_LT(far, 0.001) << width;
+    }
+}
+
+/// Training data keep directions in 32 bits, which is not where a sun stands.
+TEST(LearnedEmission, ASunLeavesByWhatItTaughtAndNotByWhatTheSkyTaught) {
+    for (int turn = 0; turn < 8; ++turn) {
+        const EnvironmentCase sky(1);
+        std::vector<Emitter> emitters{testing::distant(), testing::environment()};
+        emitters[0].normal = normalize(Vec3{0.3f + 0.07f * float(turn), -0.7f, 0.2f});
+        const EmitterSet set(emitters, sky.make(), kCentre, kRadius);
+        const Vec3 by_the_sun{2, 0, 1}, by_the_sky{-2, 0, -1};
+        TrainingData data;
+        data.blocks_x = data.blocks_y = 1;
+        Rng rng({9, Stage::kTraining, 0, uint64_t(turn)});
+        for (int i = 0; i < 4000; ++i) {
+            const uint32_t emitter = i % 5 < 3 ? 0 : 1;
+            Vec3 travel = emitters[0].normal;
+            if (emitter == 1) travel = normalize(Vec3{rng.uniform() - 0.9f, -0.3f, rng.uniform() - 0.9f});
+            const Vec3 jitter = Vec3{rng.uniform(), rng.uniform(), rng.uniform()} * 0.2f;
+            TrainingPath path;
+            path.first_vertex = uint32_t(data.vertices.size());
+            path.vertex_count = 4;
+            path.emitter = emitter;
+            path.estimate = path.square = 1;
+            data.vertices.push_back({travel * -10.0f, travel, 0});
+            data.vertices.push_back({(emitter == 0 ? by_the_sun : by_the_sky) + jitter, {}, 1});
+            data.vertices.push_back({Vec3{0, 1, 0}, {}, 1});
+            data.vertices.push_back({Vec3{0, 2, 0}, {}, 0});
+            data.paths.push_back(path);
+        }
+        data.samples = 4000;
+        data.block_sum = {4000};
+        const EmissionTable table(train_emission(data, block_brightness(data), set, {}));
+        EXPECT_LT(length(table.infinite_cell(emitters[0].normal).pivot - by_the_sun), 0.5f) << turn;
     }
 }
 
