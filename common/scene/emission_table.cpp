@@ -1,5 +1,6 @@
 #include "common/scene/emission_table.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -9,6 +10,9 @@ namespace lightloom {
 namespace {
 
 constexpr float kBelowOne = 0x1.fffffep-1f;
+/// Levels of a square, and half widths of cells, whose densities are within single precision together.
+constexpr int kMostLevels = 24;
+constexpr float kLeastHalf = 1e-9f, kMostHalf = 1e16f;
 /// Bound of the relative error with which a place on the square across a ray is known.
 constexpr float kRounding = 1e-6f;
 
@@ -97,11 +101,12 @@ Status EmissionData::validate(size_t emitter_count) const {
         if (bad_root(root)) return data_loss("the emission table names a density that it does not have");
     for (const Cell& c : cells) {
         if (bad_root(c.root)) return data_loss("the emission table names a density that it does not have");
-        if (!(c.half > 0 && std::isfinite(c.half) && std::isfinite(c.pivot.x + c.pivot.y + c.pivot.z)))
-            return data_loss("the emission table has a cell without a size");
+        if (!(c.half >= kLeastHalf && c.half <= kMostHalf && std::isfinite(c.pivot.x + c.pivot.y + c.pivot.z)))
+            return data_loss("the emission table has a cell whose size or place is out of range");
     }
     LL_RETURN_IF_ERROR(check_tree(finite, cells.size()));
     LL_RETURN_IF_ERROR(check_tree(infinite, cells.size()));
+    std::vector<int> level(squares.size(), 1);
     for (size_t i = 0; i < squares.size(); ++i) {
         float total = 0;
         for (int q = 0; q < 4; ++q) {
@@ -109,8 +114,10 @@ Status EmissionData::validate(size_t emitter_count) const {
             if (!(squares[i].share[q] > 0)) return data_loss("the emission table has a density that is not positive");
             if (child != 0 && (child <= i || child >= squares.size()))
                 return data_loss("the emission table's densities are malformed");
+            if (child != 0) level[child] = std::max(level[child], level[i] + 1);
             total += squares[i].share[q];
         }
+        if (level[i] > kMostLevels) return data_loss("the emission table has a density of too many levels");
         if (!(std::fabs(total - 1) < 1e-5f)) return data_loss("the emission table has a density that does not integrate to one");
     }
     return {};

@@ -245,6 +245,16 @@ TEST(LearnedEmission, ComesBackFromItsBytesAndRefusesOthers) {
     refused([](EmissionData* d) { d->infinite.clear(); }, "no tree");
     refused([](EmissionData* d) { d->squares[0].share[1] = 0; }, "no density");
     refused([](EmissionData* d) { d->squares[1].child[2] = 1; }, "a loop");
+    refused([](EmissionData* d) { d->cells[0].half = 1e-25f; }, "a density beyond single precision");
+    refused([](EmissionData* d) { d->cells[0].half = 1e25f; }, "a density that is zero in single precision");
+    refused(
+        [](EmissionData* d) {
+            const uint32_t first = uint32_t(d->squares.size());
+            for (uint32_t i = 0; i < 80; ++i)
+                d->squares.push_back({.share = {0.97f, 0.01f, 0.01f, 0.01f}, .child = {first + i + 1}});
+            d->squares.back().child[0] = 0;
+        },
+        "so deep that the density is beyond single precision");
     EXPECT_FALSE(parse_emission(bytes.substr(0, bytes.size() - 1)).ok());
     EXPECT_FALSE(parse_emission("").ok());
     EXPECT_TRUE(EmissionData().validate(2).ok()) << "nothing learned";
