@@ -34,7 +34,7 @@ bool samples_cone(const Emitter& e, float d2) {
 
 EmitterSet::EmitterSet(std::vector<Emitter> emitters, Environment environment, Vec3 centre, float radius, LightMaps maps)
     : emitters_(std::move(emitters)),
-      environment_(std::move(environment)),
+      environment_(std::make_shared<const Environment>(std::move(environment))),
       maps_(std::move(maps)),
       centre_(centre),
       scene_radius_(radius) {
@@ -59,7 +59,7 @@ double EmitterSet::power(const Emitter& e) const {
         case EmitterKind::kPoint: return 4 * kPiD * scalar_of(e.radiance);
         case EmitterKind::kSpot: return kPiD * scalar_of(e.radiance) * (double(e.falloff_height) + double(e.total_height));
         case EmitterKind::kDistant: return scalar_of(e.radiance) * disc;
-        case EmitterKind::kEnvironment: return environment_.integrated_radiance() * disc;
+        case EmitterKind::kEnvironment: return environment_->integrated_radiance() * disc;
         case EmitterKind::kProjection:
         case EmitterKind::kGoniometric: return scalar_of(e.radiance * direction_map(e).integral());
     }
@@ -73,7 +73,7 @@ Rgb EmitterSet::emitted(const Emitter& e, const Vec3& position, const Vec3& norm
         case EmitterKind::kPoint: return e.radiance;
         case EmitterKind::kSpot: return e.radiance * spot_falloff(e, w);
         case EmitterKind::kDistant: return e.radiance;
-        case EmitterKind::kEnvironment: return environment_.radiance(-w);
+        case EmitterKind::kEnvironment: return environment_->radiance(-w);
         case EmitterKind::kProjection:
         case EmitterKind::kGoniometric: return e.radiance * direction_map(e).intensity(w);
     }
@@ -82,7 +82,7 @@ Rgb EmitterSet::emitted(const Emitter& e, const Vec3& position, const Vec3& norm
 
 float EmitterSet::place_on_emitter(const Emitter& e, const Vec3& w) const {
     if (e.is_area()) return e.inv_area;
-    return e.kind == EmitterKind::kEnvironment ? environment_.pdf_solid_angle(-w) : 1;
+    return e.kind == EmitterKind::kEnvironment ? environment_->pdf_solid_angle(-w) : 1;
 }
 
 float EmitterSet::departure_by_power(const Emitter& e, const Vec3& normal, const Vec3& w) const {
@@ -128,7 +128,7 @@ void EmitterSet::sample_on_emitter(Vec2 u, EmissionSample* out, float rest) cons
         case EmitterKind::kProjection:
         case EmitterKind::kGoniometric: out->position = e.position; break;
         case EmitterKind::kDistant: out->direction = out->normal = e.normal; break;
-        case EmitterKind::kEnvironment: out->direction = out->normal = -environment_.sample(rest, u); break;
+        case EmitterKind::kEnvironment: out->direction = out->normal = -environment_->sample(rest, u); break;
     }
 }
 
@@ -195,7 +195,7 @@ bool EmitterSet::sample_next_event(const Vec3& reference, double pick, Vec2 u, N
     out->emitter = pick_.sample(pick, &rest);
     const Emitter& e = emitters_[out->emitter];
     if (e.is_infinite()) {
-        out->wi = e.kind == EmitterKind::kDistant ? -e.normal : environment_.sample(rest, u);
+        out->wi = e.kind == EmitterKind::kDistant ? -e.normal : environment_->sample(rest, u);
         out->normal = -out->wi;
         out->position = reference + out->wi * (2 * scene_radius_);
         out->geometry = 1;

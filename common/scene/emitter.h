@@ -100,7 +100,7 @@ class EmitterSet {
     const Emitter& operator[](uint32_t i) const { return emitters_[i]; }
     /// Index of the environment emitter, or kNone.
     int32_t environment_index() const { return environment_index_; }
-    const Environment& environment() const { return environment_; }
+    const Environment& environment() const { return *environment_; }
     float scene_radius() const { return scene_radius_; }
     /// A point outside of the scene, on a ray that has left it.
     Vec3 outside(const Vec3& origin, const Vec3& direction) const { return origin + direction * (2 * scene_radius_); }
@@ -125,7 +125,7 @@ class EmitterSet {
     /// The part of emitted() that belongs to x_0 alone, F(1) of a light prefix: radiance of area lights and of the environment
     /// along `w`, intensity on a spot's axis, or the mean over an image.
     Rgb strength(const Emitter& e, const Vec3& position, const Vec3& w) const {
-        if (e.kind == EmitterKind::kEnvironment) return environment_.radiance(-w);
+        if (e.kind == EmitterKind::kEnvironment) return environment_->radiance(-w);
         return e.has_direction_map() ? e.radiance * direction_map(e).mean() : radiance_at(e, position);
     }
     /// pL of x_0: density of sample_emission() for the point at `position`, native measure, probability of the emitter
@@ -166,7 +166,7 @@ class EmitterSet {
     std::vector<Emitter> emitters_;
     AliasTable pick_;
     std::shared_ptr<const EmissionTable> learned_;
-    Environment environment_;
+    std::shared_ptr<const Environment> environment_ = std::make_shared<const Environment>();  ///< Of all copies: it may be large.
     LightMaps maps_;
     int32_t environment_index_ = kNone;
     Vec3 centre_;

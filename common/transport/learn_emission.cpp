@@ -25,11 +25,13 @@ Result<Tables> learn_table(const LearnRequest& request) {
 }  // namespace
 
 EmissionLesson learn_emission(const LearnRequest& r) {
-    EmissionLesson lesson{{}, r.emitters, r.emitters};
-    lesson.traced.guide_emission(emission_of(r.guide));
+    EmissionLesson lesson;
     if (!learns_emission(r.settings.algorithm)) return lesson;
     lesson.data = train_emission(r.data, block_brightness(r.data), r.emitters, r.control.stop);
-    if (lesson.data.learned()) lesson.rendered.guide_emission(std::make_shared<const EmissionTable>(lesson.data));
+    if (!lesson.data.learned()) return lesson;
+    lesson.traced = lesson.rendered = r.emitters;
+    lesson.traced->guide_emission(emission_of(r.guide));
+    lesson.rendered->guide_emission(std::make_shared<const EmissionTable>(lesson.data));
     return lesson;
 }
 

@@ -223,6 +223,13 @@ TEST(LearnedEmission, ASunLeavesByWhatItTaughtAndNotByWhatTheSkyTaught) {
     }
 }
 
+/// They are copied for each round of learning and each renderer.
+TEST(LearnedEmission, CopiesOfEmittersShareTheSky) {
+    const EmitterSet set({testing::environment()}, EnvironmentCase(2).make(), kCentre, kRadius);
+    const EmitterSet copy = set;
+    EXPECT_EQ(&copy.environment(), &set.environment());
+}
+
 TEST(LearnedEmission, ComesBackFromItsBytesAndRefusesOthers) {
     const EmitterSet set = with_a_lamp({"triangle", testing::triangle(false), 0}, EnvironmentCase(0));
     const EmissionData data = testing::random_emission(set, 5, kCentre, kRadius);
