@@ -349,7 +349,7 @@ void Coordinator::tick(std::stop_token stop) {
         const TimePoint now = options_.clock();
         for (const auto& job : jobs_) {
             if (job->maker) resume_waiting(job);
-            if (job->waits_for_workers()) job->stop_clock(now);
+            if (job->waits()) job->stop_clock(now);
             UnitTable* const units = job->open_units();
             if (!units) continue;
             if (const auto expired = units->expire(now); !expired.empty()) {

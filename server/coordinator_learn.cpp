@@ -35,6 +35,7 @@ class Coordinator::Tracing final : public TracingPort {
             if (!alive()) return over();
             TrainingRound& round = *job_.round;
             if (!round.complete()) continue;
+            if (job_.work_begin == TimePoint()) job_.work_begin = coordinator_.options_.clock();  // it waited for the scene
             TracedRound traced{.kind = round.kind(),
                                .round = round.number(),
                                .work = round.work(),
@@ -190,10 +191,15 @@ Status Coordinator::learn(JobRecord& job, std::stop_token stop) {
         if (job.state != JobState::kPreparing) return over();
         spec = job.spec;
         build_scene = job.facts.build_scene;
+        job.scene_built = false;
     }
     if (!build_scene) return internal_error("this coordinator cannot build the scene that tables are learned for");
     const auto scene = build_scene();
     if (!scene.ok()) return scene.status();
+    {
+        const std::lock_guard lock(mutex_);
+        job.scene_built = true;
+    }
     const EmitterSet& emitters = (*scene)->emitters();
     Tracing tracing(*this, job, emitters.all().size(), stop);
     auto learned = learn_tables(std::move(spec), emitters, tracing, options_.clock, stop);

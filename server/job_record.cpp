@@ -72,8 +72,9 @@ void JobRecord::stop_clock(TimePoint now) {
     if (work_begin != TimePoint()) learning_seconds += seconds_between(std::exchange(work_begin, {}), now);
 }
 
-bool JobRecord::waits_for_workers() const {
-    return state == JobState::kPreparing && round && !round->complete() && round->units().leased_count() == 0;
+bool JobRecord::waits() const {
+    if (state != JobState::kPreparing || !round) return false;
+    return round->complete() ? !scene_built : round->units().leased_count() == 0;
 }
 
 JobInfo JobRecord::info(TimePoint now) const {

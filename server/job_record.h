@@ -58,6 +58,7 @@ struct JobRecord {
     std::shared_ptr<const std::string> guide_bytes;  ///< The bytes of the guide, in case the disk loses them.
     bool capped_by_time_limit = false;
     Digest table_key;                  ///< Key of the tables that the job needs; set before `makes_tables` or `maker`.
+    bool scene_built = false;          ///< Whether the coordinator has built the scene that learning needs.
     bool set_grows = false;            ///< Whether nobody knows yet which tables the job will make.
     bool makes_tables = false;         ///< Whether the job probes, traces and learns itself.
     bool may_wait = true;              ///< Whether it may wait for another job's tables: not after damage.
@@ -87,8 +88,8 @@ struct JobRecord {
     double seconds_left(TimePoint now) const;
     /// Ends the time since `work_begin`, which counts from now on as taken.
     void stop_clock(TimePoint now);
-    /// Whether the open round waits for workers: other jobs may have them all.
-    bool waits_for_workers() const;
+    /// Whether the open round waits, for workers, which other jobs may have, or for the scene that learning needs.
+    bool waits() const;
     /// The units that can be leased now, or null.
     UnitTable* open_units();
     /// The same if the unit is of their kind and round, otherwise null: a late result of one round does not belong to

@@ -171,6 +171,38 @@ TEST(GuidedTables, TheTimeBetweenTheirUnitsIsNotTheJobs) {
     ASSERT_TRUE(service.coordinator->cancel_job(older).ok());
 }
 
+/// Nor that in which the coordinator reads the scene, which a worker may know from an earlier job.
+TEST(GuidedTables, TheTimeOfReadingTheSceneIsNotTheJobs) {
+    std::atomic<bool> read{false};
+    TableService service([&](CoordinatorOptions& options) {
+        options.read_scene = [&](const AssetStore&, const JobSpec&, std::stop_token) {
+            SceneFacts facts = golden_facts();
+            facts.build_scene = [&read, build = facts.build_scene] {
+                while (!read) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                return build();
+            };
+            return Result<SceneFacts>(std::move(facts));
+        };
+    });
+    JobSpec timed = service.table_spec(0);
+    timed.time_limit_seconds = 10;
+    const std::string id = service.submit_training(timed);
+    const auto units = lease_all(service);
+    ASSERT_EQ(units.size(), 3u);
+    ASSERT_TRUE(service.coordinator->heartbeat(units[0].first, {{units[0].second.reference(), true}}).ok());
+    service.now_ms += 2000;
+    for (const auto& [worker, lease] : units)
+        EXPECT_EQ(service.give(worker, lease, traced(lease)).outcome, SubmitOutcome::kAccepted);
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));  // the coordinator looks fifty times a second
+    service.now_ms += 60000;
+    read = true;
+    service.wait(id, [](const JobInfo& j) { return j.state != JobState::kPreparing; });
+    const UnitLease lease = service.lease(units[0].first).at(0);
+    ASSERT_TRUE(service.coordinator->heartbeat(units[0].first, {{lease.reference(), true}}).ok());
+    EXPECT_EQ(service.coordinator->get_job(id)->eta_seconds, 8);
+    ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
+}
+
 TEST(GuidedTables, AreCancelledInTheSecondRoundWithoutATrace) {
     TableService service;
     const std::string id = service.submit_training(service.guided_spec());
