@@ -8,12 +8,15 @@
 #include "common/core/rng.h"
 #include "common/path/path_view.h"
 #include "common/path/vertex.h"
+#include "common/tables/gain_table.h"
 
 namespace lightloom {
 
 struct RouletteRule {
     int first_vertex = 4;  ///< Sub-path vertices with a smaller index always go on.
     float min_survival = 0.5f;
+    /// Camera sub-paths go by this instead, from their first vertex in the scene on, and may divide; null: they do not.
+    const GainTable* gain = nullptr;
 };
 
 /// Uniforms that one scattering event consumes.

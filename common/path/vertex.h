@@ -17,7 +17,8 @@ struct SubPathVertex {
     double rev = 0;      ///< Density of this vertex as traced from its successor; set when the successor has scattered.
     Vec3 p;              ///< Position.
     Rgb alpha;           ///< Throughput of the sub-path up to here, before this vertex scatters.
-    float survival = 1;  ///< Product of the survival probabilities that alpha was divided by: alpha * survival is free of roulette.
+    float survival = 1;  ///< What roulette divided alpha by: alpha * survival is free of it. A product of probabilities, or of
+                         ///< expected numbers of branches.
     /// Light subspace of the prefix, or eye subspace of the suffix, that ends here as traced; reverse_label is of the
     /// other kind, as seen from the successor. kNoLabel until a method with tables asks for them.
     uint16_t label = kNoLabel, reverse_label = kNoLabel;

@@ -15,6 +15,8 @@
 // counts). The paths that it found are dealt to the two places in turn. A light sub-path that reached the lens keeps
 // one path. Each is chosen in proportion to its estimate; estimate and square are divided by the probability of that
 // choice, so that sums over D stay unbiased.
+//
+// Visits tell roulette where camera sub-paths still have something to gain (train_gain.h).
 
 #include <cstdint>
 #include <string>
@@ -24,6 +26,7 @@
 #include "common/core/packed_normal.h"
 #include "common/core/result.h"
 #include "common/core/vec.h"
+#include "common/tables/frame_blocks.h"
 
 namespace lightloom {
 
@@ -40,9 +43,6 @@ inline constexpr int kTrainingLengths = 4, kTrainingPathsPerLength = 2;
 /// Most paths that a camera sample keeps; they are neighbours in TrainingData::paths.
 inline constexpr size_t kTrainingPathsPerSample = size_t(kTrainingLengths) * kTrainingPathsPerLength;
 
-/// Blocks into which the frame is divided, about; learning joins them where samples are few.
-inline constexpr uint64_t kTrainingBlocks = 2500;
-
 struct TrainingPath {
     uint32_t first_vertex = 0;
     uint32_t vertex_count = 0;  ///< k + 1, x_0 ... x_k; light sub-paths: y_0 ... y_{n-1}.
@@ -52,15 +52,26 @@ struct TrainingPath {
     float next_event = 0, lens = 0;  ///< Densities; see above. Light sub-paths: 0.
 };
 
+/// A vertex of a camera sub-path that could have scattered, and what came of it.
+struct TrainingVisit {
+    Vec3 position;
+    PackedNormal normal;  ///< Geometric.
+    float gain = 0;       ///< Estimates that the sub-path's later vertices found, over its throughput here.
+    float vertices = 0;   ///< How many later vertices there were.
+};
+
 struct TrainingData {
     int32_t blocks_x = 0, blocks_y = 0;
     std::vector<double> block_sum;  ///< Sums of all estimates, kept or not; blocks_x * blocks_y.
-    uint64_t samples = 0;           ///< D: camera samples traced, uniform over the frame.
-    uint64_t light_samples = 0;     ///< M': light sub-paths traced to measure Q, those included that left nothing to keep.
+    /// Sums of squares of what each camera sample found; as many, or none if nobody asked for visits.
+    std::vector<double> block_square;
+    uint64_t samples = 0;        ///< D: camera samples traced, uniform over the frame.
+    uint64_t light_samples = 0;  ///< M': light sub-paths traced to measure Q, those included that left nothing to keep.
     std::vector<TrainingPath> paths;
     std::vector<TrainingPath> light_paths;
     std::vector<uint32_t> part_ends;  ///< Ends in `paths` of the parts that append() has joined; not serialized.
     std::vector<TrainingVertex> vertices;
+    std::vector<TrainingVisit> visits;  ///< Of all camera sub-paths; none if nobody asked for them.
 
     static constexpr uint64_t kMaxVertices = UINT32_MAX;  ///< TrainingPath::first_vertex has 32 bits.
 

@@ -1,6 +1,6 @@
 #include "common/transport/bdpt.h"
 
-#include "common/transport/learn_emission.h"
+#include "common/transport/learn_gain.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {
@@ -9,8 +9,8 @@ extern const AlgorithmInfo kBdptRow;
 
 namespace {
 
-constexpr ParameterInfo kParameters[] = {kRouletteStart,   kRouletteMin, kHeuristic, kNextEvent, emission_parameter(false),
-                                         kEmissionTraining};
+constexpr ParameterInfo kParameters[] = {kRouletteByAlbedo,         kRouletteStart,   kRouletteMin, kHeuristic, kNextEvent,
+                                         emission_parameter(false), kEmissionTraining};
 
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     return make_unit_renderer(r, [&](auto&& select) {
@@ -28,7 +28,7 @@ const AlgorithmInfo kBdptRow{
     .bias = "unbiased; misses specular-diffuse-specular paths from lights that cannot be hit",
     .parameters = kParameters,
     .light_paths_per_pixel = one_light_path,
-    .learning = &kEmissionLearning,
+    .learning = &kEmissionAndGainLearning,
     .make = make,
 };
 

@@ -35,9 +35,9 @@ struct BdptSelection {
 };
 
 /// Traces one camera sample and one light sub-path and calls contribute(contribution, view) for each of their
-/// contributions. light_done(y, n) is called once the light sub-path is complete.
+/// contributions. light_done(y, n) is called once the light sub-path is complete. Returns the number of camera vertices.
 template <ViewDetail detail, class LightDone, class Contribute>
-void trace_bdpt_sample(SampleContext& context, NextEventRays rays, LightDone&& light_done, Contribute&& contribute) {
+int trace_bdpt_sample(SampleContext& context, NextEventRays rays, LightDone&& light_done, Contribute&& contribute) {
     const Scene& scene = context.scene;
     PathVertex *y = context.light_path_vertices, *z = context.camera_path;
     PathView view;
@@ -60,8 +60,8 @@ void trace_bdpt_sample(SampleContext& context, NextEventRays rays, LightDone&& l
     const auto escape = [&](int t, const WalkRay& ray) {
         if (t <= context.max_edges) contribute_escape<detail>(scene, z, t, ray, &view, contribute);
     };
-    trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters, visit,
-                      escape);
+    return trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
+                             visit, escape);
 }
 
 template <class Selection = BdptSelection>

@@ -80,9 +80,10 @@ struct CachedAlgorithm {
         return state;
     }
 
-    /// Traces one camera sample and calls contribute(contribution, view) for each of its contributions.
+    /// Traces one camera sample and calls contribute(contribution, view) for each of its contributions. Returns the number of
+    /// its camera vertices.
     template <class Contribute>
-    void trace(SampleContext& context, const State& state, Contribute&& contribute) const {
+    int trace(SampleContext& context, const State& state, Contribute&& contribute) const {
         constexpr ViewDetail kDetail = Method::kDetail;
         const Scene& scene = context.scene;
         const NextEventRays rays = state.selection.next_event_rays();
@@ -145,8 +146,8 @@ struct CachedAlgorithm {
                 contribute(c, view);
             });
         };
-        trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters, visit,
-                          escape);
+        return trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
+                                 visit, escape);
     }
 };
 

@@ -2,6 +2,7 @@
 
 #include "common/tables/subspace_tables.h"
 #include "common/transport/learn_emission.h"
+#include "common/transport/learn_gain.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {
@@ -11,6 +12,7 @@ extern const AlgorithmInfo kLvcbptRow;
 namespace {
 
 constexpr ParameterInfo kParameters[] = {
+    kRouletteByAlbedo,
     kRouletteStart,
     kRouletteMin,
     kHeuristic,
@@ -22,7 +24,7 @@ constexpr ParameterInfo kParameters[] = {
     {kTrainingPaths, 20000, 1, 1e8, true,
      "light sub-paths that count the vertices per path before rendering, and from which emission=learned learns"},
 };
-constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &SubspaceTables::kPart};
+constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &GainPart::kPart, &SubspaceTables::kPart};
 
 LearningPlan plan(const AlgorithmSettings& s) {
     const uint64_t samples = uint64_t(s.value(kTrainingPaths));
@@ -41,10 +43,12 @@ Result<Tables> learn(const LearnRequest& r) {
     options.seed = r.settings.seed;
     EmissionLesson emission = learn_emission(r);
     emission.tell(&options);
+    GainData gain = learn_gain(r);
     auto tables = train_tables(r.data, r.emitters, options, r.control, r.report);
     if (!tables.ok()) return tables.status();
     Tables all(*std::move(tables));
     all.set(std::make_shared<const EmissionPart>(EmissionPart{std::move(emission.data)}));
+    all.set(std::make_shared<const GainPart>(GainPart{std::move(gain)}));
     return all;
 }
 

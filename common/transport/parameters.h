@@ -15,6 +15,18 @@ inline constexpr ParameterInfo kRouletteStart{"rr-start",
                                               true,
                                               "sub-path vertices below this index never end by Russian roulette "
                                               "[Pharr, Jakob and Humphreys 2023, 2.2.4]"};
+inline constexpr std::string_view kRoulette = "roulette";
+inline constexpr std::string_view kRoulettes[] = {"albedo", "learned", "off"};
+inline constexpr ParameterInfo kRouletteByAlbedo{
+    kRoulette,
+    0,
+    0,
+    2,
+    true,
+    "how sub-paths end by chance: by the power that they have lost; camera sub-paths by what training found that they may still "
+    "gain, where they may divide, too [Rath et al. 2022]; or not at all",
+    kRoulettes};
+inline bool learns_gain(const AlgorithmSettings& s) { return s.has(kRoulette) && s.value(kRoulette) == 1; }
 // The weights know a typical survival at best, so that they trust a technique too much whose sub-path rarely survives:
 // with 0.05 the scene `door` needs 1.4 (spcbpt), 1.7 (bdpt) and 2.5 (path) times the processor time for the same
 // relMSE; with 1 the walks cost more than they save.
@@ -99,6 +111,7 @@ inline RouletteRule roulette_of(const AlgorithmSettings& s) {
     if (!s.has(kRouletteStart.name) || !s.has(kRouletteMin.name)) return rule;
     rule.first_vertex = int(s.value(kRouletteStart.name));
     rule.min_survival = float(s.value(kRouletteMin.name));
+    if (s.has(kRoulette) && s.value(kRoulette) == 2) rule.min_survival = 1;
     return rule;
 }
 inline NextEventRays next_event_of(const AlgorithmSettings& s) { return {int(s.value(kNextEvent.name)), 1}; }

@@ -1,5 +1,6 @@
 #include "common/transport/path.h"
 
+#include "common/transport/learn_gain.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {
@@ -8,7 +9,14 @@ extern const AlgorithmInfo kPathRow;
 
 namespace {
 
-constexpr ParameterInfo kParameters[] = {kRouletteStart, kRouletteMin, kHeuristic, kNextEvent};
+constexpr ParameterInfo kParameters[] = {
+    kRouletteByAlbedo,
+    kRouletteStart,
+    kRouletteMin,
+    kHeuristic,
+    kNextEvent,
+    {kTrainingPaths, 50000, 1, 1e8, true, "camera samples of the training set from which roulette=learned learns"},
+};
 
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     return make_unit_renderer(r, [&](auto&& select) {
@@ -26,6 +34,7 @@ const AlgorithmInfo kPathRow{
     .bias = "unbiased; misses caustics of lights that cannot be hit",
     .parameters = kParameters,
     .traces = Traces::kCamera,
+    .learning = &kGainLearning,
     .make = make,
 };
 

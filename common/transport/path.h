@@ -33,8 +33,9 @@ struct PathAlgorithm {
 
     float weight(const PathView& view, Technique own) const { return float(mis_weight(view, own, selection.on(view), heuristic)); }
 
+    /// Returns the number of camera vertices.
     template <class Contribute>
-    void trace(SampleContext& context, Contribute&& contribute) const {
+    int trace(SampleContext& context, Contribute&& contribute) const {
         constexpr ViewDetail kDetail = ViewDetail::kLightEnd;
         const Scene& scene = context.scene;
         const NextEventRays rays = selection.next_event_rays();
@@ -49,8 +50,8 @@ struct PathAlgorithm {
         const auto escape = [&](int t, const WalkRay& ray) {
             if (t <= context.max_edges) contribute_escape<kDetail>(scene, z, t, ray, &view, contribute);
         };
-        trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters, visit,
-                          escape);
+        return trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
+                                 visit, escape);
     }
 };
 

@@ -1,6 +1,7 @@
 #include "common/transport/renderer.h"
 
 #include "common/tables/emission_part.h"
+#include "common/tables/gain_part.h"
 
 namespace lightloom {
 
@@ -25,7 +26,9 @@ Result<std::unique_ptr<Renderer>> Renderer::create(std::shared_ptr<const Scene> 
     } else if (!tables.empty()) {
         return failed_precondition("algorithm '" + settings.algorithm.name() + "' reads no tables");
     }
-    return info.make({lit_scene(std::move(scene), tables), settings, tables, mask});
+    auto gain = gain_of(tables, scene->frame().crop);
+    if (!gain.ok()) return gain.status();
+    return info.make({lit_scene(std::move(scene), tables), settings, tables, mask, *std::move(gain)});
 }
 
 }  // namespace lightloom

@@ -10,6 +10,7 @@
 #include "common/film/partial.h"
 #include "common/path/mask.h"
 #include "common/scene/scene.h"
+#include "common/tables/gain_table.h"
 #include "common/tables/tables.h"
 #include "common/transport/contribution.h"
 #include "common/transport/settings.h"
@@ -25,8 +26,9 @@ std::shared_ptr<const Scene> lit_scene(std::shared_ptr<const Scene> scene, const
 struct RendererRequest {
     std::shared_ptr<const Scene> scene;  ///< With the emission of the tables.
     const RenderSettings& settings;
-    const Tables& tables;       ///< The parts that the row asks for.
-    const TechniqueMask* mask;  ///< Null: all techniques.
+    const Tables& tables;                   ///< The parts that the row asks for.
+    const TechniqueMask* mask;              ///< Null: all techniques.
+    std::shared_ptr<const GainTable> gain;  ///< Of the tables; null where they have none.
 
     uint64_t light_paths_per_iteration() const { return settings.algorithm.light_paths_per_iteration(scene->frame().crop.area()); }
 };

@@ -1,6 +1,7 @@
 #include "common/transport/spcbpt.h"
 
 #include "common/transport/learn_emission.h"
+#include "common/transport/learn_gain.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {
@@ -12,6 +13,7 @@ namespace {
 constexpr std::string_view kTrainers[] = {"mm", "adam", "contribution"};
 
 constexpr ParameterInfo kParameters[] = {
+    kRouletteByAlbedo,
     kRouletteStart,
     kRouletteMin,
     kHeuristic,
@@ -51,7 +53,7 @@ constexpr ParameterInfo kParameters[] = {
      kSwitch},
 };
 static_assert(SubspaceTables::kMaxSubspaces == 16384 && SubspaceTables::kMaxWindow == 32, "the ranges above");
-constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &SubspaceTables::kPart};
+constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &GainPart::kPart, &SubspaceTables::kPart};
 
 Correction correction_of(const AlgorithmSettings& s) {
     return s.value("correlation-aware") != 0 ? Correction::kCorrelation : Correction::kUncorrected;
@@ -88,10 +90,12 @@ Result<Tables> learn(const LearnRequest& r) {
     options.judged = r.judges_guide ? guide.get() : nullptr;
     EmissionLesson emission = learn_emission(r);
     emission.tell(&options);
+    GainData gain = learn_gain(r);
     auto tables = train_tables(r.data, r.emitters, options, r.control, r.report);
     if (!tables.ok()) return tables.status();
     Tables all(*std::move(tables));
     all.set(std::make_shared<const EmissionPart>(EmissionPart{std::move(emission.data)}));
+    all.set(std::make_shared<const GainPart>(GainPart{std::move(gain)}));
     return all;
 }
 

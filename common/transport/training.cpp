@@ -11,7 +11,9 @@
 #include "common/tables/emission_part.h"
 #include "common/transport/bdpt.h"
 #include "common/transport/parameters.h"
+#include "common/transport/path.h"
 #include "common/transport/spcbpt.h"
+#include "common/transport/visits.h"
 
 namespace lightloom {
 namespace {
@@ -131,19 +133,6 @@ void keep_light_path(const LightSubPath& y, int n, int max_edges, TrainingData* 
     data->light_paths.push_back(path);
 }
 
-/// Divides the frame into about kTrainingBlocks blocks. The size of the set does not matter: nobody may know it yet.
-struct Blocks {
-    Rect crop;
-    int edge = 1;
-
-    explicit Blocks(const Rect& r) : crop(r) {
-        edge = std::max(1, int(std::ceil(std::sqrt(double(r.area()) / double(kTrainingBlocks)))));
-    }
-    int columns() const { return (crop.width() + edge - 1) / edge; }
-    int rows() const { return (crop.height() + edge - 1) / edge; }
-    uint32_t at(int px, int py) const { return uint32_t(((py - crop.y0) / edge) * columns() + (px - crop.x0) / edge); }
-};
-
 }  // namespace
 
 Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const RenderSettings& settings, const Tables& guide) {
@@ -159,6 +148,9 @@ Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const Re
     generator.roulette_ = roulette_of(algorithm);
     generator.heuristic_ = heuristic_of(algorithm);
     generator.plan_ = learning_plan(algorithm);
+    generator.keeps_visits_ = learns_gain(algorithm);
+    generator.next_event_ = algorithm.has(kNextEvent.name) ? next_event_of(algorithm) : NextEventRays{};
+    generator.unidirectional_ = algorithm.info().traces == Traces::kCamera;
     generator.light_paths_per_iteration_ = algorithm.light_paths_per_iteration(scene.frame().crop.area());
     if (!guide.empty()) {
         LL_RETURN_IF_ERROR(guide.validate(scene.emitters()));
@@ -188,7 +180,7 @@ class TrainingGenerator::Unit {
 
     Rect crop() const { return generator_.scene_->frame().crop; }
     double pixels() const { return double(crop().area()); }
-    const Blocks& blocks() const { return blocks_; }
+    const FrameBlocks& blocks() const { return blocks_; }
     RenderToCome render() const {
         const LearningPlan& plan = generator_.plan_;
         return {generator_.scene_->emitters(),
@@ -204,6 +196,7 @@ class TrainingGenerator::Unit {
         TrainingData data;
         data.blocks_x = blocks_.columns(), data.blocks_y = blocks_.rows();
         data.block_sum.assign(size_t(data.blocks_x) * size_t(data.blocks_y), 0.0);
+        if (generator_.keeps_visits_) data.block_square.assign(data.block_sum.size(), 0.0);
         return data;
     }
     RenderUnit light_work() const {
@@ -272,12 +265,28 @@ class TrainingGenerator::Unit {
     const TrainingGenerator& generator_;
     const TrainingWork& work_;
     std::stop_token stop_;
-    Blocks blocks_;
+    FrameBlocks blocks_;
 };
 
 Result<TrainingData> TrainingGenerator::trace(const TrainingWork& work, std::stop_token stop) const {
     const Unit unit(*this, work, std::move(stop));
+    if (unidirectional_) return trace_unidirectional(unit);
     return guide_ ? trace_guided(unit) : trace_pairs(unit);
+}
+
+/// Light sub-paths would find other light than such an algorithm does.
+Result<TrainingData> TrainingGenerator::trace_unidirectional(const Unit& unit) const {
+    const PathAlgorithm<> generator{{next_event_}, heuristic_};
+    return unit.trace(unit.empty(), [&](SampleContext& context, uint32_t block, TrainingData& data, Rng&) {
+        Visits visits(keeps_visits_);
+        const int t = generator.trace(context, [&](const PathContribution& found, PathView& view) {
+            const double estimate = double(scalar_of(found.value)) * double(generator.weight(view, found.technique));
+            if (!std::isfinite(estimate)) return;
+            visits.add(found, estimate);
+            data.block_sum[block] += estimate;
+        });
+        visits.move_to(&data, context.camera_path, t, max_edges_, block);
+    });
 }
 
 Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
@@ -286,7 +295,8 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
     return unit.trace(unit.empty(), [&](SampleContext& context, uint32_t camera_block, TrainingData& data, Rng& rng) {
         CameraReservoirs from_camera;
         Reservoir from_light;
-        trace_bdpt_sample<ViewDetail::kSubspace>(
+        Visits visits(keeps_visits_);
+        const int t = trace_bdpt_sample<ViewDetail::kSubspace>(
             context, {},
             [&](const PathVertex* y, int count) {
                 if (unit.energy_share(context.light_path) > 0) keep_light_path(y, count, context.max_edges, &data);
@@ -297,9 +307,12 @@ Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
                 const bool splat = found.technique.splats();
                 const uint32_t block = splat ? unit.blocks().at(int(found.film.x), int(found.film.y)) : camera_block;
                 const double weight = mis_weight(view, found.technique, generator.on(view));
-                data.block_sum[block] += (splat ? from_light : from_camera.of(found))
-                                             .offer(found, view, weight, splat ? 1 / unit.pixels() : 1, block, render, rng);
+                const double estimate = (splat ? from_light : from_camera.of(found))
+                                            .offer(found, view, weight, splat ? 1 / unit.pixels() : 1, block, render, rng);
+                data.block_sum[block] += estimate;
+                if (!splat) visits.add(found, estimate);
             });
+        visits.move_to(&data, context.camera_path, t, max_edges_, camera_block);
         from_camera.move_to(&data);
         from_light.move_to(&data);
     });
@@ -341,10 +354,14 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
     }
     return unit.trace(std::move(data), [&](SampleContext& context, uint32_t block, TrainingData& chunk, Rng& rng) {
         CameraReservoirs from_camera;
-        generator.trace(context, state, [&](const PathContribution& found, PathView& view) {
-            chunk.block_sum[block] += from_camera.of(found).offer(
-                found, view, double(generator.weight(state, view, found.technique)), 1, block, render, rng);
+        Visits visits(keeps_visits_);
+        const int t = generator.trace(context, state, [&](const PathContribution& found, PathView& view) {
+            const double estimate = from_camera.of(found).offer(found, view, double(generator.weight(state, view, found.technique)),
+                                                                1, block, render, rng);
+            chunk.block_sum[block] += estimate;
+            visits.add(found, estimate);
         });
+        visits.move_to(&chunk, context.camera_path, t, max_edges_, block);
         from_camera.move_to(&chunk);
     });
 }

@@ -18,7 +18,8 @@ struct PreparedTables;
 /// Samples that one thread traces at a time.
 inline constexpr uint64_t kTrainingChunkSamples = 512;
 
-/// Traces training units of one scene. Without a guide it pairs camera with light sub-paths, which needs no tables;
+/// Traces training units of one scene: for an algorithm without light sub-paths its own camera samples. For others,
+/// without a guide, it pairs camera with light sub-paths, which needs no tables;
 /// with the tables of an earlier round as guide its light leaves where that round found it useful, and it makes subspace
 /// connections where the algorithm has them, which find far more of the light that is hard to find.
 class TrainingGenerator {
@@ -36,6 +37,7 @@ class TrainingGenerator {
     class Unit;
 
     explicit TrainingGenerator(const Scene& scene) : scene_(&scene) {}
+    Result<TrainingData> trace_unidirectional(const Unit& unit) const;
     Result<TrainingData> trace_pairs(const Unit& unit) const;
     Result<TrainingData> trace_guided(const Unit& unit) const;
 
@@ -44,6 +46,9 @@ class TrainingGenerator {
     RouletteRule roulette_;
     LearningPlan plan_;
     Heuristic heuristic_ = Heuristic::kBalance;
+    NextEventRays next_event_;
+    bool keeps_visits_ = false;               ///< For the gain table.
+    bool unidirectional_ = false;             ///< Without light sub-paths.
     uint64_t light_paths_per_iteration_ = 0;  ///< Of the render that the tables are for.
     std::shared_ptr<const PreparedTables> guide_;
     uint64_t seed_ = 0;

@@ -123,7 +123,9 @@ class UnitRenderer final : public Renderer {
         : scene_(request.scene),
           settings_(request.settings),
           roulette_(roulette_of(request.settings.algorithm)),
+          gain_(request.gain),
           algorithm_(std::move(algorithm)) {
+        roulette_.gain = gain_.get();
         // Checks the catalog's row against the algorithm, as far as the algorithm's type shows it.
         const AlgorithmInfo& info = settings_.algorithm.info();
         const double light_paths = settings_.algorithm.light_paths_per_pixel();
@@ -174,6 +176,7 @@ class UnitRenderer final : public Renderer {
     std::shared_ptr<const Scene> scene_;
     RenderSettings settings_;
     RouletteRule roulette_;
+    std::shared_ptr<const GainTable> gain_;
     A algorithm_;
 };
 
