@@ -191,13 +191,13 @@ int run(const Options& options) {
         auto read = read_tables(options.tables, **scene);
         if (!read.ok()) return report_error(read.status());
         tables = *std::move(read);
-        if (!options.quiet) print(*tables);
+        if (!options.quiet) print(*tables, **scene);
         if (!options.draw.empty())
             if (const Status s = draw(*tables, **scene, options.draw); !s.ok()) return report_error(s);
     }
     if (!options.json.empty()) {
         nlohmann::json out = describe(description, summary, imported->files, imported->left_out, seconds);
-        if (tables) out["tables"] = describe(*tables);
+        if (tables) out["tables"] = describe(*tables, **scene);
         if (const Status s = write_json(options.json, out); !s.ok()) return report_error(s);
     }
     return kSuccess;

@@ -6,11 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "client/inspect_emission.h"
 #include "common/core/atomic_file.h"
 #include "common/core/fork_join.h"
 #include "common/core/rng.h"
 #include "common/film/png.h"
-#include "common/tables/emission_part.h"
 #include "server/table_cache.h"
 
 namespace lightloom::client {
@@ -140,29 +140,9 @@ Status draw_energy(const SubspaceTables& t, const std::string& path) {
     return picture.write(path);
 }
 
-}  // namespace
-
-Result<TableFile> read_tables(const std::string& path, const Scene& scene) {
-    auto bytes = read_file(path);
-    if (!bytes.ok()) return bytes.status();
-    const auto content = tables_of_file(*std::move(bytes));
-    if (!content.ok()) return invalid_argument(path + ": " + content.status().message());
-    const TablePart* const known[] = {&EmissionPart::kPart, &SubspaceTables::kPart};
-    const auto parts = parse_tables(*content, known);
-    if (!parts.ok()) return invalid_argument(path + ": " + parts.status().message());
-    const auto tables = parts->get<SubspaceTables>();
-    if (!tables) return invalid_argument(path + ": holds no tables of subspaces, which are what can be shown");
-    if (const Status s = tables->validate(scene.emitters()); !s.ok())
-        return invalid_argument(path + ": the tables are not those of this scene: " + s.message());
-    return TableFile{*tables, sha256(*content), content->size()};
-}
-
-nlohmann::ordered_json describe(const TableFile& file) {
-    const SubspaceTables& t = file.tables;
+nlohmann::ordered_json describe_subspaces(const SubspaceTables& t) {
     const Statistics s = measure(t);
-    return {{"sha256", file.digest.hex()},
-            {"size_bytes", file.size_bytes},
-            {"light_subspaces", {{"count", t.light_count}, {"emitter_cells", t.division.cell_count()}, {"labels", s.light_labels}}},
+    return {{"light_subspaces", {{"count", t.light_count}, {"emitter_cells", t.division.cell_count()}, {"labels", s.light_labels}}},
             {"eye_subspaces", {{"count", t.eye_count}, {"labels", s.eye_labels}}},
             {"q",
              {{"minimum", s.q[0]},
@@ -180,10 +160,8 @@ nlohmann::ordered_json describe(const TableFile& file) {
             {"vertices_per_path", t.vertices_per_path}};
 }
 
-void print(const TableFile& file) {
-    const SubspaceTables& t = file.tables;
+void print_subspaces(const SubspaceTables& t) {
     const Statistics s = measure(t);
-    std::printf("tables %s, %.1f MB\n", file.digest.hex().c_str(), double(file.size_bytes) * 1e-6);
     std::printf("  light      %u subspaces, %u of them cells of emitters; %zu labels occur; %.3g connectible vertices per path\n",
                 t.light_count, t.division.cell_count(), s.light_labels, t.vertices_per_path);
     std::printf("  eye        %u subspaces; %zu labels occur\n", t.eye_count, s.eye_labels);
@@ -194,10 +172,39 @@ void print(const TableFile& file) {
     std::printf("  windows    %zu subspaces keep more than one\n", s.windows);
 }
 
+}  // namespace
+
+Result<TableFile> read_tables(const std::string& path, const Scene& scene) {
+    auto bytes = read_file(path);
+    if (!bytes.ok()) return bytes.status();
+    const auto content = tables_of_file(*std::move(bytes));
+    if (!content.ok()) return invalid_argument(path + ": " + content.status().message());
+    const TablePart* const known[] = {&EmissionPart::kPart, &SubspaceTables::kPart};
+    const auto parts = parse_tables(*content, known);
+    if (!parts.ok()) return invalid_argument(path + ": " + parts.status().message());
+    if (const Status s = parts->validate(scene.emitters()); !s.ok())
+        return invalid_argument(path + ": the tables are not those of this scene: " + s.message());
+    return TableFile{parts->get<SubspaceTables>(), parts->get<EmissionPart>(), sha256(*content), content->size()};
+}
+
+nlohmann::ordered_json describe(const TableFile& file, const Scene& scene) {
+    nlohmann::ordered_json out{{"sha256", file.digest.hex()}, {"size_bytes", file.size_bytes}};
+    if (file.subspaces) out.update(describe_subspaces(*file.subspaces));
+    if (file.emission) out["emission"] = describe_emission(file.emission->data, scene);
+    return out;
+}
+
+void print(const TableFile& file, const Scene& scene) {
+    std::printf("tables %s, %.1f MB\n", file.digest.hex().c_str(), double(file.size_bytes) * 1e-6);
+    if (file.subspaces) print_subspaces(*file.subspaces);
+    if (file.emission) print_emission(file.emission->data, scene);
+}
+
 Status draw(const TableFile& file, const Scene& scene, const std::string& prefix) {
-    LL_RETURN_IF_ERROR(draw_kappa(file.tables, scene, prefix));
-    LL_RETURN_IF_ERROR(draw_gamma(file.tables, prefix + kTablePictures[2]));
-    return draw_energy(file.tables, prefix + kTablePictures[3]);
+    if (!file.subspaces) return invalid_argument("--draw shows subspaces, and these tables have none");
+    LL_RETURN_IF_ERROR(draw_kappa(*file.subspaces, scene, prefix));
+    LL_RETURN_IF_ERROR(draw_gamma(*file.subspaces, prefix + kTablePictures[2]));
+    return draw_energy(*file.subspaces, prefix + kTablePictures[3]);
 }
 
 }  // namespace lightloom::client

@@ -1,7 +1,5 @@
 #include "common/tables/emission_part.h"
 
-#include <algorithm>
-
 #include "common/tables/arrays.h"
 #include "common/tables/sections.h"
 
@@ -50,10 +48,7 @@ std::string serialize(const EmissionData& d) {
 Result<EmissionData> parse_emission(std::string_view bytes) {
     const auto sections = parse_sections(bytes, kEmissionMagic);
     if (!sections.ok()) return sections.status();
-    const auto read = [&](const char* name, auto* values) {
-        const auto item = std::find_if(sections->begin(), sections->end(), [&](const auto& s) { return s.first == name; });
-        return item != sections->end() && from_bytes(item->second, values);
-    };
+    const auto read = [&](const char* name, auto* values) { return read_section(*sections, name, values); };
     EmissionData d;
     std::vector<Shares> shares;
     if (!read("shares", &shares) || shares.size() != 1 || !read("emitters", &d.emitters) || !read("places", &d.places) ||

@@ -1,6 +1,5 @@
 #include "common/tables/subspace_tables.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/tables/arrays.h"
@@ -88,10 +87,7 @@ Result<SubspaceTables> parse_subspace_tables(std::string_view bytes) {
     std::vector<Shape> shape;
     std::vector<LightDivision::Cells> cells;
     std::vector<SubspaceTree::Node> light, eye;
-    const auto read = [&](const char* name, auto* values) {
-        const auto item = std::find_if(sections->begin(), sections->end(), [&](const auto& s) { return s.first == name; });
-        return item != sections->end() && from_bytes(item->second, values);
-    };
+    const auto read = [&](const char* name, auto* values) { return read_section(*sections, name, values); };
     if (!read("shape", &shape) || shape.size() != 1 || !read("division", &cells) || !read("kappa-light", &light) ||
         !read("kappa-eye", &eye) || !read("Q", &t.energy) || !read("Gamma", &t.gamma) || !read("window", &t.window))
         return data_loss("a table is missing or malformed");

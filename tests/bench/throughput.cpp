@@ -2,7 +2,8 @@
 // given number of threads. Algorithms alternate over the repetitions, so that a drift of the machine affects all of
 // them. Works for any algorithm of the catalog; tables are made first and not timed.
 //
-//   throughput SCENE [--algorithms path,bdpt] [--iterations N] [--repetitions N] [--threads N] [--resolution WxH]
+//   throughput SCENE [--algorithms path,bdpt:emission=learned:rr-min=0.7] [--iterations N] [--repetitions N] [--threads N]
+//       [--resolution WxH]
 
 #include <tbb/global_control.h>
 
@@ -10,6 +11,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <ctime>
+#include <sstream>
 
 #include "common/transport/training.h"
 #include "tests/bench/bench_scene.h"
@@ -37,12 +40,16 @@ int main(int argc, char** argv) {
     struct Row {
         AlgorithmSettings algorithm;
         std::unique_ptr<Renderer> renderer;
-        std::vector<double> samples, rays;
+        std::vector<double> samples, rays, processor;  // the last: microseconds per sample
         double mean = 0;
     };
     std::vector<Row> rows(algorithms.size());
     for (size_t i = 0; i < rows.size(); ++i) {
-        const RenderSettings settings = bench::settings_of(algorithms[i], {}, loaded);
+        std::vector<std::string> parts;
+        std::istringstream text(algorithms[i]);
+        for (std::string part; std::getline(text, part, ':');) parts.push_back(part);
+        const std::vector<std::string> set(parts.begin() + 1, parts.end());
+        const RenderSettings settings = bench::settings_of(parts[0], set, loaded);
         rows[i].algorithm = settings.algorithm;
         rows[i].renderer = bench::value_or_exit(create_with_tables(scene, settings, {}));
     }
@@ -53,10 +60,12 @@ int main(int argc, char** argv) {
             // Camera samples differ in each repetition; the light paths are those of the first.
             RenderUnit unit = bench::whole_frame(*scene, row.algorithm, uint32_t(iterations));
             unit.first_iteration = uint64_t(rep) * uint64_t(iterations);
+            const std::clock_t processor = std::clock();
             const auto start = std::chrono::steady_clock::now();
             const auto partial = row.renderer->render(unit, {});
             const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
             if (!partial.ok()) return std::fprintf(stderr, "%s\n", partial.status().message().c_str()), 1;
+            row.processor.push_back(1e6 * double(std::clock() - processor) / CLOCKS_PER_SEC / samples);
             row.samples.push_back(samples / seconds);
             row.rays.push_back(double(partial->counters.rays) / seconds);
             double sum = 0;
@@ -70,8 +79,10 @@ int main(int argc, char** argv) {
         return v[v.size() / 2];
     };
     for (size_t i = 0; i < rows.size(); ++i)
-        std::printf("%-8s %d thread(s)  %9.0f samples/s  %6.3f M rays/s  %5.1f rays/sample  image mean %.6f\n",
-                    algorithms[i].c_str(), threads, median(rows[i].samples), median(rows[i].rays) * 1e-6,
-                    median(rows[i].rays) / median(rows[i].samples), rows[i].mean);
+        std::printf(
+            "%-8s %d thread(s)  %9.0f samples/s  %7.3f us of processor/sample  %6.3f M rays/s  %5.1f rays/sample  image mean "
+            "%.6f\n",
+            algorithms[i].c_str(), threads, median(rows[i].samples), median(rows[i].processor), median(rows[i].rays) * 1e-6,
+            median(rows[i].rays) / median(rows[i].samples), rows[i].mean);
     return 0;
 }

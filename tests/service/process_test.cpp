@@ -243,9 +243,24 @@ TEST(Processes, TablesAreKeptForTheNextRenderAndCanBeInspected) {
                   .wait(),
               0)
         << service.log("inspect");
-    EXPECT_EQ(Json::parse(*read_file(service.path("seen.json")))["tables"]["sha256"], statistics["tables"]["sha256"]);
+    const Json seen = Json::parse(*read_file(service.path("seen.json")))["tables"];
+    EXPECT_EQ(seen["sha256"], statistics["tables"]["sha256"]);
+    EXPECT_TRUE(seen["emission"]["learned"].get<bool>());
+    EXPECT_NEAR(seen["emission"]["strongest_lights"][0]["by_power"].get<double>(), 1, 1e-6) << "there is one light";
+    EXPECT_NE(service.log("inspect").find("100.0 % of the light sub-paths, by power 100.0 %"), std::string::npos)
+        << service.log("inspect");
     for (const char* picture : {"-kappa-eye.png", "-kappa-light.png", "-gamma.png", "-q.png"})
         EXPECT_TRUE(read_file(service.path("seen") + picture)->starts_with("\x89PNG")) << picture;
+    // Tables without subspaces.
+    embedded(service, 1, 1,
+             {"--algorithm", "bdpt", "--spp", "1", "--resolution", "16x16", "--set", "emission=learned", "--set",
+              "training-paths=2000", "--table-cache", service.path("emission"), "--json", service.path("bdpt.json")});
+    const std::string key = Json::parse(*read_file(service.path("bdpt.json")))["tables"]["cache_key"].get<std::string>();
+    const std::string emission = service.path("emission") + "/" + key + ".tables";
+    EXPECT_EQ(Process("lightloom", {"inspect", kScene, "--tables", emission}, service.path("inspect.log")).wait(), 0);
+    EXPECT_NE(service.log("inspect").find("  emission   10 % by power"), std::string::npos) << service.log("inspect");
+    EXPECT_EQ(Process("lightloom", {"inspect", kScene, "-q", "--tables", emission, "--draw", "x"}, service.path("none.log")).wait(),
+              2);
     std::ofstream(file, std::ios::app) << "x";
     EXPECT_EQ(Process("lightloom", {"inspect", kScene, "--quiet", "--tables", file}, service.path("damaged.log")).wait(), 2);
     EXPECT_EQ(embedded(service, 1, 2, job), first) << "damaged tables are made again";

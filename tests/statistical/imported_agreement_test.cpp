@@ -19,6 +19,7 @@ struct File {
 constexpr File kFiles[] = {
     {"alpha-curtain", "path light bdpt"},
     {"cornell", "path light bdpt"},
+    {"delta-lights", "path light bdpt"},
     {"diffuse-transmission", "path light bdpt"},
     {"distant", "path light bdpt"},
     {"env-constant", "path light bdpt"},
@@ -27,6 +28,7 @@ constexpr File kFiles[] = {
     {"furnace-sphere", "path light bdpt"},
     {"image-lights", "path light bdpt"},
     {"instances", "path light bdpt"},
+    {"one-point", "path light bdpt"},
     {"panorama", "path light bdpt"},
     {"point-spot", "path light bdpt"},
     {"procedural", "path light bdpt"},
@@ -36,6 +38,7 @@ constexpr File kFiles[] = {
     {"textures", "path light bdpt"},
     {"thin-lens", "path light bdpt"},
     {"two-sided", "path light bdpt"},
+    {"walled-lamp", "path light bdpt"},
     {"glossy", "path bdpt"},
     {"coated", "path bdpt"},
     {"glass", "path bdpt"},

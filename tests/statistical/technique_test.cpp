@@ -142,9 +142,10 @@ TEST(Techniques, RouletteAndChoicesKeepTheMean) {
             {{"rr-start", "2"}, {"rr-min", "0.05"}},
             {{"rr-start", "2"}, {"rr-min", "0.3"}},
             testing::those_of(name, {{"rr-start", "2"}, {"rr-min", "0.6"}, {"connections", "1,4"}})};
+        const AlgorithmSettings usual = testing::settings_of(name, testing::with_small_training(name, {})).algorithm;
         for (const ParameterInfo& p : row->parameters)
             for (size_t c = 0; c < p.choices.size(); ++c)
-                if (double(c) != p.default_value) variants.push_back({{std::string(p.name), std::string(p.choices[c])}});
+                if (double(c) != usual.value(p.name)) variants.push_back({{std::string(p.name), std::string(p.choices[c])}});
         std::vector<RegionMeans> estimates;
         for (const auto& parameters : variants) {
             std::string what = name;

@@ -198,10 +198,11 @@ inline BdptSelection bdpt_selection(const Scene& scene) { return {double(scene.f
 /// samples in some algorithms only, so that their difference would be far noisier than the length's own image in
 /// others. One set of tables per seed.
 inline std::vector<RegionMeans> lengths_of(const std::shared_ptr<const Scene>& scene, const std::string& name, int max_length,
-                                           uint32_t iterations, int seeds, uint64_t first_seed) {
+                                           uint32_t iterations, int seeds, uint64_t first_seed,
+                                           const std::map<std::string, std::string>& parameters = {}) {
     std::vector<RegionMeans> lengths(static_cast<size_t>(max_length));
     for (uint64_t seed = first_seed; seed < first_seed + uint64_t(seeds); ++seed) {
-        RenderSettings settings = settings_of(name, with_small_training(name, {}), seed, max_length - 1);
+        RenderSettings settings = settings_of(name, with_small_training(name, parameters), seed, max_length - 1);
         TrainingReport report;
         const auto tables = make_tables(*scene, settings, {}, &report);
         if (!tables.ok()) throw std::runtime_error(tables.status().message());
