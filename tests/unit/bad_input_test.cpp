@@ -188,7 +188,7 @@ TEST(BadInput, MoreSubspacesThanTheDataSupport) {
     const auto scene = b.build();
     testing::TestFamily family;
     // Tables learned from next to nothing make rare bright samples, and the mean of few seeds is not normally distributed.
-    constexpr int kMany = 8 * kSeeds;
+    constexpr int kMany = 4 * kSeeds;
     const Rect crop = scene->frame().crop;
     const auto expected = testing::replicate(testing::catalog_image(scene, "bdpt", kMaxDepth, 8), crop, kMany, 300);
     const Parameters extremes[] = {
