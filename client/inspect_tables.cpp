@@ -11,6 +11,7 @@
 #include "common/core/fork_join.h"
 #include "common/core/rng.h"
 #include "common/film/png.h"
+#include "common/tables/gain_part.h"
 #include "server/table_cache.h"
 
 namespace lightloom::client {
@@ -179,7 +180,7 @@ Result<TableFile> read_tables(const std::string& path, const Scene& scene) {
     if (!bytes.ok()) return bytes.status();
     const auto content = tables_of_file(*std::move(bytes));
     if (!content.ok()) return invalid_argument(path + ": " + content.status().message());
-    const TablePart* const known[] = {&EmissionPart::kPart, &SubspaceTables::kPart};
+    const TablePart* const known[] = {&EmissionPart::kPart, &GainPart::kPart, &SubspaceTables::kPart};
     const auto parts = parse_tables(*content, known);
     if (!parts.ok()) return invalid_argument(path + ": " + parts.status().message());
     if (const Status s = parts->validate(scene.emitters()); !s.ok())

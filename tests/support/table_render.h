@@ -2,9 +2,11 @@
 // Settings and random tables of the rows of the catalog that learn, for renders whose means must not depend on them.
 
 #include "common/tables/emission_part.h"
+#include "common/tables/gain_part.h"
 #include "common/tables/subspace_tables.h"
 #include "tests/support/estimates.h"
 #include "tests/support/random_emission.h"
+#include "tests/support/random_gain.h"
 #include "tests/support/random_tables.h"
 
 namespace lightloom::testing {
@@ -17,8 +19,9 @@ inline Tables random_tables_for(const AlgorithmInfo& row, const Scene& scene, ui
     Tables tables;
     if (!row.learning) return tables;
     const std::span<const TablePart* const> parts = row.learning->parts;
-    const bool known = std::all_of(parts.begin(), parts.end(),
-                                   [](const TablePart* p) { return p == &SubspaceTables::kPart || p == &EmissionPart::kPart; });
+    const bool known = std::all_of(parts.begin(), parts.end(), [](const TablePart* p) {
+        return p == &SubspaceTables::kPart || p == &EmissionPart::kPart || p == &GainPart::kPart;
+    });
     if (!known) {
         const std::string name(row.name);
         TrainingReport report;
@@ -31,6 +34,11 @@ inline Tables random_tables_for(const AlgorithmInfo& row, const Scene& scene, ui
     if (std::find(parts.begin(), parts.end(), &EmissionPart::kPart) != parts.end()) {
         EmissionData data = random_emission(scene.emitters(), seed, {0, 1, 0}, 3.5f);
         tables.set(std::make_shared<const EmissionPart>(EmissionPart{std::move(data)}));
+    }
+    if (std::find(parts.begin(), parts.end(), &GainPart::kPart) != parts.end()) {
+        // Every other table leaves roulette to the throughput.
+        GainData data = seed % 2 == 0 && parts.size() > 1 ? GainData{} : random_gain(scene.frame().crop, seed);
+        tables.set(std::make_shared<const GainPart>(GainPart{std::move(data)}));
     }
     tables.belong_to(std::string(row.name));
     return tables;
@@ -50,6 +58,7 @@ inline RenderSettings cache_settings(const std::string& algorithm, const CacheOp
     return settings_of(
         algorithm,
         those_of(algorithm, {{"emission", "learned"},
+                             {"roulette", "learned"},
                              {"connections", std::to_string(o.connections.at_first) + "," + std::to_string(o.connections.later)},
                              {"cache", std::to_string(o.paths)},
                              {"light-paths", std::to_string(o.light_paths)},
