@@ -1,5 +1,6 @@
 #include "common/tables/classifier.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -54,6 +55,13 @@ SubspaceTree SubspaceTree::compacted() const {
         if (left.axis() == kLeaf && right.axis() == kLeaf && left.child() == right.child()) nodes[i] = left;
     }
     return SubspaceTree(Layout(nodes).run());
+}
+
+uint32_t SubspaceTree::label_end() const {
+    uint32_t end = 0;
+    for (const Node& n : nodes_)
+        if (n.axis() == kLeaf) end = std::max(end, n.child() + 1);
+    return end;
 }
 
 Status SubspaceTree::validate(uint32_t label_count) const {

@@ -84,6 +84,8 @@ class SubspaceTree {
         }
     }
     const std::vector<Node>& nodes() const { return nodes_; }
+    /// One more than the largest label.
+    uint32_t label_end() const;
     /// Checks that children follow their parents (so that there is no loop), that every index is in range and every
     /// label below `label_count`, and that thresholds are finite.
     Status validate(uint32_t label_count) const;

@@ -8,7 +8,7 @@
 namespace lightloom {
 namespace {
 
-constexpr std::string_view kMagic = "lightloom-subspaces 1\n";
+constexpr std::string_view kMagic = "lightloom-subspaces 2\n";
 
 Status positive(const std::vector<float>& values, size_t count, const char* name) {
     if (values.size() != count) return data_loss(std::string(name) + " has the wrong size");
@@ -61,7 +61,7 @@ Status SubspaceTables::validate(const EmitterSet& emitters) const {
 
 SubspaceTables trivial_tables(const EmitterSet& emitters) {
     SubspaceTables t;
-    t.division = LightDivision::divide(emitters, 1);
+    t.division = LightDivision::whole(emitters);
     t.energy = {1};
     t.gamma = {1};
     t.window = {1};
@@ -72,6 +72,7 @@ std::string serialize(const SubspaceTables& t) {
     std::string out(kMagic);
     put_section(out, "shape", bytes_of(std::vector<Shape>{{t.light_count, t.eye_count, t.vertices_per_path}}));
     put_section(out, "division", bytes_of(t.division.cells()));
+    put_section(out, "kappa-source", bytes_of(t.division.finite().nodes()));
     put_section(out, "kappa-light", bytes_of(t.light_tree.nodes()));
     put_section(out, "kappa-eye", bytes_of(t.eye_tree.nodes()));
     put_section(out, "Q", bytes_of(t.energy));
@@ -86,14 +87,15 @@ Result<SubspaceTables> parse_subspace_tables(std::string_view bytes) {
     SubspaceTables t;
     std::vector<Shape> shape;
     std::vector<LightDivision::Cells> cells;
-    std::vector<SubspaceTree::Node> light, eye;
+    std::vector<SubspaceTree::Node> source, light, eye;
     const auto read = [&](const char* name, auto* values) { return read_section(*sections, name, values); };
-    if (!read("shape", &shape) || shape.size() != 1 || !read("division", &cells) || !read("kappa-light", &light) ||
-        !read("kappa-eye", &eye) || !read("Q", &t.energy) || !read("Gamma", &t.gamma) || !read("window", &t.window))
+    if (!read("shape", &shape) || shape.size() != 1 || !read("division", &cells) || !read("kappa-source", &source) ||
+        !read("kappa-light", &light) || !read("kappa-eye", &eye) || !read("Q", &t.energy) || !read("Gamma", &t.gamma) ||
+        !read("window", &t.window))
         return data_loss("a table is missing or malformed");
     t.light_count = shape[0].light_count, t.eye_count = shape[0].eye_count;
     t.vertices_per_path = shape[0].vertices_per_path;
-    t.division = LightDivision(std::move(cells));
+    t.division = LightDivision(std::move(cells), SubspaceTree(std::move(source)));
     t.light_tree = SubspaceTree(std::move(light));
     t.eye_tree = SubspaceTree(std::move(eye));
     return t;

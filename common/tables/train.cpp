@@ -8,11 +8,16 @@
 
 #include "common/core/fork_join.h"
 #include "common/tables/train_classifier.h"
+#include "common/tables/train_division.h"
 
 namespace lightloom {
 namespace {
 
 constexpr size_t kClassifierEnds = 200000;  ///< Enough for 1000 centroids and their borders.
+
+/// A cell of points on lights is not divided where a cache would hold fewer points than this in a part. A draw from an empty
+/// subspace gives nothing, and the loss, which is that of endless caches, does not know it (measured).
+constexpr double kFewestInSourceCell = 16;
 
 /// The paths' weights are cut at this quantile. Otherwise a handful of paths would decide what Gamma is and how
 /// strongly its prior counts. The cut biases no image, because every Gamma gives the right mean.
@@ -71,20 +76,18 @@ uint32_t source_label(const LightDivision& division, const EmitterSet& emitters,
     return division.label(emitters, p.emitter, x0.position, x0.normal);
 }
 
-uint32_t used_labels(const SubspaceTree& tree) {
-    uint32_t count = 0;
-    for (const SubspaceTree::Node& n : tree.nodes())
-        if (n.axis() == SubspaceTree::kLeaf) count = std::max(count, n.child() + 1);
-    return count;
-}
+/// What the classifiers are learned from.
+struct Ends {
+    std::vector<WeightedEnd> light, eye;
+    std::vector<WeightedSource> seen, emitted;  ///< Prefixes of one vertex: those of paths, and of all light sub-paths.
+};
 
-/// Trains kappa, the classifiers of both sides.
-void train_classifiers(const TrainingData& d, const std::vector<double>& brightness, const EmitterSet& emitters,
-                       const TrainingOptions& o, std::stop_token stop, SubspaceTables* tables) {
+/// Takes about kClassifierEnds ends of each kind.
+Ends collect_ends(const TrainingData& d, const std::vector<double>& brightness, const TrainingOptions& o) {
+    Ends ends;
     size_t nodes = 0;
     for (const TrainingPath& p : d.paths) nodes += p.vertex_count;
     const size_t stride = std::max<size_t>(1, nodes / kClassifierEnds);
-    std::vector<WeightedEnd> light, eye;
     for (size_t x = 0; x < d.paths.size(); x += stride) {
         const TrainingPath& p = d.paths[x];
         const TrainingVertex* v = &d.vertices[p.first_vertex];
@@ -92,13 +95,30 @@ void train_classifiers(const TrainingData& d, const std::vector<double>& brightn
         if (!(weight > 0) || !std::isfinite(weight) || !d.in_range(p)) continue;
         for (uint32_t s = 1; s + 1 < p.vertex_count; ++s) {
             if (!(v[s].density > 0)) continue;
-            eye.push_back({end_between(v[s], v[s + 1]), weight});
-            if (s >= 2) light.push_back({end_between(v[s - 1], v[s - 2]), weight});
+            ends.eye.push_back({end_between(v[s], v[s + 1]), weight});
+            if (s >= 2) ends.light.push_back({end_between(v[s - 1], v[s - 2]), weight});
+            if (s == 1) ends.seen.push_back({p.emitter, v[0].position, v[0].normal, weight, 0});
         }
     }
+    // These are alike, so that fewer tell as much.
+    const size_t light_stride = std::max<size_t>(1, 4 * d.light_paths.size() / kClassifierEnds);
+    for (size_t x = 0; x < d.light_paths.size(); x += light_stride) {
+        const TrainingPath& p = d.light_paths[x];
+        const TrainingVertex& y0 = d.vertices[p.first_vertex];
+        if (!d.in_range(p)) continue;
+        const double paths = double(light_stride) / double(std::max<uint64_t>(1, d.light_samples)) * emission_ratio(o, p, &y0);
+        ends.emitted.push_back({p.emitter, y0.position, y0.normal, y0.density, float(paths * o.nominal_paths)});
+    }
+    return ends;
+}
+
+/// Trains kappa, the classifiers of both sides.
+void train_classifiers(const TrainingData& d, const std::vector<double>& brightness, const EmitterSet& emitters,
+                       const TrainingOptions& o, std::stop_token stop, SubspaceTables* tables) {
+    const Ends ends = collect_ends(d, brightness, o);
     const uint32_t source_cells =  // at least one label is left for longer prefixes
         std::clamp(uint32_t(double(o.light_subspaces) * o.source_share), 1u, SubspaceTables::kMaxSubspaces - 1);
-    tables->division = LightDivision::divide(emitters, source_cells);
+    tables->division = train_division(emitters, ends.seen, ends.emitted, {source_cells, kFewestInSourceCell, stop});
     const uint32_t sources = tables->division.cell_count();
     ClassifierOptions light_options;
     light_options.subspaces = o.light_subspaces > sources ? o.light_subspaces - sources : 1;
@@ -110,10 +130,10 @@ void train_classifiers(const TrainingData& d, const std::vector<double>& brightn
     eye_options.subspaces = o.eye_subspaces;
     eye_options.first_label = 0;
     eye_options.seed = o.seed + 1;
-    tables->light_tree = train_classifier(light, light_options);
-    tables->eye_tree = train_classifier(eye, eye_options);
-    tables->light_count = used_labels(tables->light_tree);
-    tables->eye_count = used_labels(tables->eye_tree);
+    tables->light_tree = train_classifier(ends.light, light_options);
+    tables->eye_tree = train_classifier(ends.eye, eye_options);
+    tables->light_count = tables->light_tree.label_end();
+    tables->eye_count = tables->eye_tree.label_end();
 }
 
 /// Measures Q, the windows and the mean number of connectible vertices.

@@ -21,7 +21,7 @@ namespace lightloom {
 
 struct TrainingOptions {
     uint32_t light_subspaces = 1000, eye_subspaces = 1000;  ///< N_L, N_E: upper bounds.
-    double source_share = 0.2;                              ///< Share of the light subspaces for points on lights.
+    double source_share = 0.2;                              ///< At most this share of N_L is for points on lights.
     double direction_weight = 0.05;                         ///< k_d.
     double mix = 0.1;                                       ///< Conservative share of Gamma; see train_gamma.h.
     GammaTrainer trainer = GammaTrainer::kMm;

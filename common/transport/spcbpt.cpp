@@ -24,7 +24,7 @@ constexpr ParameterInfo kParameters[] = {
     emission_parameter(true),
     {"light-subspaces", 1000, 1, 16384, true, "N_L: upper bound of the light subspaces [Su et al. 2022, section 8.1]"},
     {"eye-subspaces", 1000, 1, 16384, true, "N_E: upper bound of the eye subspaces [Su et al. 2022, section 8.1]"},
-    {"source-share", 0.2, 0, 1, false, "share of N_L that divides the lights themselves [Su et al. 2022, section 7.2.1]"},
+    {"source-share", 0.2, 0, 1, false, "share of N_L that divides the lights themselves, at most [Su et al. 2022, section 7.2.1]"},
     {kTrainingPaths, 500000, 1, 1e8, true,
      "D: camera samples of the training set, each with a light sub-path; at most, where a job settles it [Su et al. 2022: 1e6]"},
     {"energy-paths", 1, 0.01, 16, false,

@@ -2,6 +2,8 @@
 // Tables of SPCBPT without any knowledge: random classifiers, random Q, random Gamma, random windows. No image's mean
 // may depend on them.
 
+#include <cmath>
+
 #include "common/core/rng.h"
 #include "common/tables/subspace_tables.h"
 
@@ -43,7 +45,15 @@ inline SubspaceTables random_tables(const EmitterSet& emitters, uint64_t seed, c
     const auto positive = [&] { return std::exp(options.spread * (rng.uniform_double() - 0.5)); };
     SubspaceTables t;
     t.light_count = options.light_count, t.eye_count = options.eye_count;
-    t.division = LightDivision::divide(emitters, std::min(options.source_cells, options.light_count));
+    const uint32_t cells = std::min(options.source_cells, options.light_count);
+    Rng division_rng({seed, Stage::kTraining, 78, 0});
+    std::vector<LightDivision::Cells> grids;
+    for (const Emitter& e : emitters.all()) {
+        const uint32_t side = e.is_infinite() ? 1 + division_rng.below(uint32_t(std::sqrt(double(cells)))) : 0;
+        const uint32_t first = side > 0 ? division_rng.below(cells - side * side + 1) : 0;
+        grids.push_back({uint16_t(first), uint16_t(side)});
+    }
+    t.division = LightDivision(std::move(grids), random_tree(division_rng, options.tree_leaves, cells, options));
     t.light_tree = random_tree(rng, options.tree_leaves, t.light_count, options);
     t.eye_tree = random_tree(rng, options.tree_leaves, t.eye_count, options);
     for (uint32_t i = 0; i < t.light_count; ++i) {

@@ -49,6 +49,7 @@ TEST(Tables, SerializedAndParsedAreTheSame) {
             EXPECT_TRUE(again->validate(scene->emitters()).ok());
             EXPECT_EQ(serialize(*again), bytes);
             EXPECT_EQ(again->light_count, tables.light_count);
+            EXPECT_EQ(again->division.cell_count(), tables.division.cell_count());
             EXPECT_EQ(again->gamma, tables.gamma);
             EXPECT_EQ(again->energy, tables.energy);
             EXPECT_EQ(again->window, tables.window);
@@ -164,18 +165,29 @@ TEST(Tables, EveryBadTableIsRefusedByName) {
         {"too many subspaces", [](SubspaceTables& t) { t.light_count = SubspaceTables::kMaxSubspaces + 1; }},
         {"division of no scene", [](SubspaceTables& t) { t.division = LightDivision(); }},
         {"division of another scene",
-         [](SubspaceTables& t) { t.division = LightDivision(std::vector<LightDivision::Cells>(t.division.cells().size() + 1)); }},
+         [](SubspaceTables& t) {
+             t.division = LightDivision(std::vector<LightDivision::Cells>(t.division.cells().size() + 1), t.division.finite());
+         }},
         {"cells beyond",
          [](SubspaceTables& t) {
              auto cells = t.division.cells();
-             cells.back() = {uint16_t(t.light_count - 1), 2};
-             t.division = LightDivision(cells);
+             for (auto& c : cells)
+                 if (c.side > 0) c = {uint16_t(t.light_count - 1), 2};
+             t.division = LightDivision(cells, t.division.finite());
          }},
-        {"cells without a side",
+        {"an infinite light without cells",
          [](SubspaceTables& t) {
-             auto cells = t.division.cells();
-             cells.back().side = 0;
-             t.division = LightDivision(cells);
+             t.division = LightDivision(std::vector<LightDivision::Cells>(t.division.cells().size()), t.division.finite());
+         }},
+        {"a finite light with cells",
+         [](SubspaceTables& t) {
+             t.division = LightDivision(std::vector<LightDivision::Cells>(t.division.cells().size(), {0, 1}), t.division.finite());
+         }},
+        {"label of a finite light beyond",
+         [&](SubspaceTables& t) { t.division = LightDivision(t.division.cells(), leaf(t.light_count)); }},
+        {"division without nodes",
+         [](SubspaceTables& t) {
+             t.division = LightDivision(t.division.cells(), SubspaceTree(std::vector<SubspaceTree::Node>()));
          }},
         {"light label beyond", [&](SubspaceTables& t) { t.light_tree = leaf(t.light_count); }},
         {"eye label beyond", [&](SubspaceTables& t) { t.eye_tree = leaf(t.eye_count); }},
