@@ -40,8 +40,8 @@ inline WalkRay start_camera_path(const Scene& scene, const CameraSampler& sample
 
 /// Follows the ray that leaves z[*t - 1] to the next vertex, see trace_camera_path(). False where the sub-path ends.
 template <class Visit, class Escape>
-LL_ALWAYS_INLINE bool extend_camera_path(const Scene& scene, int max_edges, const WalkRay& ray, PathVertex* z, int* t,
-                                         WalkCounters* counters, Visit&& visit, Escape&& escape) {
+LL_ALWAYS_INLINE inline bool extend_camera_path(const Scene& scene, int max_edges, const WalkRay& ray, PathVertex* z, int* t,
+                                                WalkCounters* counters, Visit&& visit, Escape&& escape) {
     SurfacePoint point;
     ++counters->rays;
     if (!scene.intersect(ray.origin, ray.direction, &point, ray.clearance)) {

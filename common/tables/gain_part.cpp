@@ -1,7 +1,5 @@
 #include "common/tables/gain_part.h"
 
-#include <algorithm>
-
 #include "common/tables/arrays.h"
 #include "common/tables/sections.h"
 
@@ -44,10 +42,7 @@ std::string serialize(const GainData& d) {
 Result<GainData> parse_gain(std::string_view bytes) {
     const auto sections = parse_sections(bytes, kGainMagic);
     if (!sections.ok()) return sections.status();
-    const auto read = [&](const char* name, auto* values) {
-        const auto item = std::find_if(sections->begin(), sections->end(), [&](const auto& s) { return s.first == name; });
-        return item != sections->end() && from_bytes(item->second, values);
-    };
+    const auto read = [&](const char* name, auto* values) { return read_section(*sections, name, values); };
     GainData d;
     std::vector<int32_t> blocks;
     if (!read("blocks", &blocks) || blocks.size() != 2 || !read("brightness", &d.brightness) || !read("nodes", &d.nodes) ||

@@ -12,7 +12,7 @@ namespace {
 constexpr ParameterInfo kParameters[] = {
     kRouletteByAlbedo,
     kRouletteStart,
-    kRouletteMin,
+    kRouletteMinOfPath,
     kHeuristic,
     kNextEvent,
     {kTrainingPaths, 50000, 1, 1e8, true, "camera samples of the training set from which roulette=learned learns"},

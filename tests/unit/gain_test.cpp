@@ -7,6 +7,7 @@
 
 #include "common/tables/gain_part.h"
 #include "common/tables/train_gain.h"
+#include "common/transport/parameters.h"
 #include "common/transport/training.h"
 #include "common/transport/visits.h"
 #include "tests/support/estimates.h"
@@ -45,10 +46,11 @@ TEST(GainTable, KeepsItsBytesAndRefusesDamage) {
     refused("threshold that is no number", [](GainData& d) { d.nodes[0].threshold = NAN; });
     refused("gains without places", [](GainData& d) { d.nodes.clear(); });
     refused("too many levels", [](GainData& d) {
-        d.nodes.assign(201, GainData::make_leaf(0));
-        for (uint32_t i = 0; i < 100; ++i) d.nodes[2 * i] = GainData::make_inner(0, 0, 2 * i + 1);
-        for (uint32_t i = 0; i < 99; ++i) std::swap(d.nodes[2 * i + 1], d.nodes[2 * i + 2]);
-        for (uint32_t i = 0; i < 100; ++i) d.nodes[i] = GainData::make_inner(0, 0, 2 * i + 1);
+        d.nodes.assign(1, GainData::make_leaf(0));
+        for (uint32_t i = 0; i < 200; i += 2) {  // the left child goes on
+            d.nodes[i > 0 ? i - 1 : 0] = GainData::make_inner(0, 0, i + 1);
+            d.nodes.resize(d.nodes.size() + 2, GainData::make_leaf(0));
+        }
     });
 }
 
