@@ -36,7 +36,7 @@ constexpr ParameterInfo roulette_minimum(double best) {
             false,    "smallest survival probability of Russian roulette; 1 switches roulette off [measured: best of 0.05 to 1]"};
 }
 inline constexpr ParameterInfo kRouletteMin = roulette_minimum(0.5);
-// What `path` finds at the end of a long sub-path it finds in no other way. relMSE times processor time, relative to 0.5, is
+// What `path` finds at the end of a long sub-path it finds in no other way. relMSE times rays, relative to 0.5, is
 // 0.72 (door), 0.77 (veach-ajar) and 0.98 (bedroom) with 0.7, and 0.78, 0.59 and 1.13 with 0.85.
 inline constexpr ParameterInfo kRouletteMinOfPath = roulette_minimum(0.7);
 inline constexpr std::string_view kHeuristicNames[] = {"balance", "power", "maximum"};
