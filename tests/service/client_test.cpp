@@ -237,7 +237,7 @@ TEST(Results, ReplayCommandsAreOneShellCommand) {
     EXPECT_EQ(::pclose(shell), 0);
     EXPECT_TRUE(
         output.starts_with("lightloom|replay|" + scene +
-                           "|--algorithm|path|--set|heuristic=balance|--set|next-event=1|--set|rr-min=0.5|--set|rr-start=6|"))
+                           "|--algorithm|path|--set|heuristic=balance|--set|next-event=1|--set|roulette=albedo|--set|rr-min=0.7|--set|rr-start=6|"))
         << output;
 }
 

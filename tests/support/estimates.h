@@ -55,7 +55,7 @@ inline std::map<std::string, std::string> those_of(const std::string& algorithm,
 }
 
 /// Training and caches that suit 32 x 32 pixels, for the rows of the catalog that have them; parameters that are
-/// already set stay. What can be learned is learned.
+/// already set stay. Emission is learned.
 inline std::map<std::string, std::string> with_small_training(const std::string& algorithm,
                                                               std::map<std::string, std::string> parameters) {
     parameters.merge(those_of(algorithm, {{"emission", "learned"},
@@ -64,6 +64,13 @@ inline std::map<std::string, std::string> with_small_training(const std::string&
                                           {"light-subspaces", "40"},
                                           {"eye-subspaces", "30"}}));
     return parameters;
+}
+
+/// The same with every table that a row can have, those of roulette included.
+inline std::map<std::string, std::string> with_all_learned(const std::string& algorithm,
+                                                           std::map<std::string, std::string> parameters) {
+    parameters.merge(those_of(algorithm, {{"roulette", "learned"}}));
+    return with_small_training(algorithm, std::move(parameters));
 }
 
 /// Whether an algorithm samples every path of a scene. `list` names, space-separated, algorithms that do; what an

@@ -242,7 +242,8 @@ TEST(BadInput, CancelledTraining) {
     for (const AlgorithmInfo* row : catalog()) {
         if (!row->learning) continue;
         const std::string name(row->name);
-        const auto made = make_tables(*scene, testing::settings_of(name, small(name), 1, 3), stop.get_token(), &report);
+        const auto made = make_tables(*scene, testing::settings_of(name, testing::with_all_learned(name, small(name)), 1, 3),
+                                      stop.get_token(), &report);
         ASSERT_FALSE(made.ok()) << name;
         EXPECT_EQ(made.status().code(), StatusCode::kCancelled) << name;
     }

@@ -107,6 +107,7 @@ TEST(AlgorithmChoice, ParsesSettingsAndNamesMistakes) {
     EXPECT_EQ(choice->settings.named_text(), (std::map<std::string, std::string>{{"emission", "power"},
                                                                                  {"heuristic", "power"},
                                                                                  {"next-event", "1"},
+                                                                                 {"roulette", "albedo"},
                                                                                  {"rr-min", "0.5"},
                                                                                  {"rr-start", "6"},
                                                                                  {"training-paths", "100000"}}));

@@ -17,7 +17,7 @@ bool mentions(const Status& status, std::string_view what) { return status.messa
 
 RenderSettings small_settings(const AlgorithmInfo& row) {
     const std::string name(row.name);
-    return testing::settings_of(name, testing::with_small_training(name, {}));
+    return testing::settings_of(name, testing::with_all_learned(name, {}));
 }
 
 TEST(Catalog, RowsAreComplete) {

@@ -137,7 +137,7 @@ class Streams : public ::testing::TestWithParam<const AlgorithmInfo*> {
     }
     RenderSettings settings(uint64_t seed) const {
         const std::string name(GetParam()->name);
-        return testing::settings_of(name, testing::with_small_training(name, parameters_), seed, 3);
+        return testing::settings_of(name, testing::with_all_learned(name, parameters_), seed, 3);
     }
     /// Sets what the row has of these parameters.
     void set(const std::map<std::string, std::string>& parameters) {

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "common/tables/emission_part.h"
+#include "common/tables/gain_part.h"
 #include "common/transport/training.h"
 #include "tests/support/table_render.h"
 #include "tests/support/test_scenes.h"
@@ -235,6 +236,7 @@ TEST(Tables, EveryBadTableIsRefusedByName) {
         // And nothing renders from them.
         Tables tables(bad);
         tables.set(std::make_shared<const EmissionPart>());
+        tables.set(std::make_shared<const GainPart>());
         EXPECT_EQ(Renderer::create(scene, small_settings(), tables).status().code(), StatusCode::kDataLoss) << name;
     }
 }
