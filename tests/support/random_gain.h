@@ -8,8 +8,8 @@
 
 namespace lightloom::testing {
 
-/// A valid table of a frame with this crop, for a scene that lies within 2 of the origin; some places end nine sub-paths of
-/// ten, some divide most of them.
+/// A valid table of a frame with this crop, for a scene within 1.2 of the y axis, between 0 and 2 above the origin; some places
+/// end nine sub-paths of ten, some divide most of them.
 inline GainData random_gain(const Rect& crop, uint64_t seed) {
     Rng rng({seed, Stage::kTraining, 79, 0});
     const FrameBlocks blocks(crop);
@@ -20,12 +20,13 @@ inline GainData random_gain(const Rect& crop, uint64_t seed) {
     for (uint32_t i = 0; i < data.nodes.size(); ++i) {
         if (data.nodes.size() < 40) {
             const uint32_t left = uint32_t(data.nodes.size()), axis = rng.below(6);
-            data.nodes[i] = GainData::make_inner(axis, (axis < 3 ? 4 : 2) * rng.uniform() - (axis < 3 ? 2 : 1), left);
+            const float u = 2 * rng.uniform() - 1;
+            data.nodes[i] = GainData::make_inner(axis, axis >= 3 ? 0.5f * u : axis == 1 ? 1 + u : 1.2f * u, left);
             data.nodes.resize(data.nodes.size() + 2);
         } else {
             data.nodes[i] = GainData::make_leaf(uint32_t(data.gains.size()));
-            const float gain = std::exp(6 * rng.uniform() - 3);
-            data.gains.push_back({gain, gain * rng.uniform()});
+            const float gain = std::exp(5 * rng.uniform() - 2);
+            data.gains.push_back({gain, gain * (0.3f + 0.7f * rng.uniform())});
         }
     }
     return data;

@@ -175,6 +175,42 @@ TEST(Visits, OfATrainingSetAddUpToThePicture) {
     }
 }
 
+/// What a vertex keeps of its successor belongs to one branch. Mutations: camera_walk.h without the line that resets `rev` and
+/// `reverse_label`, or with Branches::next() that does not count down, fail this.
+TEST(Roulette, BranchesStartAfresh) {
+    const auto scene = testing::diffuse_box();
+    const Rect crop = scene->frame().crop;
+    std::vector<GainTable> gains;
+    for (uint64_t seed = 1; seed <= 10; ++seed) gains.emplace_back(testing::random_gain(crop, seed), crop);
+    constexpr int kEdges = 6;
+    std::vector<PathVertex> z(kEdges + 2);
+    WalkCounters counters;
+    uint64_t visits = 0, branched = 0;
+    for (uint64_t n = 0; n < 1000; ++n) {
+        CameraSampler sampler(7, n, n % uint64_t(crop.area()));
+        int here[kEdges + 3] = {};  // visits with so many vertices
+        const int px = crop.x0 + int(n) % crop.width(), py = crop.y0 + int(n) / crop.width() % crop.height();
+        const int longest = trace_camera_path(
+            *scene, sampler, px, py, kEdges, {.gain = &gains[n % gains.size()]}, z.data(), &counters,
+            [&](int t) {
+                ++visits, ++here[t];
+                EXPECT_EQ(z[size_t(t) - 1].reverse_label, kNoLabel);
+                if (t > 2) {
+                    EXPECT_EQ(z[size_t(t) - 2].rev, 0);
+                    EXPECT_EQ(z[size_t(t) - 2].reverse_label, kNoLabel);
+                    z[size_t(t) - 2].reverse_label = 5;  // as a path that ends here would leave it
+                    EXPECT_GT(z[size_t(t) - 3].rev, 0);
+                }
+                EXPECT_GT(z[size_t(t) - 1].survival, 0);
+            },
+            [](int, const WalkRay&) {});
+        for (int t = 3; t <= kEdges + 1; ++t) branched += here[t] > 1;
+        EXPECT_EQ(here[2], longest >= 2 ? 1 : 0);
+    }
+    EXPECT_GT(branched, 200u);
+    EXPECT_GT(visits, 3000u);
+}
+
 /// Tables that nobody asked for are not made, and those of all three kinds of roulette render the same mean (technique_test).
 TEST(Roulette, LearnsOnlyOnRequest) {
     EXPECT_EQ(testing::settings_of("path").algorithm.learning(), nullptr);
