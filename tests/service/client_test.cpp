@@ -235,9 +235,9 @@ TEST(Results, ReplayCommandsAreOneShellCommand) {
     std::string output(1000, '\0');
     output.resize(std::fread(output.data(), 1, output.size(), shell));
     EXPECT_EQ(::pclose(shell), 0);
-    EXPECT_TRUE(
-        output.starts_with("lightloom|replay|" + scene +
-                           "|--algorithm|path|--set|heuristic=balance|--set|next-event=1|--set|roulette=albedo|--set|rr-min=0.7|--set|rr-start=6|"))
+    EXPECT_TRUE(output.starts_with(
+        "lightloom|replay|" + scene +
+        "|--algorithm|path|--set|heuristic=balance|--set|next-event=1|--set|roulette=albedo|--set|rr-min=0.7|--set|rr-start=6|"))
         << output;
 }
 
