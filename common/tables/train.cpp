@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cfloat>
-#include <chrono>
 #include <cmath>
 #include <optional>
 
 #include "common/core/fork_join.h"
+#include "common/core/stopwatch.h"
 #include "common/tables/train_classifier.h"
 #include "common/tables/train_division.h"
 
@@ -35,19 +35,6 @@ constexpr double kEnergyBegins = 0.1, kGammaBegins = 0.15;
 
 /// Most entries of Gamma: 64 MB in single precision, which every worker receives.
 constexpr uint64_t kMaxGammaCells = uint64_t(1) << 24;
-
-class Stopwatch {
-  public:
-    double lap() {
-        const auto now = std::chrono::steady_clock::now();
-        const double seconds = std::chrono::duration<double>(now - start_).count();
-        start_ = now;
-        return seconds;
-    }
-
-  private:
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 /// How much denser light sub-paths that begin as v[0], v[1] will be in the render than where the data were traced.
 double emission_ratio(const TrainingOptions& o, const TrainingPath& p, const TrainingVertex* v) {
@@ -329,9 +316,7 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
         judged = gamma_dataset(data, brightness, emitters, options, stop, *options.judged);
     if (control.data_read) control.data_read();
     report->paths = dataset.paths.size(), report->nodes = dataset.nodes.size();
-    if (dataset.paths.empty())
-        report->note +=
-            std::string(report->note.empty() ? "" : "; ") + "no path of this scene can be connected; the tables are uniform";
+    if (dataset.paths.empty()) report->add_note("no path of this scene can be connected; the tables are uniform");
     GammaOptions gamma;
     gamma.trainer = options.trainer;
     gamma.mix = options.mix;
@@ -351,8 +336,8 @@ Result<SubspaceTables> train_tables(const TrainingData& data, const EmitterSet& 
                        " eye subspaces apart, of " + std::to_string(options.light_subspaces) + " and " +
                        std::to_string(options.eye_subspaces) + " asked for";
     if (report->out_of_range > 0)
-        report->note += (report->note.empty() ? "" : "; ") + std::to_string(report->out_of_range) + " of " +
-                        std::to_string(all_paths) + " training paths left the range of single precision and were left out";
+        report->add_note(std::to_string(report->out_of_range) + " of " + std::to_string(all_paths) +
+                         " training paths left the range of single precision and were left out");
     LL_RETURN_IF_ERROR(tables.validate(emitters));
     report->light_subspaces = tables.light_count, report->eye_subspaces = tables.eye_count;
     return tables;

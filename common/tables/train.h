@@ -47,6 +47,11 @@ struct TrainingReport {
     uint64_t out_of_range = 0;  ///< Paths and light sub-paths that were left out; see TrainingData::in_range().
     double classifier_seconds = 0, energy_seconds = 0, gamma_seconds = 0;
     std::string note;  ///< One line when the tables are simpler than asked or data were left out; empty otherwise.
+
+    void add_note(std::string_view more) {
+        if (!note.empty()) note += "; ";
+        note += more;
+    }
 };
 
 /// Lets the caller follow a training and end it.

@@ -1,6 +1,6 @@
 #include "common/transport/bdpt.h"
 
-#include "common/transport/learn_gain.h"
+#include "common/transport/learn_walks.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {
@@ -28,7 +28,7 @@ const AlgorithmInfo kBdptRow{
     .bias = "unbiased; misses specular-diffuse-specular paths from lights that cannot be hit",
     .parameters = kParameters,
     .light_paths_per_pixel = one_light_path,
-    .learning = &kEmissionAndGainLearning,
+    .learning = &kWalkLearning,
     .make = make,
 };
 

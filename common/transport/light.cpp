@@ -1,6 +1,6 @@
 #include "common/transport/light.h"
 
-#include "common/transport/learn_emission.h"
+#include "common/transport/learn_walks.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {

@@ -1,8 +1,7 @@
 #include "common/transport/lvcbpt.h"
 
 #include "common/tables/subspace_tables.h"
-#include "common/transport/learn_emission.h"
-#include "common/transport/learn_gain.h"
+#include "common/transport/learn_walks.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {
@@ -41,14 +40,12 @@ Result<Tables> learn(const LearnRequest& r) {
     options.connections = p.connections;
     options.nominal_paths = double(p.minimum_paths);
     options.seed = r.settings.seed;
-    EmissionLesson emission = learn_emission(r);
-    emission.tell(&options);
-    GainData gain = learn_gain(r);
+    WalkLessons walks(r);
+    walks.tell(&options);
     auto tables = train_tables(r.data, r.emitters, options, r.control, r.report);
     if (!tables.ok()) return tables.status();
     Tables all(*std::move(tables));
-    all.set(std::make_shared<const EmissionPart>(EmissionPart{std::move(emission.data)}));
-    all.set(std::make_shared<const GainPart>(GainPart{std::move(gain)}));
+    walks.move_to(&all);
     return all;
 }
 

@@ -94,7 +94,7 @@ constexpr ParameterInfo emission_parameter(bool learned) {
             "useful [guided emission: Vorba et al. 2014]",
             kEmissions};
 }
-inline bool learns_emission(const AlgorithmSettings& s) { return s.value(kEmission) != 0; }
+inline bool learns_emission(const AlgorithmSettings& s) { return s.has(kEmission) && s.value(kEmission) != 0; }
 /// The size of a training set; a time-limited job may make it smaller.
 inline constexpr std::string_view kTrainingPaths = "training-paths";
 

@@ -1,6 +1,6 @@
 #include "common/transport/path.h"
 
-#include "common/transport/learn_gain.h"
+#include "common/transport/learn_walks.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {

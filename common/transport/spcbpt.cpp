@@ -1,7 +1,6 @@
 #include "common/transport/spcbpt.h"
 
-#include "common/transport/learn_emission.h"
-#include "common/transport/learn_gain.h"
+#include "common/transport/learn_walks.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {
@@ -88,14 +87,12 @@ Result<Tables> learn(const LearnRequest& r) {
     options.seed = r.settings.seed;
     const auto guide = r.guide.get<SubspaceTables>();
     options.judged = r.judges_guide ? guide.get() : nullptr;
-    EmissionLesson emission = learn_emission(r);
-    emission.tell(&options);
-    GainData gain = learn_gain(r);
+    WalkLessons walks(r);
+    walks.tell(&options);
     auto tables = train_tables(r.data, r.emitters, options, r.control, r.report);
     if (!tables.ok()) return tables.status();
     Tables all(*std::move(tables));
-    all.set(std::make_shared<const EmissionPart>(EmissionPart{std::move(emission.data)}));
-    all.set(std::make_shared<const GainPart>(GainPart{std::move(gain)}));
+    walks.move_to(&all);
     return all;
 }
 
