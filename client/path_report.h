@@ -23,7 +23,7 @@ struct ReportedVertex {
     Vec3 normal;           ///< Geometric; zero at the lens, and for an infinite light the direction of travel.
     int64_t emitter = -1;  ///< Number of the emitter that it lies on; -1: none.
     bool dirac = false;    ///< The path goes on through a Dirac lobe here: no technique connects or merges at it.
-    float survival = 1;    ///< Probability that roulette let its own sub-path come this far.
+    float survival = 1;    ///< What roulette has divided its own sub-path by so far.
     Rgb throughput;        ///< Of its own sub-path up to here, divided by `survival`, before the vertex scatters.
     double fwd = 0;        ///< Density when traced from the light: m^-2, x_0 in the emitter's own measure. NaN at the lens.
     double rev = 0;        ///< The same traced from the camera.
@@ -88,7 +88,7 @@ inline constexpr const char* kPathSchema =
     weight          of multiple importance sampling
     weighted        [r,g,b] weight x value: what the image gets
     throughput      [r,g,b] of both sub-paths before they were completed
-    survival        probability that roulette left both sub-paths; value and throughput are divided by it
+    survival        what roulette has divided value and throughput by: probabilities, or expected numbers of branches
     source_measure  area, solid angle or discrete: of fwd, rev and next_event at x_0
     next_event      density of x_0 if chosen from x_1
     vertices        x_0 on the light ... x_k on the lens. Each has

@@ -219,11 +219,7 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
     const auto unit = units->find(reference.key);
     if (!unit) return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};
     Status problem = data.status();
-    if (problem.ok() &&
-        (data->samples != unit->training.sample_count || data->light_samples != energy_paths(job->spec, unit->training)))
-        problem = data_loss("the training data are those of another unit");
-    // Checks that need the scene's lights are made by the task that has built the scene.
-    if (problem.ok()) problem = data->validate(SIZE_MAX);
+    if (problem.ok()) problem = check_unit_data(*data, job->spec, unit->training);
     if (!problem.ok()) return reject_result(*job, *units, reference.key, *worker, problem);
     if (auto answer = repeated_result(*job, *units, reference.key, *worker, digest)) return *std::move(answer);
     workers_.unit_succeeded(*worker);

@@ -61,7 +61,20 @@ uint64_t largest_training_payload(const JobSpec& spec, const TrainingWork& work)
     const uint64_t blocks = std::min(uint64_t(frame.crop.area()), most_blocks);
     const uint64_t path = sizeof(TrainingPath) + uint64_t(spec.max_depth + 3) * sizeof(TrainingVertex);
     const uint64_t paths = (kTrainingPathsPerSample + 1) * work.sample_count + energy_paths(spec, work);
-    return 256 + blocks * sizeof(double) + paths * path;
+    uint64_t bytes = 256 + blocks * sizeof(double) + paths * path;
+    if (learning_plan(spec.algorithm).keeps_visits)
+        bytes += blocks * sizeof(double) + work.sample_count * uint64_t(spec.max_depth + 2) * sizeof(TrainingVisit);
+    return bytes;
+}
+
+Status check_unit_data(const TrainingData& data, const JobSpec& spec, const TrainingWork& work) {
+    const FrameBlocks blocks(spec.frame.crop);
+    const bool visits = learning_plan(spec.algorithm).keeps_visits;
+    if (data.samples != work.sample_count || data.light_samples != energy_paths(spec, work) || data.blocks_x != blocks.columns() ||
+        data.blocks_y != blocks.rows() || data.block_square.empty() == visits || (!visits && !data.visits.empty()))
+        return data_loss("the training data are those of another unit");
+    // Checks that need the scene's lights are made by the task that has built the scene.
+    return data.validate(SIZE_MAX);
 }
 
 }  // namespace lightloom

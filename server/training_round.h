@@ -69,5 +69,7 @@ uint64_t energy_paths(const JobSpec& spec, const TrainingWork& work);
 
 /// An upper bound of the size of a unit's serialized data, in bytes.
 uint64_t largest_training_payload(const JobSpec& spec, const TrainingWork& work);
+/// kDataLoss unless the data can be those of this unit, and be joined with those of the others.
+Status check_unit_data(const TrainingData& data, const JobSpec& spec, const TrainingWork& work);
 
 }  // namespace lightloom

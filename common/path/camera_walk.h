@@ -66,12 +66,12 @@ LL_ALWAYS_INLINE inline bool extend_camera_path(const Scene& scene, int max_edge
 /// Vertices of a camera sub-path from which more sub-paths are still to go on, the last one first.
 class Branches {
   public:
-    /// Most sub-paths of one camera sample that split: a bound on what a bad table can cost.
+    /// Most sub-paths that splitting adds to one camera sample: a bound on what a bad table can cost.
     static constexpr int kMost = 64;
 
     /// From the vertex number t, `expected` sub-paths go on, in expectation; `u` rounds. The vertices before it are open already.
     void open(int t, float expected, float u) {
-        if (expected > 1 && split_ >= kMost) expected = 1;
+        expected = std::min(expected, float(1 + kMost - split_));
         const int count = expected == 1 ? 1 : int(expected + u);
         split_ += std::max(0, count - 1);
         last_ = t;
@@ -111,7 +111,9 @@ int trace_branching_camera_path(const Scene& scene, CameraSampler& sampler, int 
         if (goes_on) {
             const PathVertex& v = z[t - 1];
             // Glass that loses nothing only passes on what is behind it.
-            const float expected = v.lossless ? 1 : gain.continuations(gain.at(v.p, v.ng), scalar_of(v.alpha) * inverse_brightness);
+            const float expected =
+                v.lossless ? 1
+                           : gain.continuations(gain.at(v.p, face_forward(v.ng, v.wo)), scalar_of(v.alpha) * inverse_brightness);
             branches.open(t, expected, expected == 1 ? 0 : sampler.rng().uniform());
         }
         for (t = branches.next(&first); t > 0; t = branches.next(&first)) {

@@ -1,9 +1,9 @@
 #pragma once
 // The random walk of both sub-paths.
 //
-// Russian roulette divides the throughput by the true survival probability and stays out of every density: the weights
-// are a function of the path alone, and roulette is the same function of a sub-path's own throughput for every
-// technique. survival.h is what weights may know of roulette.
+// Russian roulette divides the throughput by the true survival probability, or by the expected number of branches, and
+// stays out of every density: the weights are a function of the path alone, and roulette treats a sub-path alike whichever
+// technique will use it. survival.h is what weights may know of roulette.
 
 #include "common/core/rng.h"
 #include "common/path/path_view.h"

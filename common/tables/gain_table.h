@@ -16,7 +16,8 @@ namespace lightloom {
 
 /// What was learned, as plain arrays.
 struct GainData {
-    /// A decision tree over places. Inner nodes: an axis (0, 1, 2: position in world space; 3, 4, 5: geometric normal)
+    /// A decision tree over places. Inner nodes: an axis (0, 1, 2: position in world space; 3, 4, 5: geometric
+    /// normal on the side from which the sub-path came)
     /// and the left child, which the right one follows; leaves: axis 7 and the number of a gain.
     struct Node {
         float threshold = 0;

@@ -10,9 +10,10 @@
 namespace lightloom {
 namespace {
 
-/// Visits of a leaf, at least; a place with fewer is not told apart from its surroundings.
-constexpr size_t kLeafVisits = 400;
-/// More visits than these make the table no better; they are taken at even distances.
+/// A place with twice as many visits is divided at their median; where many lie in one plane, a part may have fewer than half
+/// of them, but not fewer than these.
+constexpr size_t kLeafVisits = 400, kFewestVisits = 100;
+/// More visits than these make the table no better; which are taken has nothing to do with their order.
 constexpr size_t kMostVisits = 400000;
 /// Normals count as places that lie this share of the scene's extent apart.
 constexpr double kNormalExtent = 0.25;
@@ -89,18 +90,24 @@ class Trainer {
                 for (const Visit& v : visits) coordinates_.push_back(v.place[*axis]);
                 const auto middle = coordinates_.begin() + std::ptrdiff_t(coordinates_.size() / 2);
                 std::nth_element(coordinates_.begin(), middle, coordinates_.end());
-                float threshold = *middle;
+                float above = *middle;
                 // More than half of them may have the least coordinate; the next one divides them from the rest.
-                if (std::none_of(coordinates_.begin(), middle, [&](float c) { return c < threshold; })) {
+                if (std::none_of(coordinates_.begin(), middle, [&](float c) { return c < above; })) {
                     float next = HUGE_VALF;
                     for (const float c : coordinates_)
-                        if (c > threshold) next = std::min(next, c);
-                    threshold = next;
+                        if (c > above) next = std::min(next, c);
+                    above = next;
                 }
+                // Halfway between two coordinates: the normals here are packed, those that will be looked up are not.
+                float below = -HUGE_VALF;
+                for (const float c : coordinates_)
+                    if (c < above) below = std::max(below, c);
+                const float half_way = below + (above - below) / 2;
+                const float threshold = half_way > below ? half_way : above;
                 const auto half =
                     std::stable_partition(visits.begin(), visits.end(), [&](const Visit& v) { return v.place[*axis] < threshold; });
                 const size_t count = size_t(half - visits.begin());
-                if (count > 0 && count < visits.size()) {
+                if (count >= kFewestVisits && visits.size() - count >= kFewestVisits) {
                     const uint32_t left = uint32_t(table->nodes.size());
                     table->nodes[at] = GainData::make_inner(uint32_t(*axis), threshold, left);
                     table->nodes.resize(table->nodes.size() + 2);
@@ -139,7 +146,8 @@ GainData train_gain(const TrainingData& data, const std::vector<double>& brightn
     std::vector<Visit> visits;
     visits.reserve(data.visits.size() / step + 1);
     bool found = false;
-    for (size_t i = 0; i < data.visits.size(); i += step) {
+    for (size_t i = 0; i < data.visits.size(); ++i) {
+        if ((uint64_t(i) * 0x9e3779b97f4a7c15ull >> 32) % step != 0) continue;
         const TrainingVisit& v = data.visits[i];
         if (!(v.gain >= 0 && std::isfinite(v.gain) && v.vertices >= 0 && std::isfinite(v.vertices))) continue;
         const Vec3 normal = v.normal;

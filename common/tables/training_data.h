@@ -55,7 +55,7 @@ struct TrainingPath {
 /// A vertex of a camera sub-path that could have scattered, and what came of it.
 struct TrainingVisit {
     Vec3 position;
-    PackedNormal normal;  ///< Geometric.
+    PackedNormal normal;  ///< Geometric, on the side from which the sub-path came.
     float gain = 0;       ///< Estimates that the sub-path's later vertices found, over its throughput here.
     float vertices = 0;   ///< How many later vertices there were.
 };

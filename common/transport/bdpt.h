@@ -35,9 +35,11 @@ struct BdptSelection {
 };
 
 /// Traces one camera sample and one light sub-path and calls contribute(contribution, view) for each of their
-/// contributions. light_done(y, n) is called once the light sub-path is complete. Returns the number of camera vertices.
+/// contributions. light_done(y, n) is called once the light sub-path is complete. Returns the number of
+/// camera vertices. The light sub-path follows the context's rule of roulette.
 template <ViewDetail detail, class LightDone, class Contribute>
-int trace_bdpt_sample(SampleContext& context, NextEventRays rays, LightDone&& light_done, Contribute&& contribute) {
+int trace_bdpt_sample(SampleContext& context, const RouletteRule& camera_roulette, NextEventRays rays, LightDone&& light_done,
+                      Contribute&& contribute) {
     const Scene& scene = context.scene;
     PathVertex *y = context.light_path_vertices, *z = context.camera_path;
     PathView view;
@@ -60,7 +62,7 @@ int trace_bdpt_sample(SampleContext& context, NextEventRays rays, LightDone&& li
     const auto escape = [&](int t, const WalkRay& ray) {
         if (t <= context.max_edges) contribute_escape<detail>(scene, z, t, ray, &view, contribute);
     };
-    return trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
+    return trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, camera_roulette, z, &context.counters,
                              visit, escape);
 }
 
@@ -74,7 +76,7 @@ struct BdptAlgorithm {
     template <class Contribute>
     void trace(SampleContext& context, Contribute&& contribute) const {
         trace_bdpt_sample<ViewDetail::kFull>(
-            context, selection.next_event_rays(), [](const PathVertex*, int) {}, contribute);
+            context, context.roulette, selection.next_event_rays(), [](const PathVertex*, int) {}, contribute);
     }
 };
 

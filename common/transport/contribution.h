@@ -22,7 +22,7 @@ struct PathContribution {
     Vec3 position, normal;  ///< x_0's; for an infinite light a point outside the scene and the direction of travel.
     uint32_t emitter = 0;
     Vec2 film;           ///< For connections to the lens only.
-    float survival = 1;  ///< Probability that roulette left both sub-paths: `value` was divided by it.
+    float survival = 1;  ///< What roulette has divided `value` by, see SubPathVertex::survival.
 };
 
 /// s = 0 on a surface: what z_{t-1} emits towards z_{t-2}, if it lies on an emitter.

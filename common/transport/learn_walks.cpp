@@ -19,7 +19,9 @@ LearningPlan plan(const AlgorithmSettings& s) {
     const uint64_t samples = uint64_t(s.value(kTrainingPaths));
     return {.samples = samples,
             .energy_paths = 0,
-            .rounds = learns_emission(s) ? growing_rounds(samples) : std::vector<LearningRound>{{samples}}};
+            .rounds = learns_emission(s) ? growing_rounds(samples) : std::vector<LearningRound>{{samples}},
+            .keeps_paths = learns_emission(s),
+            .keeps_visits = learns_gain(s)};
 }
 
 Result<Tables> learn_walks(const LearnRequest& request) {

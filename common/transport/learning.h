@@ -36,6 +36,8 @@ struct LearningPlan {
     double energy_paths = 1;  ///< M' / D: light sub-paths that measure Q, per sample.
     std::vector<LearningRound> rounds;
     bool grows = false;  ///< The rounds are those of growing_rounds().
+    /// What the tables are learned from: full paths, and visits (for the gain table).
+    bool keeps_paths = true, keeps_visits = false;
     // Parameters of the render's weights that are not in the tables.
     ByDepth<int> connections;  ///< N
     Correction correction = Correction::kUncorrected;

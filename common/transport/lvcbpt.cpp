@@ -21,7 +21,8 @@ constexpr ParameterInfo kParameters[] = {
     kConnections,
     emission_parameter(false),
     {kTrainingPaths, 20000, 1, 1e8, true,
-     "light sub-paths that count the vertices per path before rendering, and from which emission=learned learns"},
+     "light sub-paths that count the vertices per path before rendering, and from which emission=learned and roulette=learned "
+     "learn"},
 };
 constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &GainPart::kPart, &SubspaceTables::kPart};
 
@@ -29,6 +30,7 @@ LearningPlan plan(const AlgorithmSettings& s) {
     const uint64_t samples = uint64_t(s.value(kTrainingPaths));
     return {.samples = samples,
             .rounds = learns_emission(s) ? growing_rounds(samples) : std::vector<LearningRound>{{samples}},
+            .keeps_visits = learns_gain(s),
             .connections = CacheParameters::of(s).connections};
 }
 

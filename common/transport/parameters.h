@@ -24,7 +24,7 @@ inline constexpr ParameterInfo kRouletteByAlbedo{
     2,
     true,
     "how sub-paths end by chance: by the power that they have lost; camera sub-paths by what training found that they may still "
-    "gain, where they may divide, too [Rath et al. 2022]; or not at all",
+    "gain, where they may divide, too [Rath et al. 2022]; or not at all. rr-start and rr-min belong to the first",
     kRoulettes};
 inline bool learns_gain(const AlgorithmSettings& s) { return s.has(kRoulette) && s.value(kRoulette) == 1; }
 // The weights know a typical survival at best, so that they trust a technique too much whose sub-path rarely survives:
@@ -98,14 +98,14 @@ inline bool learns_emission(const AlgorithmSettings& s) { return s.has(kEmission
 /// The size of a training set; a time-limited job may make it smaller.
 inline constexpr std::string_view kTrainingPaths = "training-paths";
 
-/// For algorithms that learn nothing but emission.
+/// For algorithms that learn nothing but emission and gains.
 inline constexpr ParameterInfo kEmissionTraining{
     kTrainingPaths,
     100000,
     1,
     1e8,
     true,
-    "camera samples of the training set from which emission=learned learns, each with a light sub-path"};
+    "camera samples of the training set from which emission=learned and roulette=learned learn, each with a light sub-path"};
 
 /// The algorithm's rule for Russian roulette; the defaults if it has no such parameters.
 inline RouletteRule roulette_of(const AlgorithmSettings& s) {

@@ -65,6 +65,7 @@ LearningPlan plan(const AlgorithmSettings& s) {
             .energy_paths = s.value("energy-paths"),
             .rounds = grows ? growing_rounds(samples) : std::vector<LearningRound>{{samples}},
             .grows = grows,
+            .keeps_visits = learns_gain(s),
             .connections = CacheParameters::of(s).connections,
             .correction = correction_of(s),
             .rays = next_event_beside_cache_of(s)};

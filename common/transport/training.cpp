@@ -34,6 +34,12 @@ struct RenderToCome {
     RenderSelection selection;
 };
 
+/// What a contribution is worth to the image; 0 where that is no finite number.
+double estimate_of(const PathContribution& c, double weight, double scale) {
+    const double estimate = weight * double(scalar_of(c.value)) * scale;
+    return estimate > 0 && std::isfinite(estimate) ? estimate : 0;
+}
+
 /// Keeps one of the contributions of a sub-path, in proportion to their estimates.
 class Reservoir {
   public:
@@ -41,8 +47,8 @@ class Reservoir {
     /// `scale`. Returns the estimate.
     double offer(const PathContribution& c, PathView& view, double weight, double scale, uint32_t block, const RenderToCome& render,
                  Rng& rng) {
-        const double contribution = double(scalar_of(c.value)) * scale, estimate = weight * contribution;
-        if (!(estimate > 0) || !std::isfinite(estimate)) return 0;
+        const double contribution = double(scalar_of(c.value)) * scale, estimate = estimate_of(c, weight, scale);
+        if (!(estimate > 0)) return 0;
         const int k = view.k;
         if (k < 2) return estimate;  // a directly visible emitter: nothing to learn
         sum_ += estimate;
@@ -145,10 +151,10 @@ Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const Re
         generator.lit_ = scene.with_emission(std::move(emission));
         generator.scene_ = generator.lit_.get();
     }
-    generator.roulette_ = roulette_of(algorithm);
+    generator.roulette_ = generator.camera_roulette_ = roulette_of(algorithm);
     generator.heuristic_ = heuristic_of(algorithm);
     generator.plan_ = learning_plan(algorithm);
-    generator.keeps_visits_ = learns_gain(algorithm);
+    if (generator.plan_.keeps_visits) generator.camera_roulette_.min_survival = 1;
     generator.next_event_ = algorithm.has(kNextEvent.name) ? next_event_of(algorithm) : NextEventRays{};
     generator.unidirectional_ = algorithm.info().traces == Traces::kCamera;
     generator.light_paths_per_iteration_ = algorithm.light_paths_per_iteration(scene.frame().crop.area());
@@ -196,7 +202,7 @@ class TrainingGenerator::Unit {
         TrainingData data;
         data.blocks_x = blocks_.columns(), data.blocks_y = blocks_.rows();
         data.block_sum.assign(size_t(data.blocks_x) * size_t(data.blocks_y), 0.0);
-        if (generator_.keeps_visits_) data.block_square.assign(data.block_sum.size(), 0.0);
+        if (generator_.plan_.keeps_visits) data.block_square.assign(data.block_sum.size(), 0.0);
         return data;
     }
     RenderUnit light_work() const {
@@ -214,7 +220,7 @@ class TrainingGenerator::Unit {
 
     /// Calls sample(context, block, data, rng) for every sample.
     template <class Sample>
-    Result<TrainingData> trace(TrainingData all, Sample&& sample) const {
+    Result<TrainingData> trace(TrainingData all, const RouletteRule& roulette, Sample&& sample) const {
         std::vector<TrainingData> chunks(size_t((work_.sample_count + kChunk - 1) / kChunk));
         fork_join(chunks.size(), [&](size_t first_chunk, size_t last_chunk) {
             std::vector<PathVertex> camera_path(size_t(generator_.max_edges_) + 2), light_path(size_t(generator_.max_edges_) + 1);
@@ -228,7 +234,7 @@ class TrainingGenerator::Unit {
                     SampleContext context{.scene = *generator_.scene_,
                                           .seed = generator_.seed_,
                                           .max_edges = generator_.max_edges_,
-                                          .roulette = generator_.roulette_,
+                                          .roulette = roulette,
                                           .camera_path = camera_path.data(),
                                           .light_path_vertices = light_path.data(),
                                           .counters = {}};
@@ -258,7 +264,7 @@ class TrainingGenerator::Unit {
     void trace_for_energy(SampleContext& context, uint64_t number, TrainingData* data) const {
         LightSampler sampler({generator_.seed_, Stage::kLightPool, 0, number});
         PathVertex* y = context.light_path_vertices;
-        const int n = trace_light_path(context.scene, sampler, context.max_edges, context.roulette, y, &context.counters);
+        const int n = trace_light_path(context.scene, sampler, context.max_edges, generator_.roulette_, y, &context.counters);
         keep_light_path(y, n, context.max_edges, data);
     }
 
@@ -277,11 +283,10 @@ Result<TrainingData> TrainingGenerator::trace(const TrainingWork& work, std::sto
 /// Light sub-paths would find other light than such an algorithm does.
 Result<TrainingData> TrainingGenerator::trace_unidirectional(const Unit& unit) const {
     const PathAlgorithm<> generator{{next_event_}, heuristic_};
-    return unit.trace(unit.empty(), [&](SampleContext& context, uint32_t block, TrainingData& data, Rng&) {
-        Visits visits(keeps_visits_);
+    return unit.trace(unit.empty(), camera_roulette_, [&](SampleContext& context, uint32_t block, TrainingData& data, Rng&) {
+        Visits visits(plan_.keeps_visits);
         const int t = generator.trace(context, [&](const PathContribution& found, PathView& view) {
-            const double estimate = double(scalar_of(found.value)) * double(generator.weight(view, found.technique));
-            if (!std::isfinite(estimate)) return;
+            const double estimate = estimate_of(found, double(generator.weight(view, found.technique)), 1);
             visits.add(found, estimate);
             data.block_sum[block] += estimate;
         });
@@ -292,12 +297,12 @@ Result<TrainingData> TrainingGenerator::trace_unidirectional(const Unit& unit) c
 Result<TrainingData> TrainingGenerator::trace_pairs(const Unit& unit) const {
     const BdptSelection generator{unit.pixels()};
     const RenderToCome render = unit.render();
-    return unit.trace(unit.empty(), [&](SampleContext& context, uint32_t camera_block, TrainingData& data, Rng& rng) {
+    return unit.trace(unit.empty(), roulette_, [&](SampleContext& context, uint32_t camera_block, TrainingData& data, Rng& rng) {
         CameraReservoirs from_camera;
         Reservoir from_light;
-        Visits visits(keeps_visits_);
+        Visits visits(plan_.keeps_visits);
         const int t = trace_bdpt_sample<ViewDetail::kSubspace>(
-            context, {},
+            context, camera_roulette_, {},
             [&](const PathVertex* y, int count) {
                 if (unit.energy_share(context.light_path) > 0) keep_light_path(y, count, context.max_edges, &data);
             },
@@ -352,18 +357,19 @@ Result<TrainingData> TrainingGenerator::trace_guided(const Unit& unit) const {
             from_light[m].reservoir.move_to(&data);
         }
     }
-    return unit.trace(std::move(data), [&](SampleContext& context, uint32_t block, TrainingData& chunk, Rng& rng) {
-        CameraReservoirs from_camera;
-        Visits visits(keeps_visits_);
-        const int t = generator.trace(context, state, [&](const PathContribution& found, PathView& view) {
-            const double estimate = from_camera.of(found).offer(found, view, double(generator.weight(state, view, found.technique)),
-                                                                1, block, render, rng);
-            chunk.block_sum[block] += estimate;
-            visits.add(found, estimate);
-        });
-        visits.move_to(&chunk, context.camera_path, t, max_edges_, block);
-        from_camera.move_to(&chunk);
-    });
+    return unit.trace(std::move(data), camera_roulette_,
+                      [&](SampleContext& context, uint32_t block, TrainingData& chunk, Rng& rng) {
+                          CameraReservoirs from_camera;
+                          Visits visits(plan_.keeps_visits);
+                          const int t = generator.trace(context, state, [&](const PathContribution& found, PathView& view) {
+                              const double estimate = from_camera.of(found).offer(
+                                  found, view, double(generator.weight(state, view, found.technique)), 1, block, render, rng);
+                              chunk.block_sum[block] += estimate;
+                              visits.add(found, estimate);
+                          });
+                          visits.move_to(&chunk, context.camera_path, t, max_edges_, block);
+                          from_camera.move_to(&chunk);
+                      });
 }
 
 Result<Tables> make_tables(const Scene& scene, const RenderSettings& settings, std::stop_token stop, TrainingReport* report) {

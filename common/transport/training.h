@@ -44,10 +44,11 @@ class TrainingGenerator {
     const Scene* scene_;
     std::shared_ptr<const Scene> lit_;  ///< The scene with the guide's emission; null where it has none.
     RouletteRule roulette_;
+    /// Of camera sub-paths: off where visits are kept, which tell what a sub-path that goes on finds.
+    RouletteRule camera_roulette_;
     LearningPlan plan_;
     Heuristic heuristic_ = Heuristic::kBalance;
     NextEventRays next_event_;
-    bool keeps_visits_ = false;               ///< For the gain table.
     bool unidirectional_ = false;             ///< Without light sub-paths.
     uint64_t light_paths_per_iteration_ = 0;  ///< Of the render that the tables are for.
     std::shared_ptr<const PreparedTables> guide_;

@@ -9,7 +9,8 @@
 
 namespace lightloom {
 
-/// The visits of one camera sample whose walk does not branch. Off, it records nothing.
+/// The visits of one camera sample whose walk neither branches nor ends by roulette: what is told is what a sub-path that goes
+/// on finds. Off, it records nothing.
 class Visits {
   public:
     explicit Visits(bool on) : on_(on) {}
@@ -29,7 +30,8 @@ class Visits {
             const PathVertex& v = z[n - 1];
             if (n <= max_edges) {
                 const double throughput = double(scalar_of(v.alpha));
-                data->visits.push_back({v.p, v.ng, float(throughput > 0 ? later / throughput : 0), float(t - n)});
+                data->visits.push_back(
+                    {v.p, face_forward(v.ng, v.wo), float(throughput > 0 ? later / throughput : 0), float(t - n)});
             }
             later += found_[size_t(n)];
         }

@@ -116,6 +116,29 @@ TEST(Tables, TrainingDataHaveABound) {
     EXPECT_NE(service.wait_end(id).message.find("training-paths"), std::string::npos);
 }
 
+/// Of a few samples, sums by block and visits are nearly all of the data. Data without what was asked for belong to no unit.
+TEST(Tables, DataOfVisitsFitTheirBound) {
+    for (const bool damaged : {true, false}) {
+        TableService service;
+        JobSpec spec = service.table_spec();
+        spec.algorithm = testing::algorithm_of("path", {{"roulette", "learned"}, {"training-paths", "4"}});
+        service.submit_training(spec);
+        const auto held = lease_all(service);
+        ASSERT_EQ(held.size(), 1u);
+        std::string bytes = traced(held[0].second);
+        auto data = parse_training_data(bytes);
+        ASSERT_TRUE(data.ok());
+        EXPECT_FALSE(data->visits.empty());
+        EXPECT_TRUE(data->paths.empty());
+        if (damaged) {
+            data->block_square.clear();
+            bytes = serialize(*data);
+        }
+        EXPECT_EQ(service.give(held[0].first, held[0].second, bytes).outcome,
+                  damaged ? SubmitOutcome::kRejected : SubmitOutcome::kAccepted);
+    }
+}
+
 TEST(Tables, JobsCanBeCancelledInEveryPhase) {
     std::atomic<bool> reading{false}, go{false};
     TableService service([&](CoordinatorOptions& o) {

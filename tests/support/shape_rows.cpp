@@ -40,7 +40,7 @@ struct OwnedStub {
                         context.iteration = work.first_iteration + b;
                         context.light_path = work.first_light_path + uint64_t(b) * uint64_t(tile.area()) + uint64_t(i);
                         trace_bdpt_sample<ViewDetail::kFull>(
-                            context, {}, [](const PathVertex*, int) {},
+                            context, context.roulette, {}, [](const PathVertex*, int) {},
                             [&](const PathContribution& c, PathView& view) {
                                 const Rgb value = c.value * float(mis_weight(view, c.technique, selection.on(view)));
                                 if (c.technique.splats())
@@ -85,7 +85,7 @@ struct SplatStub {
                     context.py = crop.y0 + int(rng.below(uint32_t(crop.height())));
                     context.pixel = uint32_t(crop.index(context.px, context.py));
                     trace_bdpt_sample<ViewDetail::kFull>(
-                        context, {}, [](const PathVertex*, int) {},
+                        context, context.roulette, {}, [](const PathVertex*, int) {},
                         [&](const PathContribution& c, PathView& view) {
                             const float weight = float(mis_weight(view, c.technique, selection.on(view)));
                             const bool light = c.technique.splats();
