@@ -53,8 +53,7 @@ inline TechniqueMask mask_of(Technique t, int k) {
 inline RowTechniques techniques_of(const AlgorithmInfo& row, const std::shared_ptr<const Scene>& scene) {
     RowTechniques found;
     const std::string name(row.name);
-    const auto renderer =
-        Renderer::create(scene, settings_of(name, with_small_training(name, {})), random_tables_for(row, *scene, 1));
+    const auto renderer = Renderer::create(scene, settings_of(name, with_all_learned(name, {})), random_tables_for(row, *scene, 1));
     if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
     const auto weights = (*renderer)->weights();
     if (!weights) return found;
