@@ -94,10 +94,7 @@ std::string age_text(double seconds) {
 
 std::string tables_line(const TablesInfo& tables) {
     const double learned = tables.classifier_seconds + tables.energy_seconds + tables.gamma_seconds;
-    std::string line = "tables";  // of algorithms that have no subspaces
-    if (tables.light_subspaces > 0)
-        line = "tables of " + std::to_string(tables.light_subspaces) + " x " + std::to_string(tables.eye_subspaces) + " subspaces";
-    line += " from " + std::to_string(tables.training_samples) + " training samples";
+    std::string line = tables.what() + " from " + std::to_string(tables.training_samples) + " training samples";
     if (tables.from_cache) {
         line += ", cached by an earlier job";
     } else {

@@ -221,10 +221,7 @@ Status Coordinator::finish_tables(JobRecord& job, LearnedTables learned) {
     }
     const std::string bytes = serialize(learned.tables);
     table_cache_.store(info.cache_key, bytes, info);
-    const std::string what = info.light_subspaces == 0 ? std::string("tables")  // of algorithms that have no subspaces
-                                                       : "tables of " + std::to_string(info.light_subspaces) + " x " +
-                                                             std::to_string(info.eye_subspaces) + " subspaces";
-    log_info("{}: {} from {} samples; {:.2f} s traced, {:.2f} s learned{}{}", job.id, what, info.training_samples,
+    log_info("{}: {} from {} samples; {:.2f} s traced, {:.2f} s learned{}{}", job.id, info.what(), info.training_samples,
              info.trace_seconds, learning_seconds(info), info.note.empty() ? "" : "; ", info.note);
     return adopt_tables(job, learned.spec, facts, bytes, std::move(info));
 }

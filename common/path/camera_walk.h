@@ -10,7 +10,7 @@ namespace lightloom {
 /// scattering and next event come from low-discrepancy sequences over the iterations of a pixel; the rest is independent.
 class CameraSampler : public WalkSampler {
   public:
-    CameraSampler(uint64_t seed, uint64_t iteration, uint64_t pixel)
+    LL_ALWAYS_INLINE CameraSampler(uint64_t seed, uint64_t iteration, uint64_t pixel)
         : WalkSampler({seed, Stage::kCamera, iteration, pixel}, Rng({seed, Stage::kPixelScramble, 0, pixel}).next_u64(),
                       uint32_t(iteration), 2) {}
 
@@ -53,14 +53,13 @@ LL_ALWAYS_INLINE inline bool extend_camera_path(const Scene& scene, int max_edge
     if (!(v.fwd > 0) || !std::isfinite(v.fwd)) return false;
     ++*t;
     ++counters->vertices;
-    if (*t > max_edges) {  // only an emitter hit can still be counted: k = t - 1
-        v.bsdf.kind = BsdfKind::kNull;
-        visit(*t);
-        return false;
-    }
-    v.set_bsdf(scene.bsdf_at(point));
+    const bool may_follow = *t <= max_edges;
+    if (may_follow)
+        v.set_bsdf(scene.bsdf_at(point));
+    else
+        v.bsdf.kind = BsdfKind::kNull;  // only an emitter hit can still be counted: k = t - 1
     visit(*t);
-    return true;
+    return may_follow;
 }
 
 /// Vertices of a camera sub-path from which more sub-paths are still to go on, the last one first.
@@ -96,7 +95,7 @@ class Branches {
     float expected_[kMaxEdges + 2];
 };
 
-/// trace_camera_path() where roulette goes by a gain table.
+/// trace_camera_path<true>().
 template <class Visit, class Escape>
 int trace_branching_camera_path(const Scene& scene, CameraSampler& sampler, int px, int py, int max_edges, const GainTable& gain,
                                 PathVertex* z, WalkCounters* counters, Visit&& visit, Escape&& escape) {
@@ -132,12 +131,15 @@ int trace_branching_camera_path(const Scene& scene, CameraSampler& sampler, int 
 /// Walks from the lens along sampler.ray(). `z` has room for max_edges + 2 vertices. After each arrival `visit(t)` is
 /// called with z[0 .. t-1] complete (material resolved unless nothing can follow), before the vertex scatters: the
 /// callback is the place for next event estimation and emitter hits. `escape(t, ray)` is called when the sub-path of t
-/// vertices leaves the scene. With a gain table the walk is a tree, depth first; z[0 .. t-1] is then the branch that ends at
-/// the vertex visited. Returns the number of vertices, of the longest branch.
-template <class Visit, class Escape>
+/// vertices leaves the scene. Where it `branches`, as rule.gain tells, the walk is a tree, depth first, and z[0 .. t-1] the branch
+/// that ends at the vertex visited; otherwise rule.gain is not read. Returns the number of vertices, of the longest branch.
+///
+/// An algorithm whose walks may branch decides before it makes the objects that `visit` refers to (`path.h`): if both walks
+/// could reach them, the compiler would keep them in memory for the one that is inlined, too.
+template <bool branches = false, class Visit, class Escape>
 int trace_camera_path(const Scene& scene, CameraSampler& sampler, int px, int py, int max_edges, const RouletteRule& rule,
                       PathVertex* z, WalkCounters* counters, Visit&& visit, Escape&& escape) {
-    if (rule.gain) [[unlikely]]
+    if constexpr (branches)
         return trace_branching_camera_path(scene, sampler, px, py, max_edges, *rule.gain, z, counters, visit, escape);
     WalkRay ray = start_camera_path(scene, sampler, px, py, &z[0]);
     int t = 1;

@@ -2,6 +2,7 @@
 // Random numbers of one sub-path: low-discrepancy points over the sub-paths of a sequence for the first decisions, a stream of its
 // own for the rest.
 
+#include "common/core/inline.h"
 #include "common/core/low_discrepancy.h"
 #include "common/path/random_walk.h"
 
@@ -10,7 +11,7 @@ namespace lightloom {
 class WalkSampler {
   public:
     /// For the scattering at the last of n vertices: the first one is stratified over the sequence.
-    ScatterSample scattering(int n) {
+    LL_ALWAYS_INLINE ScatterSample scattering(int n) {
         const Vec2 u = rng_.uniform2();
         lobe_rest_ = u.y;
         return {u.x, n == 2 ? point(scattering_) : rng_.uniform2()};

@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "common/core/inline.h"
 #include "common/core/math.h"
 #include "common/core/vec.h"
 #include "common/scene/sampling.h"
@@ -72,7 +73,7 @@ struct Bsdf {
     float trapped_norm = 0;                    ///< ... and the normalisation of its lobe.
 
     /// True if some lobe is not a Dirac delta, so that the vertex can be connected to.
-    bool has_smooth_lobe() const;
+    LL_ALWAYS_INLINE bool has_smooth_lobe() const;
     /// True if some lobe is a Dirac delta.
     bool has_delta_lobe() const;
     /// Whether all light that arrives leaves again, except for what a rough interface loses between its facets.

@@ -37,7 +37,7 @@ struct BdptSelection {
 /// Traces one camera sample and one light sub-path and calls contribute(contribution, view) for each of their
 /// contributions. light_done(y, n) is called once the light sub-path is complete. Returns the number of
 /// camera vertices. The light sub-path follows the context's rule of roulette.
-template <ViewDetail detail, class LightDone, class Contribute>
+template <ViewDetail detail, bool branches = false, class LightDone, class Contribute>
 int trace_bdpt_sample(SampleContext& context, const RouletteRule& camera_roulette, NextEventRays rays, LightDone&& light_done,
                       Contribute&& contribute) {
     const Scene& scene = context.scene;
@@ -62,8 +62,8 @@ int trace_bdpt_sample(SampleContext& context, const RouletteRule& camera_roulett
     const auto escape = [&](int t, const WalkRay& ray) {
         if (t <= context.max_edges) contribute_escape<detail>(scene, z, t, ray, &view, contribute);
     };
-    return trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, camera_roulette, z, &context.counters,
-                             visit, escape);
+    return trace_camera_path<branches>(scene, sampler, context.px, context.py, context.max_edges, camera_roulette, z,
+                                       &context.counters, visit, escape);
 }
 
 template <class Selection = BdptSelection>
@@ -75,8 +75,12 @@ struct BdptAlgorithm {
 
     template <class Contribute>
     void trace(SampleContext& context, Contribute&& contribute) const {
-        trace_bdpt_sample<ViewDetail::kFull>(
-            context, context.roulette, selection.next_event_rays(), [](const PathVertex*, int) {}, contribute);
+        const auto light_done = [](const PathVertex*, int) {};
+        const NextEventRays rays = selection.next_event_rays();
+        if (context.roulette.gain)
+            trace_bdpt_sample<ViewDetail::kFull, true>(context, context.roulette, rays, light_done, contribute);
+        else
+            trace_bdpt_sample<ViewDetail::kFull, false>(context, context.roulette, rays, light_done, contribute);
     }
 };
 

@@ -84,6 +84,12 @@ struct CachedAlgorithm {
     /// its camera vertices.
     template <class Contribute>
     int trace(SampleContext& context, const State& state, Contribute&& contribute) const {
+        return context.roulette.gain ? trace_walk<true>(context, state, contribute) : trace_walk<false>(context, state, contribute);
+    }
+
+  private:
+    template <bool branches, class Contribute>
+    int trace_walk(SampleContext& context, const State& state, Contribute&& contribute) const {
         constexpr ViewDetail kDetail = Method::kDetail;
         const Scene& scene = context.scene;
         const NextEventRays rays = state.selection.next_event_rays();
@@ -146,8 +152,8 @@ struct CachedAlgorithm {
                 contribute(c, view);
             });
         };
-        return trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
-                                 visit, escape);
+        return trace_camera_path<branches>(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z,
+                                           &context.counters, visit, escape);
     }
 };
 

@@ -27,7 +27,8 @@ struct PathContribution {
 
 /// s = 0 on a surface: what z_{t-1} emits towards z_{t-2}, if it lies on an emitter.
 template <ViewDetail detail, class Contribute>
-void contribute_hit(const Scene& scene, const PathVertex* z, int t, PathView* view, Contribute&& contribute) {
+LL_ALWAYS_INLINE inline void contribute_hit(const Scene& scene, const PathVertex* z, int t, PathView* view,
+                                            Contribute&& contribute) {
     const PathVertex& v = z[t - 1];
     if (v.emitter == kNone) return;
     const Rgb value = emitter_hit<detail>(scene, z, t, view);

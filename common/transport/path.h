@@ -36,6 +36,12 @@ struct PathAlgorithm {
     /// Returns the number of camera vertices.
     template <class Contribute>
     int trace(SampleContext& context, Contribute&& contribute) const {
+        return context.roulette.gain ? trace_walk<true>(context, contribute) : trace_walk<false>(context, contribute);
+    }
+
+  private:
+    template <bool branches, class Contribute>
+    int trace_walk(SampleContext& context, Contribute&& contribute) const {
         constexpr ViewDetail kDetail = ViewDetail::kLightEnd;
         const Scene& scene = context.scene;
         const NextEventRays rays = selection.next_event_rays();
@@ -50,8 +56,8 @@ struct PathAlgorithm {
         const auto escape = [&](int t, const WalkRay& ray) {
             if (t <= context.max_edges) contribute_escape<kDetail>(scene, z, t, ray, &view, contribute);
         };
-        return trace_camera_path(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z, &context.counters,
-                                 visit, escape);
+        return trace_camera_path<branches>(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z,
+                                           &context.counters, visit, escape);
     }
 };
 

@@ -10,6 +10,11 @@ bool is_terminal(JobState state) {
     return state == JobState::kSucceeded || state == JobState::kFailed || state == JobState::kCancelled;
 }
 
+std::string TablesInfo::what() const {
+    if (light_subspaces == 0) return "tables";
+    return "tables of " + std::to_string(light_subspaces) + " x " + std::to_string(eye_subspaces) + " subspaces";
+}
+
 std::string_view to_string(JobState state) {
     switch (state) {
         case JobState::kPreparing: return "preparing";

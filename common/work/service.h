@@ -90,6 +90,9 @@ struct TablesInfo {
     double uniform_loss = 0, loss = 0, prior_strength = 0;
     std::string note;
     Digest cache_key;
+
+    /// Text for people: "tables of 800 x 1000 subspaces", or "tables" of an algorithm that has none.
+    std::string what() const;
 };
 
 /// The state as a lower-case word.

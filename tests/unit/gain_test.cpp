@@ -190,7 +190,7 @@ TEST(Roulette, BranchesStartAfresh) {
         CameraSampler sampler(7, n, n % uint64_t(crop.area()));
         int here[kEdges + 3] = {};  // visits with so many vertices
         const int px = crop.x0 + int(n) % crop.width(), py = crop.y0 + int(n) / crop.width() % crop.height();
-        const int longest = trace_camera_path(
+        const int longest = trace_camera_path<true>(
             *scene, sampler, px, py, kEdges, {.gain = &gains[n % gains.size()]}, z.data(), &counters,
             [&](int t) {
                 ++visits, ++here[t];
