@@ -4,10 +4,12 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "common/core/fork_join.h"
 #include "common/core/math.h"
 #include "common/core/rng.h"
+#include "common/tables/weighted_split.h"
 
 namespace lightloom {
 namespace {
@@ -166,14 +168,18 @@ class TreeBuilder {
             Bounds bounds;
             for (auto i = begin; i != end; ++i) bounds.add(space_.point(ends_[*i].end));
             const size_t axis = bounds.widest();
-            const float scaled = 0.5f * (bounds.low[axis] + bounds.high[axis]);
-            if (!(space_.scale[axis] > 0)) continue;
-            const float threshold = scaled / space_.scale[axis];
-            const auto middle =
-                std::stable_partition(begin, end, [&](uint32_t i) { return Space::raw(ends_[i].end)[axis] < threshold; });
+            const float scale = space_.scale[axis];
+            if (!(scale > 0)) continue;
+            const auto coordinate = [&](uint32_t i) { return Space::raw(ends_[i].end)[axis]; };
+            const float centre = 0.5f * (bounds.low[axis] + bounds.high[axis]) / scale;
+            const float reach = (bounds.high[axis] - bounds.low[axis]) / scale / 16;
+            const std::optional<float> threshold =
+                widest_gap(std::span<const uint32_t>(begin, end), coordinate, centre - reach, centre + reach);
+            if (!threshold) continue;
+            const auto middle = std::stable_partition(begin, end, [&](uint32_t i) { return coordinate(i) < *threshold; });
             if (middle == begin || middle == end) continue;  // all ends lie on one side
             const uint32_t left = uint32_t(nodes_.size());
-            nodes_[task.node] = SubspaceTree::make_inner(uint32_t(axis), threshold, left);
+            nodes_[task.node] = SubspaceTree::make_inner(uint32_t(axis), *threshold, left);
             nodes_.resize(nodes_.size() + 2, SubspaceTree::make_leaf(first_label_ + label));
             const size_t split = size_t(middle - items.begin());
             tasks.push_back({left, task.begin, split, task.depth + 1});

@@ -4,7 +4,10 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <span>
 #include <utility>
+
+#include "common/tables/weighted_split.h"
 
 namespace lightloom {
 namespace {
@@ -14,6 +17,8 @@ constexpr size_t kAxes = 6;  ///< Position and normal; points on lights have no 
 /// Share of all weight that the emitted points get, and how much less they count for the second half of the cells. There they
 /// only show where a cell reaches beyond what is seen; a cell without any seen point is hardly worth being divided.
 constexpr double kEmittedShare = 0.5, kEmittedImportance = 1e-3;
+/// A leaf is split at the widest gap within so many standard deviations of its mean.
+constexpr float kReach = 0.25f;
 
 struct Point {
     std::array<float, kAxes> x;
@@ -50,8 +55,8 @@ class Splitter {
     struct Leaf {
         size_t begin = 0, end = 0;
         uint32_t node = 0, depth = 0;
-        uint32_t axis = 0;    ///< Where it would be split.
-        float threshold = 0;  ///< The points' mean on that axis.
+        uint32_t axis = 0;  ///< Where it would be split.
+        float mean = 0;     ///< Of the points on that axis.
         double weight = 0;
         /// The weight or the importance, times the mean squared distance of all points, seen or not, from their mean.
         double extent = 0, error = 0;
@@ -75,11 +80,15 @@ class Splitter {
             open->pop_back();
             if (!(leaf.*error > 0) || leaf.depth >= SubspaceTree::kMaxDepth) continue;
             const auto begin = points_.begin() + std::ptrdiff_t(leaf.begin), end = points_.begin() + std::ptrdiff_t(leaf.end);
-            const auto middle = std::stable_partition(begin, end, [&](const Point& p) { return p.x[leaf.axis] < leaf.threshold; });
-            if (middle == begin || middle == end) continue;  // they differ by less than the mean is rounded
+            // The plane of a lamp may lie at the mean.
+            const auto coordinate = [&](const Point& p) { return p.x[leaf.axis]; };
+            const float reach = kReach * float(std::sqrt(leaf.spread[leaf.axis] / leaf.weight));
+            const auto threshold = widest_gap(std::span<const Point>(begin, end), coordinate, leaf.mean - reach, leaf.mean + reach);
+            if (!threshold) continue;
+            const auto middle = std::stable_partition(begin, end, [&](const Point& p) { return coordinate(p) < *threshold; });
             if (per_cache(begin, middle) < options_.fewest || per_cache(middle, end) < options_.fewest) continue;
             const uint32_t left = uint32_t(nodes_.size());
-            nodes_[leaf.node] = SubspaceTree::make_inner(leaf.axis, leaf.threshold, left);
+            nodes_[leaf.node] = SubspaceTree::make_inner(leaf.axis, *threshold, left);
             nodes_.resize(nodes_.size() + 2, SubspaceTree::make_leaf(0));
             const size_t at = size_t(middle - points_.begin());
             for (Leaf half : {Leaf{leaf.begin, at, left, leaf.depth + 1}, Leaf{at, leaf.end, left + 1, leaf.depth + 1}}) {
@@ -112,7 +121,7 @@ class Splitter {
             if (scaled > widest) {
                 widest = scaled;
                 leaf->axis = uint32_t(a);
-                leaf->threshold = float(double(origin[a]) + sum[a] / total);
+                leaf->mean = float(double(origin[a]) + sum[a] / total);
             }
         }
         leaf->weight = total;

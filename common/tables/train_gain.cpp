@@ -7,6 +7,8 @@
 #include <optional>
 #include <span>
 
+#include "common/tables/weighted_split.h"
+
 namespace lightloom {
 namespace {
 
@@ -86,30 +88,21 @@ class Trainer {
         const Moments here = moments(visits, surroundings);
         if (visits.size() >= 2 * kLeafVisits && !stop_.stop_requested()) {
             if (const auto axis = longest_axis(visits)) {
+                const auto coordinate = [&](const Visit& v) { return v.place[*axis]; };
                 coordinates_.clear();
-                for (const Visit& v : visits) coordinates_.push_back(v.place[*axis]);
-                const auto middle = coordinates_.begin() + std::ptrdiff_t(coordinates_.size() / 2);
-                std::nth_element(coordinates_.begin(), middle, coordinates_.end());
-                float above = *middle;
-                // More than half of them may have the least coordinate; the next one divides them from the rest.
-                if (std::none_of(coordinates_.begin(), middle, [&](float c) { return c < above; })) {
-                    float next = HUGE_VALF;
-                    for (const float c : coordinates_)
-                        if (c > above) next = std::min(next, c);
-                    above = next;
-                }
-                // Halfway between two coordinates: the normals here are packed, those that will be looked up are not.
-                float below = -HUGE_VALF;
-                for (const float c : coordinates_)
-                    if (c < above) below = std::max(below, c);
-                const float half_way = below + (above - below) / 2;
-                const float threshold = half_way > below ? half_way : above;
+                for (const Visit& v : visits) coordinates_.push_back(coordinate(v));
+                const auto rank = [&](double share) {
+                    const auto nth = coordinates_.begin() + std::ptrdiff_t(share * double(coordinates_.size()));
+                    std::nth_element(coordinates_.begin(), nth, coordinates_.end());
+                    return *nth;
+                };
+                const std::optional<float> threshold = widest_gap(visits, coordinate, rank(0.4), rank(0.6));
                 const auto half =
-                    std::stable_partition(visits.begin(), visits.end(), [&](const Visit& v) { return v.place[*axis] < threshold; });
+                    std::stable_partition(visits.begin(), visits.end(), [&](const Visit& v) { return coordinate(v) < threshold; });
                 const size_t count = size_t(half - visits.begin());
                 if (count >= kFewestVisits && visits.size() - count >= kFewestVisits) {
                     const uint32_t left = uint32_t(table->nodes.size());
-                    table->nodes[at] = GainData::make_inner(uint32_t(*axis), threshold, left);
+                    table->nodes[at] = GainData::make_inner(uint32_t(*axis), *threshold, left);
                     table->nodes.resize(table->nodes.size() + 2);
                     split(visits.first(count), left, &here, table);
                     split(visits.subspan(count), left + 1, &here, table);

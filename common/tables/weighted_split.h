@@ -1,16 +1,50 @@
 #pragma once
-// One step of building a k-d tree: a set is divided at the weighted median of its longest axis.
+// One step of building a k-d tree: where a set is divided.
 
 #include <algorithm>
-#include <cmath>
+#include <cstddef>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "common/core/vec.h"
 
 namespace lightloom {
 
-/// Sorts `items` along the axis on which position(item) varies most and returns how many of them lie below `*threshold`,
-/// about half of the weight; 0 or all if they lie in one place. Items below the threshold on `*axis` come first.
+/// Where a set is divided: the middle of the widest gap among the coordinates in [low, high] and their next neighbours on either
+/// side; nothing if there is no gap. What is looked up in a tree may differ from what it was learned from by rounding (a
+/// flat wall's normal) or packing (PackedNormal): a threshold beside such a coordinate would send all that lies there to the
+/// other side.
+template <class Items, class Coordinate>
+std::optional<float> widest_gap(const Items& items, Coordinate&& coordinate, float low, float high) {
+    float below = -HUGE_VALF, above = HUGE_VALF;
+    std::vector<float> sorted;
+    for (const auto& item : items) {
+        const float c = coordinate(item);
+        if (c < low)
+            below = std::max(below, c);
+        else if (c > high)
+            above = std::min(above, c);
+        else
+            sorted.push_back(c);
+    }
+    if (below > -HUGE_VALF) sorted.push_back(below);
+    if (above < HUGE_VALF) sorted.push_back(above);
+    std::sort(sorted.begin(), sorted.end());
+    std::optional<float> threshold;
+    float widest = 0;
+    for (size_t i = 1; i < sorted.size(); ++i) {
+        const float gap = sorted[i] - sorted[i - 1];
+        if (!(gap > widest)) continue;
+        widest = gap;
+        const float middle = sorted[i - 1] + gap / 2;
+        threshold = middle > sorted[i - 1] ? middle : sorted[i];
+    }
+    return threshold;
+}
+
+/// Divides `items` along the axis on which position(item) varies most, at the widest gap between two and three fifths of the
+/// weight, and returns how many lie below `*threshold` on `*axis`: they come first. 0 if all lie in one place.
 template <class Item, class Position, class Weight>
 size_t split_at_median(std::span<Item> items, Position&& position, Weight&& weight, int* axis = nullptr,
                        float* threshold = nullptr) {
@@ -29,19 +63,20 @@ size_t split_at_median(std::span<Item> items, Position&& position, Weight&& weig
     }
     std::stable_sort(items.begin(), items.end(),
                      [&](const Item& a, const Item& b) { return position(a)[longest] < position(b)[longest]; });
+    const auto coordinate = [&](const Item& item) { return position(item)[longest]; };
+    float low = 0, high = 0;
     double below = 0;
-    size_t half = 0;
-    while (half < items.size() && below < total / 2) below += weight(items[half++]);
-    // Items at the same coordinate stay together, on the side of the threshold where they are looked up.
-    half = std::clamp(half, size_t(1), items.size() - 1);
-    const float at = position(items[half])[longest];
-    while (half > 0 && position(items[half - 1])[longest] >= at) --half;
-    if (half == 0) {  // the lower half is one coordinate: it is divided from what lies above
-        while (half < items.size() && position(items[half])[longest] <= at) ++half;
+    for (const Item& item : items) {
+        if (below <= 0.4 * total) low = coordinate(item);
+        if (below <= 0.6 * total) high = coordinate(item);
+        below += weight(item);
     }
+    const std::optional<float> gap = widest_gap(items, coordinate, low, high);
     if (axis) *axis = longest;
-    if (threshold) *threshold = half < items.size() ? position(items[half])[longest] : at;
-    return half;
+    if (threshold) *threshold = gap.value_or(low);
+    if (!gap) return 0;
+    return size_t(std::find_if(items.begin(), items.end(), [&](const Item& item) { return coordinate(item) >= *gap; }) -
+                  items.begin());
 }
 
 }  // namespace lightloom

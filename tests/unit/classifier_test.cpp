@@ -4,6 +4,7 @@
 
 #include <cstring>
 
+#include "common/core/packed_normal.h"
 #include "common/core/rng.h"
 #include "common/scene/sampling.h"
 #include "common/tables/train_classifier.h"
@@ -120,6 +121,33 @@ TEST(Classifier, LabelsAreNested) {
         EXPECT_GT(sum / pairs, last) << bits;
         last = sum / pairs;
     }
+}
+
+/// Training data are packed and flat walls' normals rounded: what was learned must hold for what will be looked up. The walls
+/// of this room and the slab in its middle lie where the middle of the bounds would divide them, and so do their normals.
+TEST(Classifier, RoundedAndPackedEndsKeepTheirLabels) {
+    Rng rng({3, Stage::kTraining, 0, 0});
+    std::vector<WeightedEnd> learned;
+    std::vector<SubPathEnd> asked;
+    const auto rounding = [&] { return 4e-7f * (rng.uniform() - 0.5f); };
+    for (int i = 0; i < 20000; ++i) {
+        Vec3 p{2 * rng.uniform() - 1, 2 * rng.uniform() - 1, 2 * rng.uniform() - 1}, n{};
+        const int axis = int(rng.next_u64() % 3);
+        const float plane = float(int(rng.next_u64() % 3) - 1);
+        (axis == 0 ? p.x : axis == 1 ? p.y : p.z) = plane;
+        (axis == 0 ? n.x : axis == 1 ? n.y : n.z) = rng.uniform() < 0.5f ? 1 : -1;
+        const Vec3 exact = normalize(n + Vec3{rounding(), rounding(), rounding()});
+        const Vec3 direction = face_forward(sample_sphere(rng.uniform2()), n);
+        const SubPathEnd end{p, Vec3(PackedNormal(exact)), direction};
+        learned.push_back({end, 0.1f + rng.uniform()});
+        asked.push_back({p + Vec3{rounding(), rounding(), rounding()}, exact, direction});
+    }
+    ClassifierOptions options;
+    options.subspaces = 200, options.seed = 5;
+    const SubspaceTree tree = train_classifier(learned, options);
+    int differ = 0;
+    for (size_t i = 0; i < asked.size(); ++i) differ += tree.label(asked[i]) != tree.label(learned[i].end) ? 1 : 0;
+    EXPECT_LE(differ, 10) << "of " << asked.size();
 }
 
 TEST(Classifier, SurvivesWhatCannotBeTrained) {

@@ -9,6 +9,7 @@
 #include <set>
 #include <tuple>
 
+#include "common/transport/subspace_view.h"
 #include "tests/support/estimates.h"
 #include "tests/support/random_tables.h"
 #include "tests/support/test_scenes.h"
@@ -129,6 +130,36 @@ TEST(GuidedTraining, EnergyIsMeasuredWithAsManyLightSubPathsAsAskedFor) {
         }
     }
     family.check();
+}
+
+/// Q is learned from packed vertices, and what a cache holds is labelled as traced: the walls of this room are tilted by what
+/// rounding leaves, and must be in the same subspaces.
+TEST(GuidedTraining, EnergyIsWhatCachesHold) {
+    testing::SceneBuilder builder = testing::cornell_builder();
+    for (TriangleMesh& mesh : builder.description().meshes)
+        for (Vec3& p : mesh.positions) p = {p.x + 1e-7f * (p.y - p.z), p.y - 1e-7f * p.x, p.z + 1e-7f * p.x};
+    const auto scene = builder.build();
+    TrainingReport report;
+    const RenderSettings settings = settings_of(11, {{"training-paths", "20000"}, {"emission", "power"}});
+    const auto tables = make_tables(*scene, settings, {}, &report);
+    ASSERT_TRUE(tables.ok());
+    const SubspaceTables& learned = *tables->get<SubspaceTables>();
+    std::vector<double> held(learned.light_count);
+    constexpr uint64_t kPaths = 100000;
+    const int max_edges = settings.max_edges();
+    std::vector<PathVertex> y(size_t(max_edges) + 1);
+    for (uint64_t m = 0; m < kPaths; ++m) {
+        LightSampler sampler({12, Stage::kLight, 0, m});
+        WalkCounters counters;
+        const int n = trace_light_path(*scene, sampler, max_edges, {}, y.data(), &counters);
+        SubspaceLabeller{learned, scene->emitters()}.label_light_path(y.data(), n);
+        for (int i = 0; i < n && i + 1 < max_edges; ++i)
+            held[y[size_t(i)].label] += double(scalar_of(y[size_t(i)].alpha)) / double(kPaths);
+    }
+    double total = 0, apart = 0;
+    for (uint32_t i = 0; i < learned.light_count; ++i)
+        total += double(learned.energy[i]), apart += std::fabs(double(learned.energy[i]) - held[i]);
+    EXPECT_LT(apart, 0.1 * total);
 }
 
 /// Labels are learned from these points: x_0 of a sun or a sky must lie where its light comes from, whoever made the path.
