@@ -7,11 +7,11 @@
 #include <set>
 
 #include "client/inspect_emission.h"
+#include "client/inspect_gain.h"
 #include "common/core/atomic_file.h"
 #include "common/core/fork_join.h"
 #include "common/core/rng.h"
 #include "common/film/png.h"
-#include "common/tables/gain_part.h"
 #include "server/table_cache.h"
 
 namespace lightloom::client {
@@ -185,13 +185,15 @@ Result<TableFile> read_tables(const std::string& path, const Scene& scene) {
     if (!parts.ok()) return invalid_argument(path + ": " + parts.status().message());
     if (const Status s = parts->validate(scene.emitters()); !s.ok())
         return invalid_argument(path + ": the tables are not those of this scene: " + s.message());
-    return TableFile{parts->get<SubspaceTables>(), parts->get<EmissionPart>(), sha256(*content), content->size()};
+    return TableFile{parts->get<SubspaceTables>(), parts->get<EmissionPart>(), parts->get<GainPart>(), sha256(*content),
+                     content->size()};
 }
 
 nlohmann::ordered_json describe(const TableFile& file, const Scene& scene) {
     nlohmann::ordered_json out{{"sha256", file.digest.hex()}, {"size_bytes", file.size_bytes}};
     if (file.subspaces) out.update(describe_subspaces(*file.subspaces));
     if (file.emission) out["emission"] = describe_emission(file.emission->data, scene);
+    if (file.gain) out["gain"] = describe_gain(file.gain->data);
     return out;
 }
 
@@ -199,6 +201,7 @@ void print(const TableFile& file, const Scene& scene) {
     std::printf("tables %s, %.1f MB\n", file.digest.hex().c_str(), double(file.size_bytes) * 1e-6);
     if (file.subspaces) print_subspaces(*file.subspaces);
     if (file.emission) print_emission(file.emission->data, scene);
+    if (file.gain) print_gain(file.gain->data);
 }
 
 Status draw(const TableFile& file, const Scene& scene, const std::string& prefix) {

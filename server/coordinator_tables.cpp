@@ -34,10 +34,10 @@ void Coordinator::open_training(JobRecord& job, UnitKind kind, uint32_t round, c
 }
 
 Status Coordinator::prepare_tables(JobRecord& job, JobSpec spec, SceneFacts facts, bool may_wait) {
-    if (const LearningPlan plan = learning_plan(spec.algorithm);
-        plan.grows && spec.samples_per_pixel > 0 && !job.submitted.algorithm.chosen(kTrainingPaths)) {
+    if (spec.samples_per_pixel > 0 && spec.algorithm.has(kTrainingPaths) && !job.submitted.algorithm.chosen(kTrainingPaths)) {
         const uint64_t image_samples = uint64_t(spec.frame.crop.area()) * spec.samples_per_pixel;
-        spec.algorithm = spec.algorithm.with(kTrainingPaths, double(proportionate_training_samples(image_samples, plan.samples)));
+        const uint64_t samples = proportionate_training_samples(image_samples, learning_plan(spec.algorithm).samples);
+        spec.algorithm = spec.algorithm.with(kTrainingPaths, double(samples));
     }
     if (adopt_cached_tables(job, spec, facts)) return {};
     const std::lock_guard lock(mutex_);

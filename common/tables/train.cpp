@@ -103,8 +103,8 @@ Ends collect_ends(const TrainingData& d, const std::vector<double>& brightness, 
 void train_classifiers(const TrainingData& d, const std::vector<double>& brightness, const EmitterSet& emitters,
                        const TrainingOptions& o, std::stop_token stop, SubspaceTables* tables) {
     const Ends ends = collect_ends(d, brightness, o);
-    const uint32_t source_cells =  // at least one label is left for longer prefixes
-        std::clamp(uint32_t(double(o.light_subspaces) * o.source_share), 1u, SubspaceTables::kMaxSubspaces - 1);
+    const uint32_t most_cells = std::max(o.light_subspaces, 2u) - 1;  // at least one label is left for longer prefixes
+    const uint32_t source_cells = std::clamp(uint32_t(double(o.light_subspaces) * o.source_share), 1u, most_cells);
     tables->division = train_division(emitters, ends.seen, ends.emitted, {source_cells, kFewestInSourceCell, stop});
     const uint32_t sources = tables->division.cell_count();
     ClassifierOptions light_options;

@@ -22,7 +22,7 @@ constexpr ParameterInfo kParameters[] = {
     emission_parameter(false),
     {kTrainingPaths, 20000, 1, 1e8, true,
      "light sub-paths that count the vertices per path before rendering, and from which emission=learned and roulette=learned "
-     "learn"},
+     "learn; at most, where a job settles it"},
 };
 constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &GainPart::kPart, &SubspaceTables::kPart};
 

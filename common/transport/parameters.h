@@ -105,7 +105,7 @@ inline constexpr ParameterInfo kEmissionTraining{
     1,
     1e8,
     true,
-    "camera samples of the training set from which emission=learned and roulette=learned learn, each with a light sub-path"};
+    "camera samples of the training set, each with a light sub-path; at most, where a job settles it"};
 
 /// The algorithm's rule for Russian roulette; the defaults if it has no such parameters.
 inline RouletteRule roulette_of(const AlgorithmSettings& s) {

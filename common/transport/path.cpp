@@ -15,7 +15,8 @@ constexpr ParameterInfo kParameters[] = {
     kRouletteMinOfPath,
     kHeuristic,
     kNextEvent,
-    {kTrainingPaths, 50000, 1, 1e8, true, "camera samples of the training set from which roulette=learned learns"},
+    {kTrainingPaths, 50000, 1, 1e8, true,
+     "camera samples of the training set from which roulette=learned learns; at most, where a job settles it"},
 };
 
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {

@@ -367,7 +367,7 @@ TEST(TrainingBudget, SoDoThreeOfThem) {
 /// Their maker takes its time: it may be tracing for longer than the other's limit.
 TEST(TrainingBudget, ATimeLimitedJobWaitsForNoTablesBeforeItKnowsWhatItCanAfford) {
     TableService service;
-    JobSpec leisurely = service.table_spec(1);
+    JobSpec leisurely = service.table_spec(4096);
     leisurely.algorithm = without(leisurely.algorithm, "training-paths");
     const std::string maker = service.submit_training(leisurely), timed = service.submit_training(poor_job(service));
     EXPECT_EQ(service.coordinator->get_job(timed)->phase, PreparePhase::kProbing);

@@ -253,12 +253,13 @@ TEST(Processes, TablesAreKeptForTheNextRenderAndCanBeInspected) {
         EXPECT_TRUE(read_file(service.path("seen") + picture)->starts_with("\x89PNG")) << picture;
     // Tables without subspaces.
     embedded(service, 1, 1,
-             {"--algorithm", "bdpt", "--spp", "1", "--resolution", "16x16", "--set", "emission=learned", "--set",
-              "training-paths=2000", "--table-cache", service.path("emission"), "--json", service.path("bdpt.json")});
+             {"--algorithm", "bdpt", "--spp", "1", "--resolution", "16x16", "--set", "emission=learned", "--set", "roulette=learned",
+              "--set", "training-paths=2000", "--table-cache", service.path("emission"), "--json", service.path("bdpt.json")});
     const std::string key = Json::parse(*read_file(service.path("bdpt.json")))["tables"]["cache_key"].get<std::string>();
     const std::string emission = service.path("emission") + "/" + key + ".tables";
     EXPECT_EQ(Process("lightloom", {"inspect", kScene, "--tables", emission}, service.path("inspect.log")).wait(), 0);
     EXPECT_NE(service.log("inspect").find("  emission   10 % by power"), std::string::npos) << service.log("inspect");
+    EXPECT_NE(service.log("inspect").find(" x 16 blocks of the frame"), std::string::npos) << service.log("inspect");
     EXPECT_EQ(Process("lightloom", {"inspect", kScene, "-q", "--tables", emission, "--draw", "x"}, service.path("none.log")).wait(),
               2);
     std::ofstream(file, std::ios::app) << "x";

@@ -132,6 +132,15 @@ TEST(GuidedTraining, EnergyIsMeasuredWithAsManyLightSubPathsAsAskedFor) {
     family.check();
 }
 
+TEST(GuidedTraining, LightsLeaveASubspaceToLongerPrefixes) {
+    TrainingReport report;
+    const auto tables =
+        make_tables(*testing::environment_lit(),
+                    settings_of(3, {{"training-paths", "2000"}, {"light-subspaces", "17"}, {"source-share", "1"}}), {}, &report);
+    ASSERT_TRUE(tables.ok());
+    EXPECT_LE(tables->get<SubspaceTables>()->light_count, 17u);
+}
+
 /// Q is learned from packed vertices, and what a cache holds is labelled as traced: the walls of this room are tilted by what
 /// rounding leaves, and must be in the same subspaces.
 TEST(GuidedTraining, EnergyIsWhatCachesHold) {
