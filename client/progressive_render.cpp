@@ -79,7 +79,8 @@ ProgressiveRender::ProgressiveRender(std::unique_ptr<const Renderer> renderer, c
       plan_(plan),
       response_(response),
       preparation_seconds_(preparation_seconds),
-      sums_(frame, response) {}
+      sums_(frame, response),
+      last_(frame) {}
 
 Status ProgressiveRender::advance(uint64_t iteration_limit, std::stop_token stop) {
     if (cut_short_ || iterations() >= iteration_limit)
@@ -100,9 +101,7 @@ Status ProgressiveRender::advance(uint64_t iteration_limit, std::stop_token stop
         if (!partial.ok()) return partial.status();
         LL_RETURN_IF_ERROR(sums_.add(*partial));
     }
-    Result<GroupSum> folded = sums_.fold(group.iteration_count);
-    if (!folded.ok()) return folded.status();
-    last_ = *std::move(folded);
+    LL_RETURN_IF_ERROR(sums_.fold(group.iteration_count, &last_));
     last_iterations_ = group.iteration_count;
     cut_short_ = cut;
     seconds_ += seconds;
@@ -111,9 +110,9 @@ Status ProgressiveRender::advance(uint64_t iteration_limit, std::stop_token stop
 }
 
 Result<RgbImage> ProgressiveRender::last_group_image() const {
-    if (!last_) return failed_precondition("no group has been rendered yet");
+    if (groups() == 0) return failed_precondition("no group has been rendered yet");
     Accumulation alone(frame_, response_);
-    LL_RETURN_IF_ERROR(alone.fold(*last_, last_iterations_));
+    LL_RETURN_IF_ERROR(alone.fold(last_, last_iterations_));
     return alone.develop();
 }
 

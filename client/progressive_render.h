@@ -80,7 +80,7 @@ class ProgressiveRender {
     FilmResponse response_;
     double preparation_seconds_, seconds_ = 0, cpu_seconds_ = 0;
     GroupedSum sums_;
-    std::optional<GroupSum> last_;
+    GroupSum last_;
     uint32_t last_iterations_ = 0;
     bool cut_short_ = false;
 };

@@ -92,7 +92,7 @@ Status watch_units(const BuiltJob& job, const Renderer& renderer, uint32_t threa
             LL_RETURN_IF_ERROR(pyramid->add(result.pictures));
             if (!unit.last) continue;
             pyramid->end_group();
-            LL_RETURN_IF_ERROR(image->fold(unit.group_iterations).status());
+            LL_RETURN_IF_ERROR(image->fold(unit.group_iterations));
             progress.show(image->complete().iterations());
             const auto dark = [&] {
                 const RgbImage so_far = image->complete().develop();

@@ -37,7 +37,7 @@ struct CoordinatorOptions {
     std::function<TimePoint()> clock = [] { return std::chrono::steady_clock::now(); };
     /// Memory of the host, into which a frame's sums must fit. 0: as the system reports it.
     int64_t memory_bytes = 0;
-    uint64_t waiting_bytes = uint64_t(512) << 20;  ///< Most memory of partials that wait for earlier groups.
+    uint64_t waiting_bytes = uint64_t(512) << 20;  ///< Most memory for the sums of groups that wait for earlier ones.
     std::filesystem::path table_cache;             ///< Tables of earlier jobs; empty: none are kept.
     uint64_t table_cache_bytes = uint64_t(4) << 30;
     uint64_t training_bytes = uint64_t(8) << 30;  ///< Most training data of one job: 7e6 samples of a hard interior.
@@ -133,7 +133,6 @@ class Coordinator {
     /// Removes the asset of an ended job's tables unless another job needs it.
     void drop_tables(const Digest& digest);
     Status store_tables(const Digest& digest, std::string_view bytes);
-    void size_window(JobRecord& job) const;
     Status write_results(JobRecord& job);
     void forget_old_jobs();
     void finish_if_complete(JobRecord& job);

@@ -19,6 +19,14 @@ namespace {
 
 constexpr uint64_t kMaxWindow = 256;
 
+/// How many groups of a job may be open at a time: the one that is completed next, and those later ones whose sums fit into
+/// `waiting_bytes`.
+uint32_t open_groups(const JobSpec& spec, uint64_t waiting_bytes) {
+    const uint64_t area = uint64_t(spec.frame.crop.area());
+    const bool splats = spec.algorithm.light_paths_per_iteration(spec.frame.crop.area()) > 0;
+    return uint32_t(std::min(1 + waiting_bytes / (Reducer::open_group_bytes(splats) * area), kMaxWindow));
+}
+
 }  // namespace
 
 bool Coordinator::start_task(JobRecord& job, std::jthread* thread, const char* purpose,
@@ -83,12 +91,10 @@ Status Coordinator::prepare(JobRecord& job, std::stop_token stop) {
 void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, TablesInfo tables) {
     const FrameLayout frame = facts.frame;
     const Plan plan(frame, spec.algorithm);
-    const double unit_light_paths =
-        double(spec.algorithm.light_paths_per_iteration(frame.crop.area())) * plan.max_group_iterations() / plan.tile_count();
     std::optional<UnitTable> units;
     // A noise target alone may be out of reach.
     const uint64_t iterations = only_noise_bounds(spec) ? JobSpec::kMaxSamplesPerPixel : spec.samples_per_pixel;
-    units.emplace(plan, iterations, 1, options_.shuffle_seed);
+    units.emplace(plan, iterations, open_groups(spec, options_.waiting_bytes), options_.shuffle_seed);
     auto reducer = std::make_shared<Reducer>(frame, plan.tile_count(), facts.response, spec.noise_target);
 
     const std::lock_guard lock(mutex_);
@@ -99,26 +105,13 @@ void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, Tab
     job.layers = std::move(facts.layers);
     job.units = std::move(units);
     job.reducer = std::move(reducer);
-    job.unit_light_paths = unit_light_paths;
     job.tables = std::move(tables);
     discard_training(job);
-    size_window(job);
     job.state = JobState::kRunning;
     log_info("{}: {}x{}, {} tile(s), {} unit(s)", job.id, frame.crop.width(), frame.crop.height(), job.units->tile_count(),
              job.units->unit_total());
     changed(job);
     work_changed_.notify_all();
-}
-
-void Coordinator::size_window(JobRecord& job) const {
-    // One group is summed as its partials come; those of later groups wait unmerged. How many splats they hold is
-    // estimated from earlier partials; before there is any, it is the most that a partial can hold.
-    const double area = double(job.spec.frame.crop.area());
-    double splats = 0;
-    if (job.unit_light_paths > 0) splats = std::min(area, job.splats_per_path.value_or(area) * job.unit_light_paths);
-    const double group_bytes = 3 * sizeof(double) * area + double(job.units->tile_count()) * splats * sizeof(SplatSum);
-    const double waiting_groups = std::floor(double(options_.waiting_bytes) / group_bytes);
-    job.units->set_window(uint32_t(std::min(1 + waiting_groups, double(kMaxWindow))));
 }
 
 void Coordinator::finish_if_complete(JobRecord& job) {

@@ -246,9 +246,8 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     }
     const UnitCounters counters = partial.counters;
     const uint64_t dropped = partial.dropped_count;
-    const double splats_per_path =
-        unit.render.light_path_count > 0 ? double(partial.splats.size()) / double(unit.render.light_path_count) : 0;
-    const auto refused = reducer->add(unit, std::move(partial));
+    const auto refused = reducer->add(unit, partial);
+    partial = {};
 
     const std::lock_guard lock(mutex_);
     if (job->state != JobState::kRunning) return SubmitAck{SubmitOutcome::kStale, "the job ended meanwhile"};
@@ -256,18 +255,10 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
         fail_job(*job, refused.status());
         return SubmitAck{SubmitOutcome::kRejected, refused.status().message()};
     }
-    Status own;
-    for (const Reducer::Refusal& refusal : *refused) {
-        if (job->state != JobState::kRunning) break;  // the one before has failed the job
+    if (const std::optional<Status>& why = *refused) {
         ++job->rejected;
-        if (refusal.unit == unit.key) own = refusal.why;
-        unit_failed(*job, refusal.unit, job->units->reopen(refusal.unit), refusal.why);
-    }
-    if (!own.ok()) return SubmitAck{SubmitOutcome::kRejected, own.message()};
-    if (job->state != JobState::kRunning) return SubmitAck{SubmitOutcome::kStale, "the job failed meanwhile: " + job->message};
-    if (unit.render.light_path_count > 0 && splats_per_path > job->splats_per_path.value_or(-1)) {
-        job->splats_per_path = splats_per_path;
-        size_window(*job);
+        unit_failed(*job, unit.key, job->units->reopen(unit.key), *why);
+        return SubmitAck{SubmitOutcome::kRejected, why->message()};
     }
     const uint64_t samples = counters.camera_samples > 0 ? counters.camera_samples : counters.light_paths;
     workers_.at(index).delivered(job->id, double(samples), render_seconds);

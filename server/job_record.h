@@ -36,12 +36,10 @@ struct JobRecord {
     struct UnitCounts {
         uint64_t total = 0, done = 0;
     } ended_units;
-    double unit_light_paths = 0;            ///< Light paths of a unit of the largest groups, approximately.
-    std::optional<double> splats_per_path;  ///< The largest ratio in a partial so far.
-    std::shared_ptr<Reducer> reducer;       ///< It has its own lock and is used without ours.
-    uint32_t merged_groups = 0;             ///< Complete groups merged so far.
-    uint64_t merged_iterations = 0;         ///< Iterations of these groups.
-    std::set<uint32_t> workers;             ///< Indices of the workers whose units were merged.
+    std::shared_ptr<Reducer> reducer;  ///< It has its own lock and is used without ours.
+    uint32_t merged_groups = 0;        ///< Complete groups merged so far.
+    uint64_t merged_iterations = 0;    ///< Iterations of these groups.
+    std::set<uint32_t> workers;        ///< Indices of the workers whose units were merged.
     /// Work of all units that arrived; in the end, of those in the image. The same holds for `dropped`.
     UnitCounters counters;
     uint64_t dropped = 0;

@@ -27,73 +27,74 @@ Reducer::Reducer(const FrameLayout& frame, uint32_t tile_count, const FilmRespon
       response_(response),
       noise_target_(noise_target) {}
 
-Result<std::vector<Reducer::Refusal>> Reducer::add(const WorkUnit& unit, Partial partial) {
+Result<std::optional<Status>> Reducer::add(const WorkUnit& unit, const Partial& partial) {
     const std::lock_guard lock(mutex_);
     try {
-        return add_locked(unit, std::move(partial));
+        return add_locked(unit, partial);
     } catch (const std::bad_alloc&) {
         return Status(StatusCode::kResourceExhausted,
                       "the coordinator has too little memory for the sums of " + std::to_string(frame_.crop.area()) + " pixels");
     }
 }
 
-Result<std::vector<Reducer::Refusal>> Reducer::add_locked(const WorkUnit& unit, Partial partial) {
+Result<std::optional<Status>> Reducer::add_locked(const WorkUnit& unit, const Partial& partial) {
+    using Answer = std::optional<Status>;
     if (frozen_) return Status(StatusCode::kCancelled, "the image is being finished");
-    if (noise_ && noise_->reached) return std::vector<Refusal>();
-    if (!sums_) sums_ = std::make_unique<GroupedSum>(frame_, response_);
-    std::vector<Refusal> refused;
-    if (unit.key.group < group_count()) {
-        refused.push_back({unit.key, internal_error("the unit was merged twice")});
-        return refused;
-    }
+    if (noise_ && noise_->reached) return Answer();
+    if (unit.key.group < group_count()) return Answer(internal_error("the unit was merged twice"));
     if (partial.tile != unit.render.tile || partial.samples_per_pixel != unit.render.samples_per_pixel() ||
-        partial.light_paths != unit.render.light_path_count) {
-        refused.push_back({unit.key, data_loss("the partial is of another unit")});
-        return refused;
-    }
-    if (unit.key.group > group_count()) {
-        if (const auto checked = check_partial(partial, frame_); !checked.ok()) {
-            refused.push_back({unit.key, checked.status()});
-        } else {
-            waiting_[unit.key.group].emplace_back(unit, std::move(partial));
-        }
-        return refused;
-    }
-    LL_RETURN_IF_ERROR(add_to_current(unit, partial, refused));
-    // Complete later groups may have waited only for the group that has just been folded.
-    for (auto next = waiting_.find(group_count()); next != waiting_.end(); next = waiting_.find(group_count())) {
-        const auto partials = std::move(next->second);
-        waiting_.erase(next);
-        for (const auto& [waiting_unit, waiting_partial] : partials)
-            LL_RETURN_IF_ERROR(add_to_current(waiting_unit, waiting_partial, refused));
-    }
-    return refused;
-}
-
-Status Reducer::add_to_current(const WorkUnit& unit, const Partial& partial, std::vector<Refusal>& refused) {
-    if (const Status added = sums_->add(partial); !added.ok()) {
-        refused.push_back({unit.key, added});
-        return {};
-    }
+        partial.light_paths != unit.render.light_path_count)
+        return Answer(data_loss("the partial is of another unit"));
+    if (!complete_) complete_.emplace(frame_, response_);
+    OpenGroup& group = open(unit);
+    if (const Status added = group.sum.add(partial); !added.ok()) return Answer(added);
+    group.iterations = unit.render.iteration_count;
+    group.counters += partial.counters;
+    ++group.units;
     if (unit.key == UnitKey{}) rare_light_ = partial.rare_light;
     for (const DroppedSample& sample : partial.dropped)
-        if (dropped_.size() < kMaxDropped) dropped_.push_back({unit.key, sample});
-    if (sums_->current_units() < tile_count_) return {};
-    LL_RETURN_IF_ERROR(sums_->fold(unit.render.iteration_count).status());
-    if (group_count() < next_noise_groups_) return {};
-    next_noise_groups_ = NoiseEstimate::next_groups(group_count());
+        if (group.dropped.size() < kMaxDropped) group.dropped.push_back({unit.key, sample});
+    // Complete later groups may have waited only for this one.
+    while (!open_.empty() && open_.begin()->first == group_count() && open_.begin()->second.units == tile_count_)
+        LL_RETURN_IF_ERROR(fold());
+    return Answer();
+}
+
+Reducer::OpenGroup& Reducer::open(const WorkUnit& unit) {
+    if (const auto known = open_.find(unit.key.group); known != open_.end()) return known->second;
+    OpenGroup group{spare_ ? *std::exchange(spare_, std::nullopt) : GroupSum(frame_), 0, 0, {}, {}};
+    return open_.emplace(unit.key.group, std::move(group)).first->second;
+}
+
+Status Reducer::fold() {
+    auto lowest = open_.extract(open_.begin());
+    OpenGroup& group = lowest.mapped();
+    LL_RETURN_IF_ERROR(complete_->fold(group.sum, group.iterations));
+    counters_ += group.counters;
+    for (const Dropped& sample : group.dropped)
+        if (dropped_.size() < kMaxDropped) dropped_.push_back(sample);
+    if (!spare_) {
+        group.sum.clear();
+        spare_ = std::move(group.sum);
+    }
+    if (!NoiseEstimate::is_due(group_count(), complete_->iterations(), noise_ ? noise_->estimate.iterations : 0)) return {};
     noise_ = estimate_noise();
-    if (noise_->reached) waiting_.clear();
+    if (noise_->reached) drop_open_groups();
     return {};
 }
 
+void Reducer::drop_open_groups() {
+    open_.clear();
+    spare_.reset();
+}
+
 std::optional<NoiseReport> Reducer::estimate_noise() const {
-    const auto estimate = sums_ ? sums_->complete().noise() : std::nullopt;
+    const auto estimate = complete_ ? complete_->noise() : std::nullopt;
     if (!estimate) return std::nullopt;
     NoiseReport report{*estimate};
     if (!(noise_target_ > 0) || !estimate->reaches(noise_target_)) return report;
     // The groups agree also as long as none of them has found anything, or nothing of what only chance finds.
-    const double mean = mean_luminance(sums_->complete().develop());
+    const double mean = mean_luminance(complete_->develop());
     const double rare_error = rare_light_of(mean).mean_error;
     report.light_missing = !(mean > 0) || rare_error * rare_error > noise_target_;
     report.reached = !report.light_missing;
@@ -113,7 +114,7 @@ std::optional<NoiseReport> Reducer::final_noise() const {
 void Reducer::freeze() {
     const std::lock_guard lock(mutex_);
     frozen_ = true;
-    waiting_.clear();
+    drop_open_groups();
 }
 
 uint32_t Reducer::folded_groups() const {
@@ -123,24 +124,22 @@ uint32_t Reducer::folded_groups() const {
 
 uint64_t Reducer::iterations() const {
     const std::lock_guard lock(mutex_);
-    return sums_ ? sums_->complete().iterations() : 0;
+    return complete_ ? complete_->iterations() : 0;
 }
 
 UnitCounters Reducer::counters() const {
     const std::lock_guard lock(mutex_);
-    return sums_ ? sums_->counters() : UnitCounters();
+    return counters_;
 }
 
 uint64_t Reducer::dropped() const {
     const std::lock_guard lock(mutex_);
-    return sums_ ? sums_->complete().dropped() : 0;
+    return complete_ ? complete_->dropped() : 0;
 }
 
 std::vector<Reducer::Dropped> Reducer::first_dropped() const {
     const std::lock_guard lock(mutex_);
-    std::vector<Dropped> out = dropped_;
-    std::erase_if(out, [&](const Dropped& d) { return d.unit.group >= group_count(); });
-    return out;
+    return dropped_;
 }
 
 Result<DevelopedImage> Reducer::developed(bool with_variance, const std::function<void()>& between) const {
@@ -153,10 +152,9 @@ Result<DevelopedImage> Reducer::developed(bool with_variance, const std::functio
         std::unique_lock lock(mutex_);
         for (size_t first = 0; group_count() == groups;) {
             const size_t count = std::min(kPixelsAtATime, pixels - first);
-            const Accumulation& complete = sums_->complete();
-            complete.develop(first, count, &image.color.pixels[3 * first]);
-            if (!image.variance.pixels.empty()) complete.variance(first, count, &image.variance.pixels[3 * first]);
-            image.iterations = complete.iterations();
+            complete_->develop(first, count, &image.color.pixels[3 * first]);
+            if (!image.variance.pixels.empty()) complete_->variance(first, count, &image.variance.pixels[3 * first]);
+            image.iterations = complete_->iterations();
             first += count;
             if (first == pixels) return image;
             if (attempt >= kDevelopAttempts) continue;
@@ -175,10 +173,9 @@ RareLightReport Reducer::rare_light_report(double image_mean) const {
 }
 
 RareLightReport Reducer::rare_light_of(double image_mean) const {
-    if (!sums_) return {};
     const FilmResponse::Triple grey = response_.of(Rgb(1.0f));
     const double exposure = double(Rgb(float(grey[0]), float(grey[1]), float(grey[2])).luminance());
-    return RareLightReport::of(rare_light_, double(sums_->counters().camera_samples), image_mean, exposure);
+    return RareLightReport::of(rare_light_, double(counters_.camera_samples), image_mean, exposure);
 }
 
 }  // namespace lightloom

@@ -1,18 +1,17 @@
 #pragma once
-// Reducer: merges the partials of one job. Partials come in any order; groups are folded in ascending order, so that
-// the result has the same bytes whatever the order was. The caller makes sure that each unit is added exactly once (by
-// its key). It takes memory (256 bytes per pixel) only from the first partial on, so that waiting jobs take none.
+// Reducer: merges the partials of one job. Partials come in any order and are added to their group's sums at once; groups are
+// folded in ascending order, so that the result has the same bytes whatever the order was. The caller makes sure that each unit is
+// added exactly once (by its key). Waiting jobs take no memory. From the first partial on it is, per pixel, 48 bytes for the image
+// and 24 for each open group, and 24 more for both where light paths splat (upper words of sums above 2^20 come on top).
 
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <memory>
 #include <mutex>
 #include <optional>
-#include <utility>
 #include <vector>
 
-#include "common/film/grouped_sum.h"
+#include "common/film/accumulation.h"
 #include "common/work/job.h"
 #include "common/work/service.h"
 
@@ -33,17 +32,15 @@ class Reducer {
     /// Once the error of the image is not above `noise_target` (0: none), later groups are dropped: see noise().
     Reducer(const FrameLayout& frame, uint32_t tile_count, const FilmResponse& response = {}, double noise_target = 0);
 
-    /// A unit whose partial could not be added to the sums: it has to be rendered again.
-    struct Refusal {
-        UnitKey unit;
-        Status why;
-    };
-    /// Adds the partial of `unit`. Returns the units that were refused: this one, or others that had waited for it and
-    /// whose sums exceed the range only now. After an error nothing more can be added (a complete group does not fit
-    /// them, or there is no memory for them: kResourceExhausted); kCancelled after freeze().
-    Result<std::vector<Refusal>> add(const WorkUnit& unit, Partial partial);
-    /// From now on nothing is merged.
+    /// Adds the partial of `unit`. Returns why it could not be added to its group's sums, if it could not: then the unit has to
+    /// be rendered again. After an error nothing more can be added (a complete group does not fit the image's sums, or
+    /// there is no memory for them: kResourceExhausted); kCancelled after freeze().
+    Result<std::optional<Status>> add(const WorkUnit& unit, const Partial& partial);
+    /// From now on nothing is merged, and the sums of groups that are not complete are gone.
     void freeze();
+
+    /// Bytes per pixel of the sums of an open group.
+    static constexpr uint64_t open_group_bytes(bool splats) { return splats ? 48 : 24; }
 
     /// Complete groups merged so far: always a prefix of the plan.
     uint32_t folded_groups() const;
@@ -63,8 +60,8 @@ class Reducer {
     /// begins again (a few times; then results wait until it is done). `between` is called between two parts (tests).
     Result<DevelopedImage> developed(bool with_variance, const std::function<void()>& between = {}) const;
     static constexpr size_t kPixelsAtATime = size_t(1) << 16;
-    /// The error of the complete groups, as of the last time that it was estimated: at the numbers of groups that
-    /// NoiseEstimate::next_groups() gives, whatever the order and number of the results that came. `reached` never changes back.
+    /// The error of the complete groups, as of the last time that it was estimated: when
+    /// NoiseEstimate::is_due(), whatever the order and number of the results that came. `reached` never changes back.
     std::optional<NoiseReport> noise() const;
     /// The same of exactly these groups, which takes time in proportion to the pixels.
     std::optional<NoiseReport> final_noise() const;
@@ -72,25 +69,35 @@ class Reducer {
     RareLightReport rare_light_report(double image_mean) const;
 
   private:
-    Result<std::vector<Refusal>> add_locked(const WorkUnit& unit, Partial partial);
-    Status add_to_current(const WorkUnit& unit, const Partial& partial, std::vector<Refusal>& refused);
+    /// A group of which not all units have come, or which waits for an earlier one.
+    struct OpenGroup {
+        GroupSum sum;
+        uint32_t iterations = 0, units = 0;
+        UnitCounters counters;
+        std::vector<Dropped> dropped;  ///< At most Reducer::kMaxDropped.
+    };
+    Result<std::optional<Status>> add_locked(const WorkUnit& unit, const Partial& partial);
+    OpenGroup& open(const WorkUnit& unit);
+    /// Adds the lowest open group, which is complete, to the image.
+    Status fold();
+    void drop_open_groups();
     std::optional<NoiseReport> estimate_noise() const;
     RareLightReport rare_light_of(double image_mean) const;
-    uint32_t group_count() const { return sums_ ? sums_->complete().group_count() : 0; }
+    uint32_t group_count() const { return complete_ ? complete_->group_count() : 0; }
 
     const FrameLayout frame_;
     const uint32_t tile_count_;
     const FilmResponse response_;
     const double noise_target_;
     mutable std::mutex mutex_;
-    std::unique_ptr<GroupedSum> sums_;
-    std::vector<Dropped> dropped_;  ///< Including those of the group that is being summed, which are the last.
-    RareLight rare_light_;          ///< From the first unit.
+    std::optional<Accumulation> complete_;  ///< All groups that were folded; made with the first partial.
+    UnitCounters counters_;                 ///< Of these groups.
+    std::vector<Dropped> dropped_;          ///< From these groups, in their order.
+    std::map<uint32_t, OpenGroup> open_;    ///< By index.
+    std::optional<GroupSum> spare_;         ///< The empty sums of a group that was folded, for the next one to be opened.
+    RareLight rare_light_;                  ///< From the first unit.
     std::optional<NoiseReport> noise_;
-    uint32_t next_noise_groups_ = NoiseEstimate::next_groups(0);
     bool frozen_ = false;
-    /// Partials of later groups wait unmerged, because a group's sums would take four times their memory.
-    std::map<uint32_t, std::vector<std::pair<WorkUnit, Partial>>> waiting_;
 };
 
 }  // namespace lightloom

@@ -16,21 +16,41 @@ double loosened(double bound) { return bound * (1 + 0x1p-40) + 0x1p-44; }
 
 Status out_of_range() { return data_loss("the light in a pixel adds up to more than 1e25 radiance units; scale the lights down"); }
 
-/// Value of one channel, of a group or of all groups: camera mean plus splats per light path.
-inline double pixel_value(double camera, uint64_t count, double splat, uint64_t light_paths) {
-    double value = 0;
-    if (count != 0) value += camera / double(count);
-    if (light_paths != 0) value += splat / double(light_paths);
-    return value;
-}
+/// Values of one channel before the film's response, camera mean plus splats per light path, of sums [first, first + count).
+struct Means {
+    const FixedSums &camera, &splat;
+    double per_sample, per_path;
+
+    Means(const FixedSums& camera_sums, const FixedSums& splat_sums, uint64_t samples, uint64_t light_paths)
+        : camera(camera_sums),
+          splat(splat_sums),
+          per_sample(samples > 0 ? 1 / double(samples) : 0),
+          per_path(light_paths > 0 ? 1 / double(light_paths) : 0) {}
+    /// With the white balance of `response`.
+    void write(size_t first, size_t count, const FilmResponse& response, double* values) const {
+        for (size_t i = 0; i < count; ++i) values[i] = camera.value(first + i) * per_sample + splat.value(first + i) * per_path;
+        if (response.is_neutral()) return;
+        for (size_t i = 0; i + 2 < count; i += 3) {
+            const FilmResponse::Triple balanced = response.balanced({values[i], values[i + 1], values[i + 2]});
+            std::copy(balanced.begin(), balanced.end(), values + i);
+        }
+    }
+};
 
 }  // namespace
 
 GroupSum::GroupSum(const FrameLayout& frame)
     : frame_(frame),
       camera_(size_t(frame.crop.area()) * 3),
-      splat_(size_t(frame.crop.area()) * 3),
-      camera_count_(size_t(frame.crop.area())) {}
+      splat_(size_t(frame.crop.area()) * 3) {}
+
+void GroupSum::clear() {
+    camera_.clear();
+    splat_.clear();
+    tiles_.clear();
+    light_paths_ = dropped_ = 0;
+    camera_bound_ = splat_bound_ = 0;
+}
 
 Status GroupSum::add(const Partial& partial) {
     const Result<PartialBounds> bounds = check_partial(partial, frame_);
@@ -59,11 +79,13 @@ Status GroupSum::add(const Partial& partial) {
         }
     }
 
-    const double* source = partial.camera.data();
-    for (int y = tile.y0; y < tile.y1; ++y, source += row_values) {
-        camera_.add(row_of(y) * 3, source, row_values, bounds->camera);
-        uint64_t* counts = camera_count_.data() + row_of(y);
-        for (int x = 0; x < tile.width(); ++x) counts[x] += partial.samples_per_pixel;
+    if (partial.samples_per_pixel > 0) camera_.allocate();
+    if (!partial.splats.empty()) splat_.allocate();
+    tiles_.push_back({tile, partial.samples_per_pixel});
+    if (partial.samples_per_pixel > 0) {
+        const double* source = partial.camera.data();
+        for (int y = tile.y0; y < tile.y1; ++y, source += row_values)
+            camera_.add(row_of(y) * 3, source, row_values, bounds->camera);
     }
     for (const SplatSum& splat : partial.splats) {
         splat_.add(size_t(splat.pixel) * 3, splat.rgb.data(), 3, bounds->splat);
@@ -75,27 +97,49 @@ Status GroupSum::add(const Partial& partial) {
     return Status::ok_status();
 }
 
+uint64_t GroupSum::camera_count(size_t pixel) const {
+    const int width = frame_.crop.width();
+    const int x = frame_.crop.x0 + int(pixel % size_t(width)), y = frame_.crop.y0 + int(pixel / size_t(width));
+    uint64_t count = 0;
+    for (const Tile& tile : tiles_) count += tile.pixels.contains(x, y) ? tile.samples_per_pixel : 0;
+    return count;
+}
+
+std::optional<GroupSum::WrongCount> GroupSum::find_wrong_count(uint64_t count) const {
+    // Nearly always the tiles lie side by side and have the same number of samples.
+    bool plain = true;
+    int64_t area = 0;
+    for (size_t i = 0; i < tiles_.size() && plain; ++i) {
+        const Rect& a = tiles_[i].pixels;
+        area += a.area();
+        plain = tiles_[i].samples_per_pixel == count;
+        for (size_t j = 0; j < i && plain; ++j) {
+            const Rect& b = tiles_[j].pixels;
+            plain = a.x1 <= b.x0 || b.x1 <= a.x0 || a.y1 <= b.y0 || b.y1 <= a.y0;
+        }
+    }
+    if (plain && area == frame_.crop.area()) return std::nullopt;
+    for (size_t p = 0; p < size_t(frame_.crop.area()); ++p)
+        if (const uint64_t found = camera_count(p); found != count) return WrongCount{p, found};
+    return std::nullopt;
+}
+
 Accumulation::Accumulation(const FrameLayout& frame, const FilmResponse& response)
     : frame_(frame),
       response_(response),
       camera_(size_t(frame.crop.area()) * 3),
-      splat_(size_t(frame.crop.area()) * 3),
-      camera_count_(size_t(frame.crop.area())),
-      mean_(size_t(frame.crop.area()) * 3),
-      moment_(size_t(frame.crop.area()) * 3) {}
+      splat_(size_t(frame.crop.area()) * 3) {}
 
 Status Accumulation::fold(const GroupSum& group, uint32_t iterations) {
     if (!(group.frame_ == frame_)) return failed_precondition("accumulation: the group belongs to another frame");
     if (iterations == 0) return failed_precondition("accumulation: a group of no iterations cannot be folded");
-    const bool splats_only = group.camera_count_.empty() || group.camera_count_[0] == 0;
+    const bool splats_only = group.camera_count(0) == 0;
     const uint64_t expected = splats_only ? 0 : iterations;
     if (splats_only && group.light_paths_ == 0) return failed_precondition("accumulation: the group is empty");
-    for (size_t p = 0; p < group.camera_count_.size(); ++p) {
-        if (group.camera_count_[p] != expected) {
-            return failed_precondition("accumulation: pixel " + std::to_string(p) + " of the group has " +
-                                       std::to_string(group.camera_count_[p]) + " camera samples, not " + std::to_string(expected) +
-                                       "; only complete groups may be folded");
-        }
+    if (const auto wrong = group.find_wrong_count(expected)) {
+        return failed_precondition("accumulation: pixel " + std::to_string(wrong->pixel) + " of the group has " +
+                                   std::to_string(wrong->count) + " camera samples, not " + std::to_string(expected) +
+                                   "; only complete groups may be folded");
     }
     if (camera_bound_ + group.camera_bound_ >= kRange || splat_bound_ + group.splat_bound_ >= kRange) {
         for (size_t i = 0; i < camera_.size(); ++i) {
@@ -103,34 +147,34 @@ Status Accumulation::fold(const GroupSum& group, uint32_t iterations) {
         }
     }
 
-    camera_.add(group.camera_);
-    splat_.add(group.splat_);
+    if (!group.camera_.empty()) camera_.allocate();
+    if (!group.splat_.empty()) splat_.allocate();
+    moment_.resize(camera_.size());
     const double weight = iterations;
-    const double total = double(iterations_) + weight;
+    const Means own(group.camera_, group.splat_, expected, group.light_paths_);
+    const Means before(camera_, splat_, camera_count_, light_paths_);
+    const Means after(camera_, splat_, camera_count_ + expected, light_paths_ + group.light_paths_);
     double relative = 0;
     for (size_t block = 0; block < camera_.size(); block += kSpreadBlock) {
-        const size_t end = std::min(camera_.size(), block + kSpreadBlock);
+        const size_t count = std::min(camera_.size() - block, kSpreadBlock);
+        double x[kSpreadBlock], old_mean[kSpreadBlock], mean[kSpreadBlock];
+        own.write(block, count, response_, x);
+        before.write(block, count, response_, old_mean);
+        camera_.add(group.camera_, block, count);
+        splat_.add(group.splat_, block, count);
+        after.write(block, count, response_, mean);
         double level = 0, squares = 0;
-        for (size_t first = block; first < end; first += 3) {
-            FilmResponse::Triple x;
-            for (size_t c = 0; c < 3; ++c)
-                x[c] = pixel_value(group.camera_.value(first + c), expected, group.splat_.value(first + c), group.light_paths_);
-            x = response_.balanced(x);
-            for (size_t c = 0; c < 3; ++c) {
-                const size_t i = first + c;
-                const double delta = x[c] - mean_[i];
-                level += mean_[i];
-                mean_[i] += delta * (weight / total);
-                const double square = weight * delta * (x[c] - mean_[i]);
-                moment_[i] += square;
-                squares += square;
-            }
+        for (size_t i = 0; i < count; ++i) {
+            level += old_mean[i];
+            const double square = weight * (x[i] - old_mean[i]) * (x[i] - mean[i]);
+            moment_[block + i] += square;
+            squares += square;
         }
-        level /= double(end - block);
+        level /= double(count);
         relative += squares / (level * level + epsilon());
     }
     if (group_count_ > 0) spread_.add(relative / double(camera_.size()));
-    for (size_t p = 0; p < camera_count_.size(); ++p) camera_count_[p] += group.camera_count_[p];
+    camera_count_ += expected;
     camera_bound_ += group.camera_bound_;
     splat_bound_ += group.splat_bound_;
     light_paths_ += group.light_paths_;
@@ -142,32 +186,37 @@ Status Accumulation::fold(const GroupSum& group, uint32_t iterations) {
 
 RgbImage Accumulation::develop() const {
     RgbImage image{frame_.crop.width(), frame_.crop.height(), std::vector<float>(camera_.size())};
-    develop(0, camera_count_.size(), image.pixels.data());
+    develop(0, camera_.size() / 3, image.pixels.data());
     return image;
 }
 
 RgbImage Accumulation::variance() const {
     if (group_count_ < 2) return {};
     RgbImage image{frame_.crop.width(), frame_.crop.height(), std::vector<float>(camera_.size())};
-    variance(0, camera_count_.size(), image.pixels.data());
+    variance(0, camera_.size() / 3, image.pixels.data());
     return image;
 }
 
 std::optional<NoiseEstimate> Accumulation::noise() const {
     if (group_count_ < 2) return std::nullopt;
     const double factor = 1 / (double(group_count_ - 1) * double(iterations_));
-    const double relmse =
-        relative_variance(mean_.data(), moment_.data(), frame_.crop.width(), frame_.crop.height(), factor, epsilon());
+    const int width = frame_.crop.width();
+    const auto mean_of_row = [&](int y, double* values) {
+        Means(camera_, splat_, camera_count_, light_paths_)
+            .write(3 * size_t(y) * size_t(width), 3 * size_t(width), response_, values);
+    };
+    const double relmse = relative_variance(mean_of_row, moment_.data(), width, frame_.crop.height(), factor, epsilon());
     return NoiseEstimate{relmse, relmse * spread_.relative_error(), group_count_, iterations_};
 }
 
 void Accumulation::develop(size_t first, size_t count, float* values) const {
     for (size_t p = first; p < first + count; ++p) {
-        FilmResponse::Triple value;
-        for (size_t c = 0; c < 3; ++c)
-            value[c] = pixel_value(camera_.value(3 * p + c), camera_count_[p], splat_.value(3 * p + c), light_paths_);
-        value = response_(value);
-        for (const double v : value) *values++ = float(v);
+        FilmResponse::Triple value{};
+        for (size_t c = 0; c < 3; ++c) {
+            if (camera_count_ != 0) value[c] += camera_.value(3 * p + c) / double(camera_count_);
+            if (light_paths_ != 0) value[c] += splat_.value(3 * p + c) / double(light_paths_);
+        }
+        for (const double v : response_(value)) *values++ = float(v);
     }
 }
 

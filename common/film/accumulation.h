@@ -3,7 +3,8 @@
 //
 // Sums are 128-bit integers with step 2^-44 (range about 1e25 radiance units), so that their order does not matter and
 // merging is exact. The sums are not divided before develop(). One Accumulation holds one job with one set of
-// parameters.
+// parameters. Per pixel, camera sums, splat sums and second moments take 24 bytes each, from their first addition on; a
+// GroupSum takes the same for its camera and splat sums.
 
 #include <array>
 #include <cstdint>
@@ -27,16 +28,31 @@ struct RgbImage {
 /// The sums of one group that is not complete yet. Partials may be added in any order.
 class GroupSum {
   public:
+    /// Takes no memory before the first partial.
     explicit GroupSum(const FrameLayout& frame);
     /// kDataLoss if the partial does not fit the frame, holds a non-finite value, or exceeds the range; then nothing
     /// was added. The caller makes sure that each unit is added exactly once (by its key).
     Status add(const Partial& partial);
+    /// Forgets what was added, and keeps the memory for the next group.
+    void clear();
 
   private:
     friend class Accumulation;
+    struct Tile {
+        Rect pixels;
+        uint32_t samples_per_pixel = 0;
+    };
+    /// Whether every pixel has `count` camera samples; if not, the first pixel that has another number, and that number.
+    struct WrongCount {
+        size_t pixel = 0;
+        uint64_t count = 0;
+    };
+    std::optional<WrongCount> find_wrong_count(uint64_t count) const;
+    uint64_t camera_count(size_t pixel) const;
+
     FrameLayout frame_;
-    FixedSums camera_, splat_;            // 3 per pixel of the crop
-    std::vector<uint64_t> camera_count_;  // samples per pixel
+    FixedSums camera_, splat_;  // 3 per pixel of the crop
+    std::vector<Tile> tiles_;   // of the partials: how many samples a pixel has
     uint64_t light_paths_ = 0;
     uint64_t dropped_ = 0;
     double camera_bound_ = 0, splat_bound_ = 0;  // Sums of the partials' largest magnitudes, which bound every sum.
@@ -48,9 +64,10 @@ class Accumulation {
     explicit Accumulation(const FrameLayout& frame, const FilmResponse& response = {});
 
     /// Folds a complete group of `iterations` iterations in. Groups are folded in ascending order of their index (the
-    /// caller holds later ones back), because the second moments are kept in double. kFailedPrecondition, and nothing is
-    /// folded, if the group is of another frame or does not hold `iterations` camera samples in every pixel (or none in
-    /// any, for a group that only splats); kDataLoss if a sum would leave the range.
+    /// caller holds later ones back), because the second moments are kept in double. All groups have the same number of light
+    /// paths per iteration. kFailedPrecondition, and nothing is folded, if the group is of another frame or does not hold
+    /// `iterations` camera samples in every pixel (or none in any, for a group that only splats); kDataLoss if a sum would leave
+    /// the range.
     Status fold(const GroupSum& group, uint32_t iterations);
 
     uint32_t group_count() const { return group_count_; }
@@ -77,16 +94,16 @@ class Accumulation {
     FrameLayout frame_;
     FilmResponse response_;
     FixedSums camera_, splat_;
-    std::vector<uint64_t> camera_count_;
+    uint64_t camera_count_ = 0;  // in every pixel
     uint64_t light_paths_ = 0;
     uint64_t dropped_ = 0;
     uint64_t iterations_ = 0;
     uint32_t group_count_ = 0;
     double camera_bound_ = 0, splat_bound_ = 0;
-    // Both describe X_g, the groups' images after white balance and before exposure: white balance mixes channels, and
-    // variances alone could not follow it.
-    std::vector<double> mean_;    // Mean with weights n_g, 3 per pixel.
-    std::vector<double> moment_;  // sum_g n_g (X_g - mean_)^2, updated as groups come [West 1979].
+    // sum_g n_g (X_g - mean)^2, updated as groups come [West 1979], 3 per pixel. X_g are the groups' images after white balance and
+    // before exposure: white balance mixes channels, and variances alone could not follow it. Their mean with weights n_g need not
+    // be kept: it is that of the sums.
+    std::vector<double> moment_;
     /// Of the relative squared distance between each group and those before it, as a mean over the frame.
     GroupSpread spread_;
 };

@@ -24,8 +24,8 @@ struct Rect {
 inline constexpr int64_t kMaxPartialPixels = int64_t(1) << 28;
 
 /// Memory that a job's sums take per pixel while it is rendered, for the sums of all complete groups and of the
-/// incomplete one.
-inline constexpr int64_t kFrameBytesPerPixel = 256;
+/// incomplete one: at most 24 bytes for each of five arrays of sums (server/reducer.h), rounded up.
+inline constexpr int64_t kFrameBytesPerPixel = 128;
 
 /// Returns "P pixels, which take G GB of memory while they are rendered (256 bytes each)".
 inline std::string pixels_and_memory(int64_t pixels) {

@@ -65,16 +65,22 @@ double GroupSpread::relative_error() const {
     return std::sqrt(moment_ / (count_ - 1.0) / count_) / mean_;
 }
 
-double relative_variance(const double* mean, const double* moment, int width, int height, double variance_factor, double epsilon) {
+double relative_variance(const MeanOfRow& mean, const double* moment, int width, int height, double variance_factor,
+                         double epsilon) {
+    constexpr int kRows = 2 * kRadius + 1;
     const size_t row_values = size_t(width) * kChannels;
+    // The rows of the window, each in the place that its number gives.
+    std::vector<double> means(row_values * kRows);
+    const auto row = [&](int y) { return means.data() + size_t(y % kRows) * row_values; };
+    int known_rows = 0;
     ColumnSums columns(row_values);
     double total = 0;
     for (int y = 0; y < height; ++y) {
         const int top = std::max(0, y - kRadius), bottom = std::min(height - 1, y + kRadius);
+        for (; known_rows <= bottom; ++known_rows) mean(known_rows, row(known_rows));
         // Running sums would keep the rounding errors of bright pixels that have left the window.
         columns.clear();
-        for (int j = top; j <= bottom; ++j)
-            columns.add(mean + size_t(j) * row_values, moment + size_t(j) * row_values, variance_factor);
+        for (int j = top; j <= bottom; ++j) columns.add(row(j), moment + size_t(j) * row_values, variance_factor);
         double row_total = 0;
         for (int x = 0; x < width; ++x) {
             const int left = std::max(0, x - kRadius), right = std::min(width - 1, x + kRadius);
@@ -88,7 +94,8 @@ double relative_variance(const double* mean, const double* moment, int width, in
                     variance += columns.variance[column];
                 }
                 const size_t index = size_t(y) * row_values + size_t(x) * kChannels + size_t(c);
-                const double own = mean[index], own_square = own * own, own_variance = moment[index] * variance_factor;
+                const double own = row(y)[size_t(x) * kChannels + size_t(c)], own_square = own * own,
+                             own_variance = moment[index] * variance_factor;
                 row_total += own_variance /
                              (std::max(known_square(own_square, own_variance),
                                        filtered_square(own, own_variance,

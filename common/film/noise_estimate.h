@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 
 namespace lightloom {
 
@@ -22,11 +23,12 @@ struct NoiseEstimate {
     /// Whether the image's error can be taken for no larger than `target`. The standard error is added, because the estimate is
     /// asked again and again and the first low one would be believed.
     bool reaches(double target) const { return groups >= kLeastGroups && relmse + error <= target; }
-    /// The number of groups with which the estimate is made for the next time after `groups`, while an image grows: 2, 4, 8, then
-    /// with each group or each tenth more of them. So decisions follow from the plan alone, and their cost stays small.
-    static constexpr uint32_t next_groups(uint32_t groups) {
-        if (groups < kLeastGroups) return groups < 2 ? 2 : groups < 4 ? 4 : kLeastGroups;
-        return groups + (groups < 20 ? 1 : groups / 10);
+    /// Whether the estimate of a growing image is made when it has `groups` groups of `iterations` iterations in all, after it was
+    /// made with `last` iterations: with 2, 4, 8, then with each group up to 20, then with each tenth more iterations. So decisions
+    /// follow from the plan alone, and their cost stays small.
+    static constexpr bool is_due(uint32_t groups, uint64_t iterations, uint64_t last) {
+        if (groups < kLeastGroups) return groups == 2 || groups == 4;
+        return groups <= 20 || iterations >= last + last / 10;
     }
     /// Added to the square of a pixel's value, as Metrics::relmse does.
     static constexpr double kEpsilon = 0.01;
@@ -46,11 +48,15 @@ class GroupSpread {
     double mean_ = 0, moment_ = 0;
 };
 
+/// Writes the means of a row, three channels interleaved.
+using MeanOfRow = std::function<void(int y, double* values)>;
 /// Mean over all values of V / (r^2 + epsilon), row-major and interleaved with three channels: V = `variance_factor` * moment is
 /// the variance of a mean, and r what is known of the true value. The mean itself would not do as r: where few samples have found
 /// the light, mean and V are large in the same pixels, and their ratio is at most about 1, whatever the error is. So r is the
 /// mean after a local Wiener filter (5 x 5 pixels), which takes a pixel's neighbours into account as far as its own noise exceeds
 /// the contrast around it [Lee 1980], or what the pixel shows by itself beyond three standard deviations, if that is more.
-double relative_variance(const double* mean, const double* moment, int width, int height, double variance_factor, double epsilon);
+/// `mean` is asked once for each row, in ascending order.
+double relative_variance(const MeanOfRow& mean, const double* moment, int width, int height, double variance_factor,
+                         double epsilon);
 
 }  // namespace lightloom

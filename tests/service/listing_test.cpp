@@ -8,6 +8,7 @@
 #include "client/grpc_job_port.h"
 #include "client/job_label.h"
 #include "common/film/exr_io.h"
+#include "common/film/grouped_sum.h"
 #include "server/grpc_services.h"
 #include "server/reducer.h"
 #include "server/status_json.h"
@@ -159,7 +160,7 @@ TEST(Preview, HoldsWholeGroupsOnlyWhileResultsComeIn) {
     const auto add = [&](const WorkUnit& unit) {
         const Partial partial = testing::fake_partial(unit.render, frame);
         const auto refused = reducer.add(unit, partial);
-        ASSERT_TRUE(refused.ok() && refused->empty());
+        ASSERT_TRUE(refused.ok() && !*refused);
         ASSERT_TRUE(serial.add(partial).ok());
     };
     const auto add_group = [&] {

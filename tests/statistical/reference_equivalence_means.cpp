@@ -24,6 +24,7 @@ Result<Rendering> render_groups(const Scene& scene, const RenderGroup& render, d
     const FrameLayout frame = scene.frame();
     const FilmResponse response = scene.description().film.response;
     GroupedSum total(frame, response);
+    GroupSum sum(frame);
     Rendering result;
     const auto start = std::chrono::steady_clock::now();
     for (uint32_t group = 0;; ++group) {
@@ -32,10 +33,9 @@ Result<Rendering> render_groups(const Scene& scene, const RenderGroup& render, d
         auto partial = render(work);
         if (!partial.ok()) return partial.status();
         LL_RETURN_IF_ERROR(total.add(*partial));
-        const Result<GroupSum> sum = total.fold(kIterations);
-        if (!sum.ok()) return sum.status();
+        LL_RETURN_IF_ERROR(total.fold(kIterations, &sum));
         Accumulation alone(frame, response);
-        LL_RETURN_IF_ERROR(alone.fold(*sum, kIterations));
+        LL_RETURN_IF_ERROR(alone.fold(sum, kIterations));
         const PartMeans means = part_means(alone.develop());
         for (size_t part = 0; part < means.size(); ++part) result.parts[part].add(means[part], kIterations);
         result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -166,6 +166,16 @@ TEST(Accumulation, FoldsOnlyCompleteGroups) {
     EXPECT_EQ(total.fold(group, 5).code(), StatusCode::kFailedPrecondition);
     EXPECT_TRUE(total.fold(group, 4).ok());
     EXPECT_EQ(total.dropped(), 80u);
+    group.clear();
+    EXPECT_EQ(total.fold(group, 4).code(), StatusCode::kFailedPrecondition) << "nothing is left of it";
+    // As many pixels as the frame has, but not all of them.
+    for (const size_t i : {0, 1, 2, 2}) ASSERT_TRUE(group.add(random_partial(kFrame, tiles[i], i, 10)).ok());
+    EXPECT_EQ(total.fold(group, 4).code(), StatusCode::kFailedPrecondition);
+    // Samples may come in parts.
+    group.clear();
+    for (int part = 0; part < 2; ++part)
+        for (const Rect& tile : tiles) ASSERT_TRUE(group.add(random_partial(kFrame, tile, 5, 10)).ok());
+    EXPECT_TRUE(total.fold(group, 8).ok());
 }
 
 /// Partials of a whole group of kFrame; `seed` tells groups apart.
@@ -201,8 +211,9 @@ TEST(GroupedSum, ARefusedUnitLeavesTheSumsAsTheyWere) {
 
 TEST(GroupedSum, OnlyCompleteGroupsAreSeen) {
     GroupedSum sums(kFrame);
-    EXPECT_EQ(sums.fold(4).status().code(), StatusCode::kFailedPrecondition) << "no unit yet";
+    EXPECT_EQ(sums.fold(4).code(), StatusCode::kFailedPrecondition) << "no unit yet";
     Accumulation all(kFrame);
+    GroupSum folded(kFrame);
     uint64_t rays = 0;
     for (uint32_t g = 0; g < 3; ++g) {
         GroupSum alone(kFrame);
@@ -215,8 +226,7 @@ TEST(GroupedSum, OnlyCompleteGroupsAreSeen) {
         }
         EXPECT_EQ(sums.current_units(), 4u);
         for (const Partial& partial : group_of(g)) rays += partial.counters.rays;
-        const Result<GroupSum> folded = sums.fold(4);
-        ASSERT_TRUE(folded.ok());
+        ASSERT_TRUE(sums.fold(4, &folded).ok());
         ASSERT_TRUE(all.fold(alone, 4).ok());
         EXPECT_EQ(sums.current_units(), 0u);
         EXPECT_EQ(sums.counters().rays, rays);
@@ -224,7 +234,7 @@ TEST(GroupedSum, OnlyCompleteGroupsAreSeen) {
         EXPECT_EQ(sums.complete().develop().pixels, all.develop().pixels);
         // What is given back are this group's own sums.
         Accumulation one(kFrame), other(kFrame);
-        ASSERT_TRUE(one.fold(*folded, 4).ok());
+        ASSERT_TRUE(one.fold(folded, 4).ok());
         ASSERT_TRUE(other.fold(alone, 4).ok());
         EXPECT_EQ(one.develop().pixels, other.develop().pixels);
     }
@@ -245,13 +255,13 @@ TEST(GroupedSum, AGroupThatDoesNotFitIsNoPartOfTheImage) {
         EXPECT_EQ(sums.counters().rays, rays);
     };
     ASSERT_TRUE(sums.add(units[0]).ok());
-    EXPECT_EQ(sums.fold(4).status().code(), StatusCode::kFailedPrecondition);
+    EXPECT_EQ(sums.fold(4).code(), StatusCode::kFailedPrecondition);
     unchanged();
     sums.drop_current();
     EXPECT_EQ(sums.current_units(), 0u);
     for (const Partial& partial : units) ASSERT_TRUE(sums.add(partial).ok());
     ASSERT_TRUE(sums.add(units[0]).ok()) << "exactly-once is the caller's duty";
-    EXPECT_EQ(sums.fold(4).status().code(), StatusCode::kFailedPrecondition);
+    EXPECT_EQ(sums.fold(4).code(), StatusCode::kFailedPrecondition);
     unchanged();
 
     const FrameLayout frame{1, 1, {0, 0, 1, 1}};
@@ -263,7 +273,7 @@ TEST(GroupedSum, AGroupThatDoesNotFitIsNoPartOfTheImage) {
     ASSERT_TRUE(bright.add(p).ok());
     ASSERT_TRUE(bright.fold(1).ok());
     ASSERT_TRUE(bright.add(p).ok());
-    EXPECT_EQ(bright.fold(1).status().code(), StatusCode::kDataLoss);
+    EXPECT_EQ(bright.fold(1).code(), StatusCode::kDataLoss);
     EXPECT_EQ(bright.complete().iterations(), 1u);
 }
 
@@ -290,12 +300,42 @@ TEST(FixedSums, EqualPlain128BitSums) {
             ASSERT_TRUE(sums.steps(size_t(i)) == plain[i]) << round;
         }
     }
-    all.add(sums);
-    all.add(sums);
+    all.add(sums, 0, 3);
+    all.add(sums, 0, 3);
     for (size_t i = 0; i < 3; ++i) {
         EXPECT_TRUE(all.steps(i) == 2 * plain[i]);
         EXPECT_EQ(all.value(i), double(2 * plain[i]) * 0x1p-44);
     }
+}
+
+/// Many sums, of which only some have ever had more than 64 bits.
+TEST(FixedSums, UpperWordsComeWhereTheyAreNeededAndGo) {
+    constexpr size_t kCount = 3000;
+    FixedSums sums(kCount), other(kCount), empty(kCount);
+    EXPECT_TRUE(sums.empty());
+    EXPECT_EQ(sums.value(7), 0);
+    std::vector<Int128> expected(kCount), expected_other(kCount);
+    Rng rng({9});
+    for (int round = 0; round < 40; ++round) {
+        std::vector<double> values(kCount);
+        for (double& v : values)
+            v = std::ldexp(rng.uniform_double() - (round < 20 ? 0 : 0.5), round % 2 == 0 ? 18 : int(rng.below(70)));
+        const double largest = std::fabs(
+            *std::max_element(values.begin(), values.end(), [](double a, double b) { return std::fabs(a) < std::fabs(b); }));
+        sums.add(0, values.data(), kCount, largest);
+        other.add(0, values.data(), kCount / 2, largest);
+        for (size_t i = 0; i < kCount; ++i) expected[i] += FixedSums::to_steps(values[i]);
+        for (size_t i = 0; i < kCount / 2; ++i) expected_other[i] += FixedSums::to_steps(values[i]);
+    }
+    for (size_t i = 0; i < kCount; ++i) ASSERT_TRUE(sums.steps(i) == expected[i] && other.steps(i) == expected_other[i]) << i;
+    sums.add(other, 0, kCount);
+    sums.add(empty, 0, kCount);
+    for (size_t i = 0; i < kCount; ++i) {
+        ASSERT_TRUE(sums.steps(i) == expected[i] + expected_other[i]) << i;
+        ASSERT_EQ(sums.value(i), std::ldexp(double(expected[i] + expected_other[i]), -44)) << i;
+    }
+    sums.clear();
+    for (size_t i = 0; i < kCount; ++i) ASSERT_TRUE(sums.steps(i) == 0) << i;
 }
 
 }  // namespace

@@ -181,14 +181,32 @@ TEST(NoiseEstimate, ReachesATargetWithItsStandardErrorAndEightGroups) {
 }
 
 TEST(NoiseEstimate, IsMadeAtNumbersOfGroupsThatThePlanGives) {
-    std::vector<uint32_t> numbers;
-    for (uint32_t g = NoiseEstimate::next_groups(0); g < 40; g = NoiseEstimate::next_groups(g)) numbers.push_back(g);
-    EXPECT_EQ(numbers,
-              (std::vector<uint32_t>{2, 4, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 22, 24, 26, 28, 30, 33, 36, 39}));
+    // `iterations` of group g, by number from 1 on.
+    const auto numbers = [](uint32_t groups, const std::function<uint64_t(uint32_t)>& iterations) {
+        std::vector<uint32_t> due;
+        uint64_t done = 0, last = 0;
+        for (uint32_t g = 1; g <= groups; ++g) {
+            done += iterations(g);
+            if (!NoiseEstimate::is_due(g, done, last)) continue;
+            due.push_back(g);
+            last = done;
+        }
+        return due;
+    };
+    const std::vector<uint32_t> first{2, 4, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20};
+    const auto with = [&](std::vector<uint32_t> more) {
+        more.insert(more.begin(), first.begin(), first.end());
+        return more;
+    };
+    EXPECT_EQ(numbers(39, [](uint32_t) { return 1; }), with({22, 24, 26, 28, 30, 33, 36, 39}));
+    EXPECT_EQ(numbers(20, [](uint32_t g) { return g; }), first);
+    EXPECT_EQ(numbers(26, [](uint32_t g) { return g <= 20 ? 50 : 1000; }), with({21, 22, 23, 24, 25, 26}))
+        << "a tenth of the samples";
 }
 
 TEST(NoiseEstimate, FramesSmallerThanTheWindow) {
-    const double mean[] = {1, 2, 3}, moment[] = {1, 1, 1};
+    const double moment[] = {1, 1, 1};
+    const auto mean = [](int, double* values) { values[0] = 1, values[1] = 2, values[2] = 3; };
     EXPECT_NEAR(relative_variance(mean, moment, 1, 1, 0.5, 0.01), 0.5 * (1 / 1.01 + 1 / 4.01 + 1 / 9.01) / 3, 1e-12);
 }
 
