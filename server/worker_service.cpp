@@ -65,7 +65,7 @@ grpc::Status WorkerServiceImpl::SubmitResult(grpc::ServerContext*, grpc::ServerR
     if (!expected.ok()) return answer(Result<SubmitAck>(unexpected_result(expected.status())), response);
     if (descriptor->splat_count > uint64_t(expected->frame.crop.area()))
         return invalid("more splat sums than the frame has pixels");
-    const uint64_t size = partial_payload_size(expected->frame, expected->tile, descriptor->splat_count);
+    const uint64_t size = partial_payload_size(*expected, descriptor->splat_count);
     if (descriptor->payload_size != size)
         return invalid("the payload of this unit has " + std::to_string(size) + " bytes, but the announced size is " +
                        std::to_string(descriptor->payload_size));

@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cstring>
+#include <optional>
 
 namespace lightloom {
 
@@ -35,9 +36,10 @@ struct Part {
 
 struct Layout {
     std::vector<Part> parts;
-    std::string prologue;             // Everything before the first chunk: headers and offset tables.
-    std::vector<size_t> first_chunk;  // Per part: offset of its first chunk; the others follow at chunk_bytes().
-    size_t size = 0;                  // Bytes of the whole file.
+    std::optional<size_t> camera, splat;  // Their places in `parts`.
+    std::string prologue;                 // Everything before the first chunk: headers and offset tables.
+    std::vector<size_t> first_chunk;      // Per part: offset of its first chunk; the others follow at chunk_bytes().
+    size_t size = 0;                      // Bytes of the whole file.
 };
 
 template <typename T>
@@ -89,21 +91,22 @@ void put_header(std::string& out, const Part& part, const FrameLayout& frame) {
     out.push_back('\0');
 }
 
-std::vector<Part> parts_of(const FrameLayout& frame, const Rect& tile, uint64_t splat_count) {
-    std::vector<Part> parts{{"camera", tile.x0, tile.y0, tile.width(), tile.height(), kPlanes}};
+/// The only possible file layout for this unit and number of splat sums.
+Layout make_layout(const FrameLayout& frame, const Rect& tile, uint32_t samples_per_pixel, uint64_t splat_count) {
+    Layout layout;
+    const auto add = [&](const Part& part) {
+        layout.parts.push_back(part);
+        return layout.parts.size() - 1;
+    };
     const Rect& crop = frame.crop;
+    // A file needs a part.
+    if (samples_per_pixel > 0 || splat_count == 0)
+        layout.camera = add({"camera", tile.x0, tile.y0, tile.width(), tile.height(), kPlanes});
     switch (splat_layout(frame, splat_count)) {
         case SplatLayout::kNone: break;
-        case SplatLayout::kDense: parts.push_back({"splat", crop.x0, crop.y0, crop.width(), crop.height(), kPlanes}); break;
-        case SplatLayout::kSparse: parts.push_back({"splat", 0, 0, int(splat_count), 1, kPlanes + 1}); break;
+        case SplatLayout::kDense: layout.splat = add({"splat", crop.x0, crop.y0, crop.width(), crop.height(), kPlanes}); break;
+        case SplatLayout::kSparse: layout.splat = add({"splat", 0, 0, int(splat_count), 1, kPlanes + 1}); break;
     }
-    return parts;
-}
-
-/// The only possible file layout for this unit and number of splat sums.
-Layout make_layout(const FrameLayout& frame, const Rect& tile, uint64_t splat_count) {
-    Layout layout;
-    layout.parts = parts_of(frame, tile, splat_count);
     std::string& out = layout.prologue;
     put(out, uint32_t(20000630));    // Magic number.
     put(out, uint32_t(2 | 0x1000));  // Version 2, multi-part.
@@ -172,8 +175,8 @@ Status check_frame(const FrameLayout& frame, const Rect& tile) {
 
 }  // namespace
 
-uint64_t partial_payload_size(const FrameLayout& frame, const Rect& tile, uint64_t splat_count) {
-    return make_layout(frame, tile, splat_count).size;
+uint64_t partial_payload_size(const PartialExpectation& expected, uint64_t splat_count) {
+    return make_layout(expected.frame, expected.tile, expected.samples_per_pixel, splat_count).size;
 }
 
 Result<EncodedPartial> encode_partial(const Partial& partial, const FrameLayout& frame) {
@@ -182,7 +185,7 @@ Result<EncodedPartial> encode_partial(const Partial& partial, const FrameLayout&
 
     uint64_t splat_count = 0;
     for (const SplatSum& splat : partial.splats) splat_count += !is_zero(splat.rgb);
-    const Layout layout = make_layout(frame, partial.tile, splat_count);
+    const Layout layout = make_layout(frame, partial.tile, partial.samples_per_pixel, splat_count);
 
     EncodedPartial encoded;
     std::string& bytes = encoded.payload;
@@ -195,23 +198,25 @@ Result<EncodedPartial> encode_partial(const Partial& partial, const FrameLayout&
         }
     }
 
-    const Part& camera = layout.parts[0];
-    const size_t width = size_t(camera.width);
-    for (int line = 0; line < camera.height; ++line) {
-        char* to = bytes.data() + layout.first_chunk[0] + size_t(line) * camera.chunk_bytes() + kChunkPrefix;
-        split_line(partial.camera.data() + size_t(line) * width * 3, width, to);
+    if (layout.camera) {
+        const Part& camera = layout.parts[*layout.camera];
+        const size_t width = size_t(camera.width);
+        for (int line = 0; line < camera.height; ++line) {
+            char* to = bytes.data() + layout.first_chunk[*layout.camera] + size_t(line) * camera.chunk_bytes() + kChunkPrefix;
+            split_line(partial.camera.data() + size_t(line) * width * 3, width, to);
+        }
     }
 
     const SplatLayout how = splat_layout(frame, splat_count);
-    if (how != SplatLayout::kNone) {
-        const Part& part = layout.parts[1];
+    if (layout.splat) {
+        const Part& part = layout.parts[*layout.splat];
         const size_t count = size_t(part.width);
         size_t next = 0;
         for (const SplatSum& splat : partial.splats) {
             if (is_zero(splat.rgb)) continue;
             size_t line = 0, column = next++;
             if (how == SplatLayout::kDense) line = splat.pixel / count, column = splat.pixel % count;
-            char* to = bytes.data() + layout.first_chunk[1] + line * part.chunk_bytes() + kChunkPrefix;
+            char* to = bytes.data() + layout.first_chunk[*layout.splat] + line * part.chunk_bytes() + kChunkPrefix;
             for (size_t c = 0; c < 3; ++c) {
                 const uint64_t bits = std::bit_cast<uint64_t>(splat.rgb[c]);
                 store(to + ((2 - c) * count + column) * 4, uint32_t(bits >> 32));
@@ -246,7 +251,7 @@ Result<Partial> decode_partial(const PartialExpectation& expected, const Partial
         return data_loss("partial: declares " + std::to_string(d.splat_count) + " splat sums for " + std::to_string(crop_area) +
                          " pixels");
     }
-    const Layout layout = make_layout(expected.frame, expected.tile, d.splat_count);
+    const Layout layout = make_layout(expected.frame, expected.tile, d.samples_per_pixel, d.splat_count);
     if (payload.size() != layout.size || d.payload_size != layout.size) {
         return data_loss("partial: payload of " + std::to_string(payload.size()) + " bytes, declared " +
                          std::to_string(d.payload_size) + ", expected " + std::to_string(layout.size));
@@ -278,22 +283,26 @@ Result<Partial> decode_partial(const PartialExpectation& expected, const Partial
     partial.dropped = d.dropped;
     partial.counters = d.counters;
     partial.rare_light = d.rare_light;
-    const Part& camera = layout.parts[0];
-    const size_t width = size_t(camera.width);
     partial.camera.resize(size_t(expected.tile.area()) * 3);
-    for (int line = 0; line < camera.height; ++line) {
-        const char* from = payload.data() + layout.first_chunk[0] + size_t(line) * camera.chunk_bytes() + kChunkPrefix;
-        join_line(from, width, partial.camera.data() + size_t(line) * width * 3);
+    if (layout.camera) {
+        const Part& camera = layout.parts[*layout.camera];
+        const size_t width = size_t(camera.width);
+        for (int line = 0; line < camera.height; ++line) {
+            const char* from =
+                payload.data() + layout.first_chunk[*layout.camera] + size_t(line) * camera.chunk_bytes() + kChunkPrefix;
+            join_line(from, width, partial.camera.data() + size_t(line) * width * 3);
+        }
     }
 
     const SplatLayout how = splat_layout(expected.frame, d.splat_count);
-    if (how != SplatLayout::kNone) {
-        const Part& part = layout.parts[1];
+    if (layout.splat) {
+        const Part& part = layout.parts[*layout.splat];
         const size_t count = size_t(part.width);
         partial.splats.reserve(size_t(d.splat_count));
         std::vector<double> rgb(count * 3);
         for (int line = 0; line < part.height; ++line) {
-            const char* from = payload.data() + layout.first_chunk[1] + size_t(line) * part.chunk_bytes() + kChunkPrefix;
+            const char* from =
+                payload.data() + layout.first_chunk[*layout.splat] + size_t(line) * part.chunk_bytes() + kChunkPrefix;
             join_line(from, count, rgb.data());
             for (size_t i = 0; i < count; ++i) {
                 const std::array<double, 3> value{rgb[i * 3], rgb[i * 3 + 1], rgb[i * 3 + 2]};

@@ -3,7 +3,7 @@
 //
 // The file is a multi-part, flat scanline EXR without compression, and its bytes are a pure function of the partial:
 //   part "camera": data window = the tile; UINT channels hi.{B,G,R}, lo.{B,G,R} are the upper and lower 32 bits of the
-//                  double sums of camera samples.
+//                  double sums of camera samples. Absent where there are none, provided that there are splats.
 //   part "splat":  absent without splats; otherwise whichever is smaller of
 //                  dense  - data window = the crop, the same six channels, zero where nothing was splatted, or
 //                  sparse - N x 1 pixels, the same six channels and `pixel` (row-major in the crop, ascending); not beyond
@@ -50,7 +50,7 @@ struct PartialExpectation {
 };
 
 /// Size in bytes of the payload for `splat_count` splat sums; for size limits and admission. The tile and crop are valid.
-uint64_t partial_payload_size(const FrameLayout& frame, const Rect& tile, uint64_t splat_count);
+uint64_t partial_payload_size(const PartialExpectation& expected, uint64_t splat_count);
 
 /// Encodes a partial. Splat sums that are zero in all channels are left out. kDataLoss if check_partial() refuses the
 /// partial.

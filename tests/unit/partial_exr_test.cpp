@@ -34,7 +34,7 @@ TEST(PartialExr, RoundTripsBitForBit) {
             const Partial p = random_partial(kFrame, tile, splats, splats);
             const Result<EncodedPartial> encoded = encode_partial(p, kFrame);
             ASSERT_TRUE(encoded.ok()) << encoded.status().message();
-            EXPECT_EQ(encoded->payload.size(), partial_payload_size(kFrame, tile, splats));
+            EXPECT_EQ(encoded->payload.size(), partial_payload_size(expectation_of(p, kFrame), splats));
             const Result<Partial> back = decode_partial(expectation_of(p, kFrame), encoded->descriptor, encoded->payload);
             ASSERT_TRUE(back.ok()) << back.status().message();
             EXPECT_TRUE(same(p, *back));
@@ -46,10 +46,10 @@ TEST(PartialExr, RoundTripsBitForBit) {
 /// One line of more than 2^31 bytes cannot be stored, however few pixels of a large frame have a splat.
 TEST(PartialExr, SparseSplatsStayWithinALine) {
     const FrameLayout large{16384, 16384, {0, 0, 16384, 16384}};
-    const Rect tile{0, 0, 1, 1};
+    const PartialExpectation expected{large, {0, 0, 1, 1}, 1, 1};
     constexpr uint64_t kMost = uint64_t(INT32_MAX) / 28;
-    EXPECT_LT(partial_payload_size(large, tile, kMost), (uint64_t(1) << 31) + 4096);
-    EXPECT_GT(partial_payload_size(large, tile, kMost + 1), uint64_t(16384) * 16384 * 24);
+    EXPECT_LT(partial_payload_size(expected, kMost), (uint64_t(1) << 31) + 4096);
+    EXPECT_GT(partial_payload_size(expected, kMost + 1), uint64_t(16384) * 16384 * 24);
 }
 
 TEST(PartialExr, IsAnExrThatOpenExrReads) {

@@ -23,7 +23,7 @@ Partial splats_only(const Rect& tile, uint32_t splats, double value, uint64_t li
     return partial;
 }
 
-/// Without splats, with few (sparse) and with one in every pixel (dense).
+/// Without splats, with few (sparse) and with one in every pixel (dense). Sums that are all zero do not travel with splats.
 TEST(SplatsOnly, TravelBitForBit) {
     for (const uint32_t splats : {0u, 3u, uint32_t(kFrame.crop.area())}) {
         const Partial partial = splats_only({2, 1, 6, 9}, splats, 0.1);
@@ -32,6 +32,8 @@ TEST(SplatsOnly, TravelBitForBit) {
         ASSERT_TRUE(encoded.ok()) << encoded.status().message();
         EXPECT_EQ(encoded->descriptor.samples_per_pixel, 0u);
         const PartialExpectation expected{kFrame, partial.tile, 0, partial.light_paths};
+        EXPECT_EQ(encoded->payload.size(), partial_payload_size(expected, splats));
+        EXPECT_EQ(encoded->payload.find("camera") == std::string::npos, splats > 0);
         const Result<Partial> back = decode_partial(expected, encoded->descriptor, encoded->payload);
         ASSERT_TRUE(back.ok()) << back.status().message();
         EXPECT_EQ(back->samples_per_pixel, 0u);
