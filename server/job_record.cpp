@@ -24,8 +24,8 @@ void tell_rendering(const JobRecord& job, TimePoint now, JobInfo* info) {
         info->eta_seconds = 0;
     } else if (job.spec.time_limit_seconds > 0) {
         info->eta_seconds = std::max(0.0, job.seconds_left(now));
-    } else if (info->unit_total > 0) {
-        info->eta_seconds = seconds_left(info->render_seconds, info->unit_done, info->unit_total).value_or(info->eta_seconds);
+    } else if (const double share = sample_share(*info); share > 0) {
+        info->eta_seconds = info->render_seconds * (1 - share) / share;
     }
     if (const auto share = noise_share(*info); share && !over) {
         const double left = info->render_seconds * (1 - *share) / *share;

@@ -77,10 +77,20 @@ std::optional<double> noise_share(const JobInfo& job) {
     return done / std::max(done, double(noise.iterations) * (noise.relmse + noise.error) / job.spec.noise_target);
 }
 
+double sample_share(const JobInfo& job) {
+    const int64_t area = job.spec.frame.crop.area();
+    const double iterations = job.spec.samples_per_pixel;
+    if (area <= 0 || iterations == 0) return 0;
+    const double paths = double(job.spec.algorithm.light_paths_per_iteration(area));
+    // An algorithm without camera samples has light paths instead.
+    const double done =
+        job.camera_samples > 0 || paths == 0 ? double(job.camera_samples) / double(area) : double(job.light_paths) / paths;
+    return std::min(1.0, done / iterations);
+}
+
 double rendered_share(const JobInfo& job) {
     if (job.state == JobState::kSucceeded || job.state == JobState::kFinishing) return 1;
-    double done = 0;
-    if (job.unit_total > 0) done = double(job.unit_done) / double(job.unit_total);
+    double done = sample_share(job);
     // Learning has taken a part of the limit before.
     if (job.spec.time_limit_seconds > 0 && job.render_seconds > 0 && job.eta_seconds >= 0)
         done = job.render_seconds / (job.render_seconds + job.eta_seconds);

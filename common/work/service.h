@@ -142,9 +142,12 @@ struct JobInfo {
     std::string scene;       ///< Path of the scene file in its file list.
     double age_seconds = 0;  ///< Time since the submission.
 };
-/// Share of the image that is rendered, from 0 to 1: the share of its units, of its time limit, or of the samples with which its
+/// Share of the image that is rendered, from 0 to 1: the share of its samples, of its time limit, or of the samples with which its
 /// noise target will be reached, whichever is largest.
 double rendered_share(const JobInfo& job);
+/// Share of the samples of a job with a number of samples per pixel that lie in the units that have arrived (units differ in
+/// length); 0 for any other job.
+double sample_share(const JobInfo& job);
 /// Share of the samples with which the job's noise target will be reached, as the present estimate promises; nothing where it
 /// promises nothing.
 std::optional<double> noise_share(const JobInfo& job);
