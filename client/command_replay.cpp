@@ -159,17 +159,20 @@ int replay(const ReplayOptions& options) {
     if (!tables.ok()) return report_error(tables.status());
     const auto renderer = Renderer::create(scene, render_settings(spec), *tables);
     if (!renderer.ok()) return report_error(renderer.status());
-    const RenderUnit& whole = unit->render;
+    RenderUnit whole = unit->render;
     RenderUnit work = whole;
     if (options.unit.empty()) {
-        // The light path of a camera sample is numbered by its place in the unit.
+        const uint32_t place_in_unit = uint32_t(options.iteration - whole.first_iteration);
+        whole = whole.batch(place_in_unit - place_in_unit % whole.batch_iterations());
+        work = whole;
+        // The light path of a camera sample is numbered by its place in the batch.
         const uint64_t place =
             (options.iteration - whole.first_iteration) * uint64_t(whole.tile.area()) + uint64_t(whole.tile.index(x, y));
         work.first_iteration = options.iteration;
         work.iteration_count = 1;
         work.tile = {x, y, x + 1, y + 1};
         if (shares_light_paths) {
-            work.owner_tile = whole.tile;  // the sample looks at the whole unit's cache
+            work.owner_tile = whole.tile;  // the sample looks at the whole batch's cache
         } else {
             work.first_light_path = whole.first_light_path + place;
             work.light_path_count = whole.light_path_count > 0 ? 1 : 0;

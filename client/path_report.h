@@ -44,7 +44,7 @@ struct ReportedPath {
     float weight = 0;
     Rgb weighted;            ///< What the image gets.
     int x = 0, y = 0;        ///< Full-frame pixel in which it lands.
-    uint64_t iteration = 0;  ///< Of a splat from a unit's cache the unit's first.
+    uint64_t iteration = 0;  ///< Of a splat from a cache the batch's first.
 };
 
 ReportedPath report_path(const Scene& scene, const SeenContribution& seen);
@@ -83,7 +83,7 @@ inline constexpr const char* kPathSchema =
     technique       hit, next event, connect, lens or merge
     s, t, k         light vertices (merge: index of the vertex where both met), camera vertices, edges
     pixel           where it lands
-    iteration       of the sample; for a unit's light path the unit's first
+    iteration       of the sample; for a unit's light path its batch's first
     value           [r,g,b] unweighted: f over the density of what was drawn
     weight          of multiple importance sampling
     weighted        [r,g,b] weight x value: what the image gets

@@ -1,6 +1,6 @@
 #pragma once
-// The light-vertex cache of a unit: light sub-paths traced before its first camera sample, frozen, and shared by all of
-// its samples [Davidovic et al. 2014, section 4.1]. They belong to the unit: its key alone decides what they are.
+// The light-vertex cache of a unit, or of each of its batches: light sub-paths traced before the first camera sample, frozen, and
+// shared by all samples [Davidovic et al. 2014, section 4.1]. They belong to the batch: its key alone decides what they are.
 //
 // The plan counts the first work.light_path_count paths (N1 per pixel and iteration): they are connected to the lens (t
 // = 1) and are candidates for connections. Where these are too few, or where rare subspaces keep a longer window,

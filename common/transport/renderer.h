@@ -39,7 +39,7 @@ struct SeenContribution {
     const PathView& view;
     double weight;       ///< The image gets found.value * weight.
     uint32_t pixel;      ///< Where it lands, row-major in the crop.
-    uint64_t iteration;  ///< That of the camera sample; the unit's first for a light path that no camera sample owns.
+    uint64_t iteration;  ///< That of the camera sample; the batch's first for a light path that no camera sample owns.
     bool labelled;       ///< Whether the view's subspace labels are filled in.
 };
 

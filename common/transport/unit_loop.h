@@ -1,7 +1,8 @@
 #pragma once
 // The loop that every algorithm shares: samples of a unit in a fixed order, on all threads, summed so that the bytes do not
 // depend on how many there are. Pixels are dealt to threads in fixed chunks; a chunk owns its pixels and adds their samples
-// in iteration order; splats are kept in path order and added chunk by chunk at the end.
+// in iteration order; splats are kept in path order and added chunk by chunk at the end of each batch (RenderUnit::batch()).
+// What is said of units below holds for each batch of a unit.
 //
 // An algorithm has one of three shapes:
 //   per sample   trace(context, contribute)                           calls contribute(PathContribution, PathView&) for everything
@@ -178,16 +179,25 @@ class UnitSums {
         add(preparation.counters);
         traced_light_paths_ += preparation.light_paths;
     }
-    void add(std::vector<UnitChunk> chunks) {
-        for (const UnitChunk& chunk : chunks) {
+    /// `count` empty chunks. Their memory is that of the chunks before, and it stays until the unit is done: freed before the
+    /// partial's splats are allocated it would go back to the system, which costs bdpt two per cent in page faults.
+    std::vector<UnitChunk>& open_chunks(size_t count) {
+        chunks_.resize(count);
+        for (UnitChunk& chunk : chunks_) {
+            chunk.splats.clear();
+            chunk.dropped.clear();
+            chunk.dropped_count = 0;
+            chunk.counters = {};
+        }
+        return chunks_;
+    }
+    void add_chunks() {
+        for (const UnitChunk& chunk : chunks_) {
             partial.dropped_count += chunk.dropped_count;
             for (const DroppedSample& d : chunk.dropped) drop(d);
             add(chunk.counters);
             add(chunk.splats);
         }
-        // The chunks' memory stays until the unit is done: freed before the partial's splats are allocated it would go
-        // back to the system, which costs bdpt two per cent in page faults.
-        last_chunks_ = std::move(chunks);
     }
     void add(const UnitSink& sink) {
         for (const UnitSink::Lane& lane : sink.lanes()) {
@@ -208,9 +218,16 @@ class UnitSums {
     }
     Partial finish() && {
         partial.counters.light_paths = std::max(partial.light_paths, traced_light_paths_);
-        for (uint32_t p = 0; p * size_t(3) < splat_sums_.size(); ++p) {
-            const double* sum = &splat_sums_[size_t(p) * 3];
-            if (sum[0] != 0 || sum[1] != 0 || sum[2] != 0) partial.splats.push_back({p, {sum[0], sum[1], sum[2]}});
+        const size_t pixels = splat_sums_.size() / 3;
+        const auto splatted = [&](size_t p) {
+            return splat_sums_[3 * p] != 0 || splat_sums_[3 * p + 1] != 0 || splat_sums_[3 * p + 2] != 0;
+        };
+        size_t count = 0;
+        for (size_t p = 0; p < pixels; ++p) count += splatted(p);
+        partial.splats.reserve(count);
+        for (size_t p = 0; p < pixels; ++p) {
+            const double* sum = &splat_sums_[3 * p];
+            if (splatted(p)) partial.splats.push_back({uint32_t(p), {sum[0], sum[1], sum[2]}});
         }
         return std::move(partial);
     }
@@ -223,7 +240,7 @@ class UnitSums {
     }
 
     const Rect crop_;
-    std::vector<UnitChunk> last_chunks_;
+    std::vector<UnitChunk> chunks_;
     std::vector<double> splat_sums_;
     uint64_t traced_light_paths_ = 0;
 };
@@ -236,7 +253,7 @@ void add_samples(const UnitScope& scope, const Trace& trace, const Weight& weigh
     const Rect &crop = scope.scene.frame().crop, &tile = work.tile;
     const int64_t pixels = tile.area();
     const int64_t chunk_pixels = clamp<int64_t>(pixels / 256, 16, 4096);
-    std::vector<UnitChunk> chunks(size_t((pixels + chunk_pixels - 1) / chunk_pixels));
+    std::vector<UnitChunk>& chunks = sums->open_chunks(size_t((pixels + chunk_pixels - 1) / chunk_pixels));
     fork_join(chunks.size(), [&](size_t first_chunk, size_t last_chunk) {
         std::vector<PathVertex> camera_path(size_t(scope.max_edges) + 2), light_path(size_t(scope.max_edges) + 1);
         for (size_t c = first_chunk; c != last_chunk; ++c) {
@@ -279,7 +296,7 @@ void add_samples(const UnitScope& scope, const Trace& trace, const Weight& weigh
             chunk.counters = context.counters;
         }
     });
-    sums->add(std::move(chunks));
+    sums->add_chunks();
 }
 
 /// Adds one preparation and the samples that share its state.
@@ -299,6 +316,36 @@ void add_prepared(const A& algorithm, const UnitScope& scope, UnitSums* sums) {
         [&](const PathView& view, Technique own) { return algorithm.weight(state, view, own); }, sums);
 }
 
+/// Adds one batch, whose light paths are the same number in every iteration if states are made for each.
+template <class A>
+void add_batch(const A& algorithm, const UnitScope& scope, UnitSums* sums) {
+    const RenderUnit& work = scope.work;
+    if constexpr (OwnedAlgorithm<A>) {
+        UnitSink sink(work);
+        algorithm.run(scope, sink);
+        sums->add(sink);
+    } else if constexpr (PreparedAlgorithm<A> && prepares_per_iteration<A>()) {
+        // Light paths of an iteration follow those of the one before. The iteration is part of the keys of its
+        // uncounted paths, which would otherwise be the same in every iteration.
+        const uint64_t light_paths = work.iteration_count > 0 ? work.light_path_count / work.iteration_count : 0;
+        for (uint32_t b = 0; b < work.iteration_count && !scope.stop.stop_requested(); ++b) {
+            RenderUnit iteration = work;
+            iteration.first_iteration = iteration.group_first_iteration = work.first_iteration + b;
+            iteration.iteration_count = 1;
+            iteration.first_light_path = work.first_light_path + b * light_paths;
+            iteration.light_path_count = light_paths;
+            add_prepared(algorithm, UnitScope{scope.scene, scope.seed, scope.max_edges, scope.roulette, iteration, scope.stop},
+                         sums);
+        }
+    } else if constexpr (PreparedAlgorithm<A>) {
+        add_prepared(algorithm, scope, sums);
+    } else {
+        add_samples(
+            scope, [&](SampleContext& context, auto&& contribute) { algorithm.trace(context, contribute); },
+            [&](const PathView& view, Technique own) { return algorithm.weight(view, own); }, sums);
+    }
+}
+
 }  // namespace detail
 
 /// Sums one unit of the image of `seed`. kInvalidArgument for a unit that does not lie inside the frame, kCancelled after a stop
@@ -310,33 +357,17 @@ requires UnitAlgorithm<A> || PreparedAlgorithm<A> || OwnedAlgorithm<A> Result<Pa
     const Rect &crop = scene.frame().crop, &tile = work.tile;
     if (tile.empty() || tile.x0 < crop.x0 || tile.y0 < crop.y0 || tile.x1 > crop.x1 || tile.y1 > crop.y1)
         return invalid_argument("the unit's tile does not lie inside the frame");
-    detail::UnitSums sums(scene, work);
-    const UnitScope scope{scene, seed, max_edges, roulette, work, stop};
-    if constexpr (OwnedAlgorithm<A>) {
-        UnitSink sink(work);
-        algorithm.run(scope, sink);
-        sums.add(sink);
-    } else if constexpr (PreparedAlgorithm<A> && prepares_per_iteration<A>()) {
-        // Light paths of an iteration follow those of the one before. The iteration is part of the keys of its
-        // uncounted paths, which would otherwise be the same in every iteration.
-        const uint64_t light_paths = work.iteration_count > 0 ? work.light_path_count / work.iteration_count : 0;
-        if (light_paths * work.iteration_count != work.light_path_count)
+    if constexpr (PreparedAlgorithm<A> && prepares_per_iteration<A>()) {
+        if (work.iteration_count > 0 && work.light_path_count % work.iteration_count != 0)
             return invalid_argument("the unit's light paths are not the same number in every iteration");
-        for (uint32_t b = 0; b < work.iteration_count && !stop.stop_requested(); ++b) {
-            RenderUnit iteration = work;
-            iteration.first_iteration = iteration.group_first_iteration = work.first_iteration + b;
-            iteration.iteration_count = 1;
-            iteration.first_light_path = work.first_light_path + b * light_paths;
-            iteration.light_path_count = light_paths;
-            detail::add_prepared(algorithm, UnitScope{scene, seed, max_edges, roulette, iteration, stop}, &sums);
-        }
-    } else if constexpr (PreparedAlgorithm<A>) {
-        detail::add_prepared(algorithm, scope, &sums);
-    } else {
-        detail::add_samples(
-            scope, [&](SampleContext& context, auto&& contribute) { algorithm.trace(context, contribute); },
-            [&](const PathView& view, Technique own) { return algorithm.weight(view, own); }, &sums);
     }
+    detail::UnitSums sums(scene, work);
+    uint32_t done = 0;
+    do {
+        const RenderUnit batch = work.batch(done);
+        detail::add_batch(algorithm, UnitScope{scene, seed, max_edges, roulette, batch, stop}, &sums);
+        done += batch.iteration_count;
+    } while (done < work.iteration_count && !stop.stop_requested());
     if (stop.stop_requested()) return Status(StatusCode::kCancelled, "the unit was cancelled");
     return std::move(sums).finish();
 }

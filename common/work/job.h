@@ -88,6 +88,7 @@ struct PlanOptions {
     uint64_t light_paths_per_iteration = 0;  ///< N1 |crop|; 0 for algorithms that splat nothing.
     bool whole_frame = false;                ///< Units cover the whole frame instead of tiles.
     bool splats_only = false;                ///< Units have no camera samples.
+    bool shares_light_paths = false;         ///< See AlgorithmInfo; such samples take longer.
 };
 /// The options that follow from the algorithm's row of the catalog.
 PlanOptions plan_options(const FrameLayout& frame, const AlgorithmSettings& algorithm);
@@ -97,9 +98,10 @@ PlanOptions plan_options(const FrameLayout& frame, const AlgorithmSettings& algo
 std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& tiles, const PlanOptions& options);
 
 /// The plan is a pure function of frame, options and the number of iterations. Group sizes grow geometrically: a group
-/// is at most 5 % of all iterations before it (at least one iteration, at most what makes about 2^18 camera samples per
-/// unit or 8 iterations of the whole frame), so that a job stopped at any group boundary wastes little, and rendering
-/// it again with that number of iterations makes the very same groups.
+/// is at most 5 % of all iterations before it, so that a job stopped at any group boundary wastes little, and rendering it again
+/// with that number of iterations makes the very same groups. It has one iteration at least. At most it has what makes about 2^22
+/// camera samples per unit (2^21 where samples share light sub-paths), but no more than 32 iterations, unless they make
+/// fewer than 2^18 samples; 8 of a whole frame are always allowed.
 class Plan {
   public:
     Plan(const FrameLayout& frame, const PlanOptions& options);

@@ -6,17 +6,25 @@
 namespace lightloom {
 namespace {
 
-constexpr int64_t kUnitSamples = int64_t(1) << 18;  // camera samples that a unit should have
-constexpr int kTileWidth = 512;                     // approximate: tiles are equal parts of the crop window
+/// Camera samples of an iteration of a tile, at most approximately. Tiles of small frames are not cut further, because every unit's
+/// splats go to the whole frame.
+constexpr int64_t kTileSamples = RenderUnit::kBatchSamples;
+/// Camera samples of a unit of several iterations. At 70000 a second, which a slow thread makes of `bdpt`, the larger one takes a
+/// minute; samples that share light sub-paths take about twice as long.
+constexpr int64_t kUnitSamples = int64_t(1) << 22, kSharingUnitSamples = kUnitSamples / 2;
+/// Iterations over which a partial's bytes (24 or 48 for a pixel) and its merging are spread well enough. Small frames, whose units
+/// could have more of them, gain nothing beyond: a job with a time limit drops the groups that are not complete at its end.
+constexpr int64_t kEnoughIterations = 32;
+constexpr int kTileWidth = 512;  // approximate: tiles are equal parts of the crop window
 constexpr int kMinTileRows = 256;
 constexpr int64_t kWholeFrameIterations = 8;  // groups of whole frames may grow to this, however large the frame is
 
 int ceil_div(int64_t a, int64_t b) { return int((a + b - 1) / b); }
 
 std::vector<Rect> make_tiles(const Rect& crop, bool whole_frame) {
-    if (whole_frame || crop.area() <= kUnitSamples) return {crop};
+    if (whole_frame || crop.area() <= kTileSamples) return {crop};
     const int columns = ceil_div(crop.width(), kTileWidth);
-    const int64_t rows_per_tile = std::max<int64_t>(kMinTileRows, kUnitSamples / ceil_div(crop.width(), columns));
+    const int64_t rows_per_tile = std::max<int64_t>(kMinTileRows, kTileSamples / ceil_div(crop.width(), columns));
     const int rows = ceil_div(crop.height(), rows_per_tile);
     std::vector<Rect> tiles;
     for (int j = 0; j < rows; ++j) {
@@ -37,7 +45,8 @@ uint32_t group_size(uint64_t done, uint32_t cap) { return uint32_t(std::clamp<ui
 PlanOptions plan_options(const FrameLayout& frame, const AlgorithmSettings& algorithm) {
     return {.light_paths_per_iteration = algorithm.light_paths_per_iteration(frame.crop.area()),
             .whole_frame = algorithm.info().frame == FrameShape::kWhole,
-            .splats_only = !algorithm.info().camera_samples};
+            .splats_only = !algorithm.info().camera_samples,
+            .shares_light_paths = algorithm.info().shares_light_paths};
 }
 
 std::vector<WorkUnit> split_group(const Group& group, const std::vector<Rect>& tiles, const PlanOptions& options) {
@@ -73,7 +82,8 @@ Plan::Plan(const FrameLayout& frame, const PlanOptions& options)
     for (const Rect& tile : tiles_) largest = std::max(largest, tile.area());
     // The partial of a large whole frame is large, so that its groups should not stay at one iteration for ever.
     const int64_t least = options.whole_frame ? kWholeFrameIterations : 1;
-    max_group_iterations_ = uint32_t(std::max(least, kUnitSamples / largest));
+    const int64_t most = (options.shares_light_paths ? kSharingUnitSamples : kUnitSamples) / largest;
+    max_group_iterations_ = uint32_t(std::max({least, kTileSamples / largest, std::min(most, kEnoughIterations)}));
 }
 
 Plan Plan::training(UnitKind kind, uint32_t round, const TrainingWork& work) {

@@ -133,6 +133,64 @@ TEST(Determinism, IterationsShareNoLightSubPath) {
     EXPECT_NE(refused.message().find("every iteration"), std::string::npos) << refused.message();
 }
 
+/// Notes the keys of every sample and of what is made for its batch.
+struct KeysAlgorithm {
+    struct Notes {
+        std::mutex mutex;
+        std::vector<RenderUnit> prepared;
+        std::set<std::pair<uint64_t, uint32_t>> samples;      ///< Iteration and pixel.
+        std::set<std::pair<uint64_t, uint64_t>> light_paths;  ///< First iteration of the group and number in it.
+    };
+    Notes* notes;
+
+    template <class Contribute>
+    int prepare(const UnitScope& scope, UnitPreparation*, Contribute&&) const {
+        notes->prepared.push_back(scope.work);
+        return 0;
+    }
+    template <class Contribute>
+    void trace(SampleContext& context, int, Contribute&& contribute) const {
+        {
+            const std::lock_guard lock(notes->mutex);
+            notes->samples.insert({context.iteration, context.pixel});
+            notes->light_paths.insert({context.group_iteration, context.light_path});
+        }
+        PathView view;
+        contribute(PathContribution{.value = Rgb(1.0f), .technique = Technique::hit()}, view);
+        const Vec2 film{float(context.px) + 0.5f, float(context.py) + 0.5f};
+        contribute(PathContribution{.value = Rgb(2.0f), .technique = Technique::lens(2), .film = film}, view);
+    }
+    float weight(int, const PathView&, Technique) const { return 1; }
+};
+
+/// A unit that is longer than a batch: nothing is left out or made twice, and what an algorithm keeps it keeps for a batch.
+TEST(Units, AreRenderedInBatches) {
+    const auto scene = testing::diffuse_box();
+    const auto area = uint64_t(scene->frame().crop.area());
+    const auto per_batch = uint32_t(uint64_t(RenderUnit::kBatchSamples) / area);
+    const uint32_t iterations = per_batch + 3;
+    RenderUnit work = whole_frame(*scene, iterations, area);
+    work.first_iteration = work.group_first_iteration = 50;
+    KeysAlgorithm::Notes notes;
+    const Result<Partial> partial = render_unit(KeysAlgorithm{&notes}, *scene, 3, 6, {}, work, {});
+    ASSERT_TRUE(partial.ok());
+    ASSERT_EQ(notes.prepared.size(), 2u);
+    EXPECT_EQ(notes.prepared[0], work.batch(0));
+    EXPECT_EQ(notes.prepared[1], work.batch(per_batch));
+    EXPECT_EQ(notes.samples.size(), iterations * area);
+    EXPECT_EQ(notes.samples.begin()->first, 50u);
+    EXPECT_EQ(notes.samples.rbegin()->first, 50u + iterations - 1);
+    EXPECT_EQ(notes.light_paths.size(), iterations * area);
+    EXPECT_EQ(partial->samples_per_pixel, iterations);
+    EXPECT_EQ(partial->light_paths, iterations * area);
+    EXPECT_EQ(partial->counters.camera_samples, iterations * area);
+    ASSERT_EQ(partial->splats.size(), area);
+    for (size_t p = 0; p < area; ++p) {
+        EXPECT_EQ(partial->camera[3 * p], iterations);
+        EXPECT_EQ(partial->splats[p].rgb[0], 2 * iterations);
+    }
+}
+
 /// Holds every sample until a second thread has come, or for ten seconds.
 struct MeetingAlgorithm {
     std::mutex* mutex;

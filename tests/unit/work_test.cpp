@@ -97,18 +97,67 @@ TEST(Plan, SmallFramesAreOneTileAndLargeTilesAreLarge) {
 }
 
 TEST(Plan, GroupsGrowByAtMostFivePercentUpToTheCap) {
-    const Plan plan(frame(64, 64), PlanOptions{.light_paths_per_iteration = 64 * 64});
-    uint64_t done = 0;
-    for (uint32_t i = 0; i < 2000; ++i) {
-        const Group group = plan.group(i);
-        ASSERT_EQ(group.index, i);
-        ASSERT_EQ(group.first_iteration, done);
-        ASSERT_GE(group.iteration_count, 1u);
-        ASSERT_LE(group.iteration_count, std::max<uint64_t>(1, done / 20));
-        ASSERT_LE(int64_t(group.iteration_count) * 64 * 64, int64_t(1) << 18);
-        done += group.iteration_count;
+    for (const FrameLayout& f : {frame(64, 64), frame(160, 90), frame(1024, 576), frame(1920, 1080)}) {
+        const Plan plan(f, PlanOptions{.light_paths_per_iteration = 64 * 64}),
+            same(f, PlanOptions{.light_paths_per_iteration = 64 * 64});
+        uint64_t done = 0;
+        for (uint32_t i = 0; i < 2000; ++i) {
+            const Group group = plan.group(i);
+            ASSERT_EQ(group.index, i);
+            ASSERT_EQ(group.first_iteration, done);
+            ASSERT_GE(group.iteration_count, 1u);
+            ASSERT_LE(group.iteration_count, std::max<uint64_t>(1, done / 20));
+            ASSERT_LE(group.iteration_count, plan.max_group_iterations());
+            ASSERT_EQ(same.group(i).iteration_count, group.iteration_count) << "a pure function";
+            done += group.iteration_count;
+        }
+        EXPECT_EQ(plan.group(1999).iteration_count, plan.max_group_iterations());
+        for (const WorkUnit& unit : plan.units(plan.group(1999)))
+            EXPECT_LE(unit.render.tile.area() * unit.render.iteration_count, int64_t(1) << 22);
     }
-    EXPECT_EQ(plan.group(1999).iteration_count, plan.max_group_iterations());
+}
+
+/// Bytes of traffic and time of the coordinator go with units and groups: a large frame must not have one for every iteration.
+TEST(Plan, LongJobsHaveLongUnitsAndSmallFramesNoLongerOnesThanTheyNeed) {
+    const auto cap = [](const FrameLayout& f, const PlanOptions& options) { return Plan(f, options).max_group_iterations(); };
+    EXPECT_EQ(cap(frame(64, 64), {}), 64u);
+    EXPECT_EQ(cap(frame(160, 90), {}), 32u);
+    EXPECT_EQ(cap(frame(512, 512), {}), 16u);
+    EXPECT_EQ(cap(frame(1024, 576), {}), 28u);
+    EXPECT_EQ(cap(frame(1024, 576), {.shares_light_paths = true}), 14u);
+    EXPECT_EQ(cap(frame(1920, 1080), {}), 16u);
+    EXPECT_EQ(cap(frame(1920, 1080), {.whole_frame = true}), 8u);
+    EXPECT_LE(Plan(frame(1024, 576), PlanOptions{}).group_count(1000), 115u);
+    EXPECT_EQ(Plan(frame(1024, 576), PlanOptions{}).group(0).iteration_count, 1u) << "the first preview comes soon";
+}
+
+TEST(Plan, BatchesDivideAUnitAndItsLightPaths) {
+    const RenderUnit small{.iteration_count = 4, .tile = {0, 0, 256, 256}, .light_path_count = 7};
+    EXPECT_EQ(small.batch_iterations(), 4u);
+    EXPECT_EQ(small.batch(0), small);
+    EXPECT_EQ((RenderUnit{.iteration_count = 2, .tile = {0, 0, 4000, 4000}}.batch_iterations()), 1u) << "one at least";
+    for (const uint64_t paths : {uint64_t(0), uint64_t(1), uint64_t(17), uint64_t(31) * 256 * 256, uint64_t(1) << 62}) {
+        RenderUnit unit{.first_iteration = 100,
+                        .iteration_count = 31,
+                        .group_first_iteration = 100,
+                        .tile = {256, 0, 512, 256},
+                        .first_light_path = 5,
+                        .light_path_count = paths};
+        uint32_t done = 0;
+        uint64_t next = unit.first_light_path;
+        while (done < unit.iteration_count) {
+            const RenderUnit batch = unit.batch(done);
+            EXPECT_EQ(batch.iteration_count, done < 28 ? 4u : 3u);
+            EXPECT_EQ(batch.first_iteration, 100 + done);
+            EXPECT_EQ(batch.group_first_iteration, 100 + done) << "a group of its own";
+            EXPECT_EQ(batch.tile, unit.tile);
+            EXPECT_EQ(batch.first_light_path, next);
+            EXPECT_EQ(batch.batch(0), batch);
+            next += batch.light_path_count;
+            done += batch.iteration_count;
+        }
+        EXPECT_EQ(next, unit.first_light_path + paths);
+    }
 }
 
 TEST(Plan, BoundedGroupsAreAPrefixOfTheUnboundedOnes) {
@@ -201,7 +250,7 @@ TEST(Plan, UnitsHaveTheShapeThatTheOptionsSay) {
                 EXPECT_EQ(unit.render.samples_per_pixel(), splats_only ? 0 : unit.render.iteration_count);
             }
             // A large frame that cannot be cut has groups of several iterations in the end, so that not every one costs a partial.
-            EXPECT_EQ(plan.max_group_iterations(), whole ? 8u : 1u);
+            EXPECT_EQ(plan.max_group_iterations(), whole ? 8u : 27u);
         }
     }
 }
