@@ -1,6 +1,7 @@
 // The plan, the spec's digest, file lists and the asset store.
 
 #include "common/work/job.h"
+#include "common/work/service.h"
 
 #include <dirent.h>
 #include <dlfcn.h>
@@ -17,6 +18,7 @@
 #include "common/transport/renderer.h"
 #include "common/work/asset.h"
 #include "common/work/golden.h"
+#include "common/work/service.h"
 #include "tests/support/algorithm_of.h"
 #include "tests/support/estimates.h"
 
@@ -269,6 +271,26 @@ TEST(Plan, UnitsOfTrainingSayWhichRoundTheyAreOf) {
         next += units[0].training.sample_count;
     }
     EXPECT_EQ(next, work.first_sample + work.sample_count);
+}
+
+/// Late units have many times the samples of early ones.
+TEST(JobInfo, ProgressCountsSamplesAndNotUnits) {
+    JobInfo job;
+    job.state = JobState::kRunning;
+    job.unit_total = 10, job.unit_done = 8;
+    job.spec.samples_per_pixel = 100;
+    job.spec.frame = frame(20, 10);
+    job.spec.algorithm = testing::algorithm_of("bdpt");
+    EXPECT_EQ(rendered_share(job), 0);
+    job.camera_samples = 25 * 200;
+    job.light_paths = 99 * 200;
+    EXPECT_DOUBLE_EQ(rendered_share(job), 0.25);
+    job.spec.algorithm = testing::algorithm_of("light");
+    job.camera_samples = 0;
+    job.light_paths = 40 * job.spec.algorithm.light_paths_per_iteration(200);
+    EXPECT_DOUBLE_EQ(rendered_share(job), 0.4) << "no camera samples at all";
+    job.spec.samples_per_pixel = 0;
+    EXPECT_EQ(sample_share(job), 0) << "nobody knows how many there will be";
 }
 
 TEST(JobSpec, DigestChangesWithEverythingThatChangesTheImageAndOnlyThat) {
