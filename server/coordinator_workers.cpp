@@ -1,6 +1,7 @@
 // The coordinator's side of a worker's life: registration, leases, heartbeats and results.
 
 #include "common/cli/log_line.h"
+#include "common/core/crash_point.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
 
@@ -65,6 +66,7 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
                 continue;
         }
         worker.held.insert({job->id, unit->key});
+        crash_point("server.unit-leased");
         if (!render && job->learning_seconds > 0 && job->work_begin == TimePoint()) job->work_begin = now;  // it goes on
         if (render) return UnitLease{job->id, job->spec, *unit, job->tables.asset};
         return UnitLease{job->id, job->spec, *unit, job->guide};
@@ -181,6 +183,7 @@ Result<PartialExpectation> Coordinator::expected_partial(const UnitReference& re
 Result<SubmitAck> Coordinator::submit_payload(const std::string& worker_id, const UnitReference& unit,
                                               const PartialDescriptor& descriptor, std::string_view payload,
                                               double render_seconds) {
+    crash_point("server.result-received");
     const auto expected = expected_partial(unit);
     if (!expected.ok()) return unexpected_result(expected.status());
     auto partial = decode_partial(*expected, descriptor, payload);
@@ -248,7 +251,9 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     const uint64_t dropped = partial.dropped_count;
     const double splats_per_path =
         unit.render.light_path_count > 0 ? double(partial.splats.size()) / double(unit.render.light_path_count) : 0;
+    crash_point("server.before-merge");
     const auto refused = reducer->add(unit, std::move(partial));
+    crash_point("server.after-merge");
 
     const std::lock_guard lock(mutex_);
     if (job->state != JobState::kRunning) return SubmitAck{SubmitOutcome::kStale, "the job ended meanwhile"};
@@ -289,6 +294,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     changed(*job);
     work_changed_.notify_all();
     finish_if_complete(*job);
+    crash_point("server.result-counted");
     return SubmitAck{SubmitOutcome::kAccepted, {}};
 }
 

@@ -7,6 +7,7 @@
 
 #include "common/cli/log_line.h"
 #include "common/core/atomic_file.h"
+#include "common/core/crash_point.h"
 #include "common/import/import.h"
 #include "common/transport/training.h"
 
@@ -131,6 +132,7 @@ Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, st
     auto scene = Scene::build(std::move(imported->description), scene_options(spec));
     if (!scene.ok()) return scene.status();
     log_info("scene {} built", root.hex().substr(0, 12));
+    crash_point("worker.scene-read");
     return std::shared_ptr<const Scene>(std::move(scene).value());
 }
 
