@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
+#include <sys/stat.h>
 
 #include <set>
 
@@ -83,6 +84,19 @@ TEST(ChaosLedger, GoesOnWhereItWasSaved) {
         ASSERT_TRUE(write_file_atomically(file, wrong).ok());
         EXPECT_EQ(Ledger::load(file).status().code(), StatusCode::kInvalidArgument) << wrong;
     }
+}
+
+TEST(Programs, OutliveTheReaderOfTheirLog) {
+    const TempDirectory directory;
+    const std::string pipe = directory.file("pipe"), ports = directory.file("ports");
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    const int reader = ::open(pipe.c_str(), O_RDWR | O_CLOEXEC);
+    Process server("lightloom-server",
+                   {"--listen", "127.0.0.1:0", "--status", "off", "--data", directory.file("data"), "--port-file", ports}, pipe);
+    ASSERT_TRUE(lightloom::testing::wait_until(60, [&] { return std::filesystem::exists(ports); }));
+    ::close(reader);
+    server.signal(SIGTERM);  // of which it logs a line
+    EXPECT_EQ(server.wait(), 0);
 }
 
 TEST(CrashPoints, AWrongLabelIsRefusedAtTheStart) {
