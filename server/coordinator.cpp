@@ -7,6 +7,7 @@
 
 #include "common/cli/log_line.h"
 #include "common/core/atomic_file.h"
+#include "common/core/crash_point.h"
 #include "common/path/path_view.h"
 #include "server/job_record.h"
 #include "server/results.h"
@@ -161,6 +162,7 @@ Result<JobInfo> Coordinator::submit_job(const std::string& request_id, const Job
     jobs_.push_back(std::move(record));
     requests_[request_id] = &job;
     log_info("{}: accepted, {} {}", job.id, spec.algorithm.name(), job.spec.scene_root.hex().substr(0, 12));
+    crash_point("server.job-accepted");
     start_task(job, &job.prepare_task, "to prepare this job: its scene or frame is too large",
                [this, &job](std::stop_token stop) { return prepare(job, stop); });
     return job.info(options_.clock());
@@ -291,6 +293,7 @@ void Coordinator::end_job(JobRecord& job, JobState state) {
     discarded_.push_back(std::make_shared<std::vector<ImageLayer>>(std::move(job.layers)));
     job.reducer.reset();
     log_info("{}: {}{}{}", job.id, to_string(state), job.message.empty() ? "" : ": ", job.message);
+    crash_point("server.job-ended");
     changed(job);
 }
 

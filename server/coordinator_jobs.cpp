@@ -10,6 +10,7 @@
 
 #include "common/cli/log_line.h"
 #include "common/core/atomic_file.h"
+#include "common/core/crash_point.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
 #include "server/results.h"
@@ -70,6 +71,7 @@ Status Coordinator::prepare(JobRecord& job, std::stop_token stop) {
     }
     auto facts = options_.read_scene(assets_, spec, stop);
     if (!facts.ok()) return facts.status();
+    crash_point("server.scene-read");
     const Rect& crop = facts->frame.crop;
     if (crop.empty() || crop.area() > kMaxPartialPixels)
         return invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) + " pixels");
@@ -110,6 +112,7 @@ void Coordinator::plan_units(JobRecord& job, JobSpec spec, SceneFacts facts, Tab
     job.state = JobState::kRunning;
     log_info("{}: {}x{}, {} tile(s), {} unit(s)", job.id, frame.crop.width(), frame.crop.height(), job.units->tile_count(),
              job.units->unit_total());
+    crash_point("server.units-planned");
     changed(job);
     work_changed_.notify_all();
 }
@@ -184,9 +187,12 @@ Status Coordinator::write_results(JobRecord& job) {
     }
     std::error_code error;
     std::filesystem::create_directories(job.directory, error);
+    crash_point("server.image-encoded");
     Status status = write_file_atomically((job.directory / "image.exr").string(), *image);
+    crash_point("server.image-written");
     if (status.ok()) status = write_file_atomically((job.directory / "manifest.json").string(), to_json(manifest));
     LL_RETURN_IF_ERROR(status);
+    crash_point("server.manifest-written");
 
     const std::lock_guard lock(mutex_);
     if (job.state == JobState::kFinishing) end_job(job, JobState::kSucceeded);

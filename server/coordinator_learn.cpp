@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "common/cli/log_line.h"
+#include "common/core/crash_point.h"
 #include "common/transport/parameters.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
@@ -220,7 +221,9 @@ Status Coordinator::finish_tables(JobRecord& job, LearnedTables learned) {
         facts = std::move(job.facts);
     }
     const std::string bytes = serialize(learned.tables);
+    crash_point("server.tables-learned");
     table_cache_.store(info.cache_key, bytes, info);
+    crash_point("server.tables-cached");
     log_info("{}: {} from {} samples; {:.2f} s traced, {:.2f} s learned{}{}", job.id, info.what(), info.training_samples,
              info.trace_seconds, learning_seconds(info), info.note.empty() ? "" : "; ", info.note);
     return adopt_tables(job, learned.spec, facts, bytes, std::move(info));

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "common/cli/log_line.h"
+#include "common/core/crash_point.h"
 #include "common/transport/parameters.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
@@ -167,6 +168,7 @@ Status Coordinator::adopt_tables(JobRecord& job, const JobSpec& spec, const Scen
         job.tables_asset = digest;  // set before the bytes are stored, so that no job that ends removes them
     }
     LL_RETURN_IF_ERROR(store_tables(digest, bytes));
+    crash_point("server.tables-stored");
     plan_units(job, spec, facts, std::move(tables));
     const std::lock_guard lock(mutex_);
     job.guide_bytes.reset();
@@ -198,6 +200,7 @@ Result<uint64_t> Coordinator::expected_training_bytes(const UnitReference& refer
 
 Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, const UnitReference& reference, const Digest& digest,
                                                std::string_view payload, double trace_seconds) {
+    crash_point("server.training-received");
     const auto limit = expected_training_bytes(reference);
     if (!limit.ok()) return unexpected_result(limit.status());
     Result<TrainingData> data = data_loss("the training data differ from their digest");
@@ -236,6 +239,7 @@ Result<SubmitAck> Coordinator::submit_training(const std::string& worker_id, con
     }
     prepared_further(*job);
     work_changed_.notify_all();
+    crash_point("server.training-counted");
     return SubmitAck{SubmitOutcome::kAccepted, {}};
 }
 

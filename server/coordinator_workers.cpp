@@ -1,6 +1,7 @@
 // The coordinator's side of a worker's life: registration, leases, heartbeats and results.
 
 #include "common/cli/log_line.h"
+#include "common/core/crash_point.h"
 #include "server/coordinator.h"
 #include "server/job_record.h"
 
@@ -65,6 +66,7 @@ std::optional<UnitLease> Coordinator::next_unit(WorkerRecord& worker) {
                 continue;
         }
         worker.held.insert({job->id, unit->key});
+        crash_point("server.unit-leased");
         if (!render && job->learning_seconds > 0 && job->work_begin == TimePoint()) job->work_begin = now;  // it goes on
         if (render) return UnitLease{job->id, job->spec, *unit, job->tables.asset};
         return UnitLease{job->id, job->spec, *unit, job->guide};
@@ -181,6 +183,7 @@ Result<PartialExpectation> Coordinator::expected_partial(const UnitReference& re
 Result<SubmitAck> Coordinator::submit_payload(const std::string& worker_id, const UnitReference& unit,
                                               const PartialDescriptor& descriptor, std::string_view payload,
                                               double render_seconds) {
+    crash_point("server.result-received");
     const auto expected = expected_partial(unit);
     if (!expected.ok()) return unexpected_result(expected.status());
     auto partial = decode_partial(*expected, descriptor, payload);
@@ -246,7 +249,9 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     }
     const UnitCounters counters = partial.counters;
     const uint64_t dropped = partial.dropped_count;
+    crash_point("server.before-merge");
     const auto refused = reducer->add(unit, partial);
+    crash_point("server.after-merge");
     partial = {};
 
     const std::lock_guard lock(mutex_);
@@ -280,6 +285,7 @@ Result<SubmitAck> Coordinator::submit_partial(const std::string& worker_id, cons
     changed(*job);
     work_changed_.notify_all();
     finish_if_complete(*job);
+    crash_point("server.result-counted");
     return SubmitAck{SubmitOutcome::kAccepted, {}};
 }
 

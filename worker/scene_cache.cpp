@@ -7,6 +7,7 @@
 
 #include "common/cli/log_line.h"
 #include "common/core/atomic_file.h"
+#include "common/core/crash_point.h"
 #include "common/import/import.h"
 #include "common/transport/training.h"
 
@@ -15,8 +16,9 @@ namespace {
 
 constexpr size_t kMaxScenes = 2;
 constexpr size_t kMaxRenderers = 4;
-/// Attempts at getting tables: a copy that was damaged on disk or on its way is thrown away and fetched again.
-constexpr int kTableAttempts = 3;
+/// Attempts at getting tables or the files of a scene: a copy that was damaged on disk or on its way is thrown away and fetched
+/// again.
+constexpr int kFetchAttempts = 3;
 /// Largest list of a scene's files, far above any real scene's.
 constexpr uint64_t kMaxManifestBytes = uint64_t(64) << 20;
 
@@ -74,8 +76,7 @@ Status SceneFetcher::fetch(AssetStore& store, const Digest& digest, uint64_t siz
     return {};
 }
 
-Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, std::stop_token stop) {
-    const Digest& root = spec.scene_root;
+Result<AssetManifest> SceneFetcher::file_list(const Digest& root, std::stop_token stop) {
     if (!store_.contains(root)) {
         std::string text;
         LL_RETURN_IF_ERROR(port_.read_asset(root, 0, [&](std::string_view bytes) -> Status {
@@ -94,13 +95,35 @@ Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, st
         }
     }
     const auto text = store_.read(root);
-    if (!text.ok()) return text.status();
-    const auto manifest = AssetManifest::parse(*text);
-    if (!manifest.ok()) return manifest.status();
-    for (const AssetEntry& entry : manifest->entries) LL_RETURN_IF_ERROR(fetch(store_, entry.digest, entry.size_bytes, stop));
+    if (!text.ok()) {
+        store_.remove(root);
+        return data_loss(text.status().message());  // also if another worker has just removed a damaged one
+    }
+    return AssetManifest::parse(*text);
+}
 
+Result<AssetManifest> SceneFetcher::lay_out(const Digest& root, const std::filesystem::path& directory, std::stop_token stop) {
+    Status status;
+    for (int attempt = 0; attempt < kFetchAttempts; ++attempt) {
+        auto manifest = file_list(root, stop);
+        status = manifest.status();
+        if (status.ok()) {
+            for (const AssetEntry& entry : manifest->entries)
+                if (status.ok()) status = fetch(store_, entry.digest, entry.size_bytes, stop);
+        }
+        if (status.ok()) status = store_.materialise(*manifest, directory);
+        if (status.ok()) return manifest;
+        if (status.code() != StatusCode::kDataLoss) return status;
+        log_warn("files of scene {} are fetched again: {}", root.hex().substr(0, 12), status.message());
+    }
+    return status;
+}
+
+Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, std::stop_token stop) {
+    const Digest& root = spec.scene_root;
     const std::filesystem::path directory = scratch_ / root.hex();
-    LL_RETURN_IF_ERROR(store_.materialise(*manifest, directory));
+    const auto manifest = lay_out(root, directory, stop);
+    if (!manifest.ok()) return manifest.status();
     // The scene may not refer to files outside of the directory.
     auto imported = import_pbrt((directory / manifest->main).string(), {.root = directory.string(), .without = manifest->without});
     std::error_code ignored;
@@ -109,12 +132,13 @@ Result<std::shared_ptr<const Scene>> SceneFetcher::scene(const JobSpec& spec, st
     auto scene = Scene::build(std::move(imported->description), scene_options(spec));
     if (!scene.ok()) return scene.status();
     log_info("scene {} built", root.hex().substr(0, 12));
+    crash_point("worker.scene-read");
     return std::shared_ptr<const Scene>(std::move(scene).value());
 }
 
 Result<std::string> SceneFetcher::tables(const AssetReference& tables, std::stop_token stop) {
     Status status;
-    for (int attempt = 0; attempt < kTableAttempts; ++attempt) {
+    for (int attempt = 0; attempt < kFetchAttempts; ++attempt) {
         status = fetch(table_store_, tables.digest, tables.size_bytes, stop);
         if (status.ok()) {
             auto bytes = table_store_.read(tables.digest);  // fails if another worker has just trimmed them away

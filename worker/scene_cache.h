@@ -32,6 +32,9 @@ class SceneFetcher {
 
   private:
     Status fetch(AssetStore& store, const Digest& digest, uint64_t size_bytes, std::stop_token stop);
+    Result<AssetManifest> file_list(const Digest& root, std::stop_token stop);
+    /// Fetches the files of a scene and puts them into `directory` under their names. What is damaged is fetched again.
+    Result<AssetManifest> lay_out(const Digest& root, const std::filesystem::path& directory, std::stop_token stop);
 
     WorkerPort& port_;
     std::filesystem::path scratch_;  ///< Belongs to this process; removed at the end.

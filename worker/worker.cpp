@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "common/cli/log_line.h"
+#include "common/core/crash_point.h"
 
 namespace lightloom {
 namespace {
@@ -78,6 +79,7 @@ Status Worker::sign_in(std::stop_token stop, const std::string& stale_id) {
         const auto grant = port_.register_worker(hello);
         if (grant.ok()) {
             log_info("registered as {}", grant->worker_id);
+            crash_point("worker.registered");
             const std::lock_guard lock(mutex_);
             grant_ = *grant;
             return {};
@@ -158,6 +160,7 @@ void Worker::lane(std::stop_token stop) {
 }
 
 bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
+    crash_point("worker.unit-received");
     const UnitReference reference = lease.reference();
     std::stop_token unit_stop;
     {
@@ -186,6 +189,7 @@ bool Worker::run_unit(const UnitLease& lease, std::stop_token stop) {
     if (!made.ok()) {
         const Status status = port_.release_unit(id(), reference, made);
         if (!status.ok()) log_debug("release: {}", status.message());
+        crash_point("worker.unit-released");
     }
     return able;
 }
@@ -214,6 +218,7 @@ Status Worker::render_unit(const UnitLease& lease, std::stop_token unit_stop, st
     });
     if (!taken.ok()) return taken.status();
     if (!partial.ok()) return partial.status();
+    crash_point("worker.unit-rendered");
     return submit(
         lease, [&](const std::string& worker_id) { return port_.submit_result(worker_id, lease, *partial, seconds); }, drain);
 }
@@ -236,6 +241,7 @@ Status Worker::trace_unit(const UnitLease& lease, std::stop_token unit_stop, std
     const auto seconds = in_turn(lease, unit_stop, drain, [&] { data = (*tracer)(lease.unit.training, unit_stop); });
     if (!seconds.ok()) return seconds.status();
     if (!data.ok()) return data.status();
+    crash_point("worker.training-traced");
     const std::string payload = serialize(*data);
     const auto send = [&](const std::string& worker_id) { return port_.submit_training(worker_id, lease, payload, *seconds); };
     return submit(lease, send, drain);
@@ -245,7 +251,9 @@ Status Worker::submit(const UnitLease& lease, const Send& send, std::stop_token 
     Backoff backoff;
     for (int attempt = 0; attempt < kSubmitAttempts; ++attempt) {
         const std::string worker_id = id();
+        crash_point("worker.before-submit");
         const auto ack = send(worker_id);
+        crash_point("worker.after-submit");
         if (ack.ok()) {
             if (ack->outcome == SubmitOutcome::kDuplicateDifferent) log_error("{}: {}", name_of(lease.reference()), ack->reason);
             // The coordinator has counted the failure, but a heartbeat or our other lane may have leased the unit again

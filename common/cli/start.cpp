@@ -9,6 +9,7 @@
 
 #include "common/cli/log.h"
 #include "common/cli/mistakes.h"
+#include "common/core/crash_point.h"
 #include "common/core/nearest.h"
 
 namespace lightloom {
@@ -43,6 +44,11 @@ std::optional<int> parse_and_log(CLI::App& app, int argc, char** argv, const std
         return end_of_parse(app, error);
     }
     set_up_logging(app.get_name(), level);
+    ::signal(SIGPIPE, SIG_IGN);  // whoever reads the log may go away; a farm does not end with it
+    if (const Status armed = arm_crash_point_of_environment(); !armed.ok()) {
+        print_error(armed.message());
+        return kBadCommandLine;
+    }
     return std::nullopt;
 }
 

@@ -1,4 +1,5 @@
 #include "common/core/atomic_file.h"
+#include "common/core/crash_point.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -45,7 +46,9 @@ Status write_file_atomically(const std::string& path, std::string_view bytes) {
     }
     if (error == 0 && fsync(file) != 0 && errno != EINVAL) error = errno;  // EINVAL: such a file cannot be flushed.
     if (close(file) != 0 && error == 0) error = errno;
+    if (!stream && error == 0) crash_point("file.before-rename");
     if (!stream && error == 0 && std::rename(temporary.c_str(), target.c_str()) != 0) error = errno;
+    if (!stream && error == 0) crash_point("file.after-rename");
     if (error != 0) {
         if (!stream) unlink(temporary.c_str());
         return failure(path, "cannot be written", error);

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "common/core/atomic_file.h"
+#include "common/core/crash_point.h"
 #include "common/work/asset.h"
 #include "common/work/cache_trim.h"
 
@@ -188,6 +189,7 @@ Status AssetStore::Upload::append(std::string_view bytes) {
     if (bytes.size() > size_ - offset_) return invalid_argument("more data than the declared size");
     LL_RETURN_IF_ERROR(write_all(file_, bytes, store_->incoming_path(digest_)));
     offset_ += bytes.size();
+    crash_point("asset.appended");
     return {};
 }
 
@@ -204,7 +206,9 @@ Status AssetStore::Upload::finish() {
     }
     const fs::path to = store_->path_of(digest_);
     fs::create_directories(to.parent_path(), error);
+    crash_point("asset.before-commit");
     if (::rename(from.c_str(), to.c_str()) != 0) return io_error(to, errno);
+    crash_point("asset.committed");
     return {};
 }
 

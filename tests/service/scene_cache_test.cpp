@@ -32,23 +32,29 @@ class Storing {
     int file_;
 };
 
-TEST(SceneFetcher, AFileListThatAnotherProcessDidNotFinishIsStoredAfterAll) {
-    FakeService service;
+/// A job on a scene of one file, which the coordinator has.
+JobSpec put_scene(FakeService& service) {
     const std::string source = std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/furnace-sphere.pbrt";  // which includes no file
     const auto text = read_file(source);
-    ASSERT_TRUE(text.ok()) << text.status().message();
+    EXPECT_TRUE(text.ok()) << text.status().message();
     const AssetManifest manifest{"scene.pbrt", {{"scene.pbrt", sha256(*text), text->size()}}};
     AssetStore& assets = service.coordinator->assets();
-    ASSERT_TRUE(assets.put(sha256(*text), *text).ok());
-    ASSERT_TRUE(assets.put(manifest.root(), manifest.canonical_text()).ok());
+    EXPECT_TRUE(assets.put(sha256(*text), *text).ok());
+    EXPECT_TRUE(assets.put(manifest.root(), manifest.canonical_text()).ok());
     JobSpec spec;
     spec.scene_root = manifest.root();
     spec.width = spec.height = 16;
+    return spec;
+}
 
+TEST(SceneFetcher, AFileListThatAnotherProcessDidNotFinishIsStoredAfterAll) {
+    FakeService service;
+    JobSpec spec = put_scene(service);
+    AssetStore& assets = service.coordinator->assets();
     const TempDirectory directory;
     LocalWorkerPort port(*service.coordinator);
     SceneFetcher fetcher(port, directory.path);
-    std::optional<Storing> other(std::in_place, directory.path / "assets", manifest.root());
+    std::optional<Storing> other(std::in_place, directory.path / "assets", spec.scene_root);
     std::stop_source stop;
     auto fetched = std::async(std::launch::async, [&] { return fetcher.scene(spec, stop.get_token()); });
     EXPECT_EQ(fetched.wait_for(std::chrono::milliseconds(300)), std::future_status::timeout) << "the other one may finish yet";
@@ -63,6 +69,32 @@ TEST(SceneFetcher, AFileListThatAnotherProcessDidNotFinishIsStoredAfterAll) {
     spec.scene_root = sha256("another list");
     ASSERT_TRUE(assets.put(spec.scene_root, "another list").ok());
     EXPECT_EQ(fetcher.scene(spec, stop.get_token()).status().code(), StatusCode::kCancelled);
+}
+
+TEST(SceneFetcher, DamagedFilesAreFetchedAgain) {
+    FakeService service;
+    const JobSpec spec = put_scene(service);
+    const TempDirectory directory;
+    LocalWorkerPort port(*service.coordinator);
+    const auto fetch = [&] { return SceneFetcher(port, directory.path).scene(spec, {}).status(); };
+    ASSERT_TRUE(fetch().ok());
+    const AssetStore kept(directory.path / "assets");
+    const auto list = AssetManifest::parse(*kept.read(spec.scene_root));
+    for (const Digest& digest : {spec.scene_root, list->entries.front().digest}) {
+        const std::string bytes = *kept.read(digest), path = kept.path_of(digest).string();
+        std::string damaged = bytes;
+        damaged[bytes.size() / 2] ^= 1;
+        for (const std::string& wrong : {damaged, bytes.substr(1), std::string()}) {
+            ASSERT_TRUE(write_file_atomically(path, wrong).ok());
+            const Status again = fetch();
+            EXPECT_TRUE(again.ok()) << again.message();
+            EXPECT_EQ(*kept.read(digest), bytes);
+        }
+    }
+    // Where the coordinator's copy is damaged as well, that is said, after some attempts.
+    std::filesystem::remove(kept.path_of(spec.scene_root));
+    ASSERT_TRUE(write_file_atomically(service.coordinator->assets().path_of(spec.scene_root).string(), "damaged").ok());
+    EXPECT_EQ(fetch().code(), StatusCode::kDataLoss);
 }
 
 /// Jobs on one scene that differ in --crop alone.
