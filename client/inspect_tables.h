@@ -23,7 +23,8 @@ struct TableFile {
 
 /// Reads an entry of a table cache, or bare tables, and checks that they fit the scene.
 Result<TableFile> read_tables(const std::string& path, const Scene& scene);
-/// Sizes, labels that occur, quantiles of Q, entropy of Gamma's columns in bits, windows, what is known of emission and of gains, digest.
+/// Sizes, labels that occur, quantiles of Q, entropy of Gamma's columns in bits, windows, digest; what is known of emission and
+/// gains.
 nlohmann::ordered_json describe(const TableFile& file, const Scene& scene);
 void print(const TableFile& file, const Scene& scene);
 /// What follows PREFIX in the names of the pictures.
