@@ -252,9 +252,10 @@ TEST(Processes, TablesAreKeptForTheNextRenderAndCanBeInspected) {
     for (const char* picture : {"-kappa-eye.png", "-kappa-light.png", "-gamma.png", "-q.png"})
         EXPECT_TRUE(read_file(service.path("seen") + picture)->starts_with("\x89PNG")) << picture;
     // Tables without subspaces.
-    embedded(service, 1, 1,
-             {"--algorithm", "bdpt", "--spp", "1", "--resolution", "16x16", "--set", "emission=learned", "--set", "roulette=learned",
-              "--set", "training-paths=2000", "--table-cache", service.path("emission"), "--json", service.path("bdpt.json")});
+    embedded(
+        service, 1, 1,
+        {"--algorithm", "bdpt", "--spp", "1", "--resolution", "16x16", "--set", "emission=learned", "--set", "roulette=learned",
+         "--set", "training-paths=2000", "--table-cache", service.path("emission"), "--json", service.path("bdpt.json")});
     const std::string key = Json::parse(*read_file(service.path("bdpt.json")))["tables"]["cache_key"].get<std::string>();
     const std::string emission = service.path("emission") + "/" + key + ".tables";
     EXPECT_EQ(Process("lightloom", {"inspect", kScene, "--tables", emission}, service.path("inspect.log")).wait(), 0);
