@@ -360,7 +360,7 @@ TEST(ImportOptions, UnsupportedOnesAreNamed) {
     refused("Camera \"perspective\" \"float fov\" 180", "fov");
     refused("Film \"spectral\"", "rgb");
     refused("\nFilm \"rgb\" \"integer xresolution\" 16384 \"integer yresolution\" 16385", "scene.pbrt:2");
-    refused("Film \"rgb\" \"integer xresolution\" 16384 \"integer yresolution\" 16385", "268451840 pixels, which take 69 GB");
+    refused("Film \"rgb\" \"integer xresolution\" 16384 \"integer yresolution\" 16385", "268451840 pixels, which take 35 GB");
     refused("\nIntegrator \"path\" \"integer maxdepth\" -1", "scene.pbrt:2");
     refused("Integrator \"path\" \"integer maxdepth\" -1", "negative");
     warned("Integrator \"path\" \"integer maxdepth\" 1000", "255");
