@@ -51,10 +51,6 @@ class Look : public ::testing::Test {
         arguments.insert(arguments.end(), more.begin(), more.end());
         return arguments;
     }
-    /// Whether a sample's light sub-paths are those of its unit.
-    static bool shares_light_paths(const std::string& algorithm) {
-        return learns(algorithm) || (*find_algorithm(algorithm))->merges;
-    }
     static bool learns(const std::string& algorithm) { return AlgorithmSettings::parse(algorithm, {})->learning() != nullptr; }
     static std::vector<std::string> algorithms() {
         std::vector<std::string> names;
@@ -112,8 +108,8 @@ TEST_F(Look, PathsSumToTheSample) {
                 EXPECT_NEAR(value, json["camera"][c].get<double>(), 1e-8 * std::fabs(value));
             }
             // Splats are the sample's own but where light paths are the unit's.
-            EXPECT_EQ(json["splats"].is_null(), shares_light_paths(algorithm));
-            if (shares_light_paths(algorithm)) {
+            EXPECT_EQ(json["splats"].is_null(), learns(algorithm));
+            if (learns(algorithm)) {
                 arguments.push_back("--splats");
                 const Json with_splats = document(run(arguments).output);
                 EXPECT_EQ(with_splats["camera"], json["camera"]);
