@@ -1,5 +1,4 @@
 #include "common/core/atomic_file.h"
-#include "common/core/crash_point.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -10,6 +9,8 @@
 #include <cstdio>
 #include <filesystem>
 #include <system_error>
+
+#include "common/core/crash_point.h"
 
 namespace lightloom {
 
