@@ -145,6 +145,15 @@ std::vector<UnitTable::Expired> UnitTable::expire(TimePoint now) {
     return expired;
 }
 
+std::optional<TimePoint> UnitTable::next_expiry() const {
+    std::optional<TimePoint> next;
+    for (const UnitKey& key : leased_) {
+        const TimePoint expiry = entry(key)->expiry;
+        if (!next || expiry < *next) next = expiry;
+    }
+    return next;
+}
+
 std::set<uint32_t> UnitTable::lose(const UnitKey& key, uint32_t worker) {
     Entry* e = entry(key);
     if (!e || e->state == State::kDone) return {};

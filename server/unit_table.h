@@ -42,6 +42,8 @@ class UnitTable {
     };
     /// Puts units back whose lease ended before `now`, and returns them in the order in which they were leased.
     std::vector<Expired> expire(TimePoint now);
+    /// When the lease that ends first does; nothing if no unit is leased.
+    std::optional<TimePoint> next_expiry() const;
     /// Notes that `worker` went silent while it held the unit. Returns all workers that did, except those that have
     /// renewed the unit since.
     std::set<uint32_t> lose(const UnitKey& key, uint32_t worker);
@@ -110,6 +112,7 @@ class UnitTable {
     bool is_ours(const UnitKey& key) const { return key.tile < tile_count() && key == plan_.key(key.group, key.tile); }
     /// The record of a unit of an open group.
     Entry* entry(const UnitKey& key);
+    const Entry* entry(const UnitKey& key) const { return const_cast<UnitTable*>(this)->entry(key); }
     bool open_group();
     void make_pending(Entry& e);
 

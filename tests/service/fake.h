@@ -95,6 +95,7 @@ struct FakeService {
         };
         options.shuffle_seed = shuffle;
         options.clock = [this] { return TimePoint(std::chrono::milliseconds(now_ms)); };
+        options.longest_sleep_seconds = 0.02;  // nobody tells the ticker that the clock was turned
         if (change) change(options);
         coordinator = std::make_unique<Coordinator>(std::move(options));
         EXPECT_TRUE(coordinator->assets().put(root, manifest.canonical_text()).ok());

@@ -1,0 +1,232 @@
+#include "server/dispatch.h"
+
+#include "common/core/crash_point.h"
+#include "server/blame.h"
+#include "server/finish_job.h"
+#include "server/learn_job.h"
+#include "server/plan_job.h"
+
+namespace lightloom {
+namespace {
+
+constexpr double kLongestLeaseWait = 5;
+/// A waiting call looks by itself that often whether its caller is still there, and whether a worker that rested may go on.
+constexpr double kLookSeconds = 0.5;
+
+std::string describe(const BuildIdentity& identity) {
+    return "build " + identity.build_id + ", math profile \"" + identity.math_profile + "\", golden unit " +
+           identity.golden_digest.hex().substr(0, 16);
+}
+
+/// In the line of those that wait for as long as it lives.
+class InLine {
+  public:
+    explicit InLine(JobBook& book) : book_(book), place_(book.waiters.insert(book.waiters.end(), &waiter_)) {}
+    ~InLine() {
+        book_.waiters.erase(place_);
+        if (waiter_.look) book_.wake_one_waiter();  // it was told to look and did not
+    }
+    JobBook::Waiter& waiter() { return waiter_; }
+
+  private:
+    JobBook& book_;
+    JobBook::Waiter waiter_;
+    std::list<JobBook::Waiter*>::iterator place_;
+};
+
+}  // namespace
+
+Result<WorkerGrant> Dispatch::register_worker(const WorkerHello& hello) {
+    const CoordinatorOptions& options = office_.options;
+    if (hello.thread_count == 0) return invalid_argument("a worker needs at least one thread");
+    OpenBook book(office_);
+    if (hello.identity != options.identity) {
+        const Status refusal = failed_precondition(
+            "this worker could render other pixels than the coordinator and is refused: worker has " + describe(hello.identity) +
+            "; coordinator has " + describe(options.identity) + "; install the same build on both hosts");
+        book.note().error("worker on " + hello.host + " (process " + std::to_string(hello.process_id) + "): " + refusal.message());
+        book->workers.refuse(hello, refusal.message(), office_.now());
+        return refusal;
+    }
+    const WorkerRecord& worker = book->workers.add(hello, office_.now());
+    book.note().info(worker.id + ": registered, " + std::to_string(hello.thread_count) + " thread(s)");
+    return WorkerGrant{worker.id, options.heartbeat_seconds, options.lease_seconds};
+}
+
+Dispatch::Turn Dispatch::next_unit(OpenBook& book, WorkerRecord& worker, std::optional<UnitLease>* lease) {
+    const TimePoint now = office_.now();
+    WorkerRegistry& workers = book->workers;
+    if (!worker.has_room() || workers.rests(worker, now)) return Turn::kNotForThisOne;
+    const auto anyone_else = [&](const std::set<uint32_t>& but) { return workers.anyone_else(but, now); };
+    // A worker gets a second unit only if enough are left for the workers that have none: a unit must not wait behind
+    // another one while a worker idles.
+    const size_t idle = worker.held.empty() ? 0 : workers.idle();
+    bool passed_over = false;
+    for (const auto& [number, in_line] : book->open_jobs()) {
+        const JobPtr file = book->in_its_place(in_line);
+        Job& job = file->job;
+        if (file != in_line && job.state() != JobState::kPreparing) continue;
+        UnitTable* const units = job.open_units();
+        if (!units || !units->has_more_than(0)) continue;
+        passed_over = true;
+        if (!worker.held.empty() && !units->has_more_than(idle)) continue;
+        const auto unit = units->lease(worker.index, office_.lease_end(), anyone_else);
+        if (!unit) continue;
+        book.look_again(file, office_.lease_end());
+        const bool render = unit->key.kind == UnitKind::kRender;
+        worker.held.insert({job.id(), unit->key});
+        crash_point("server.unit-leased");
+        if (render) {
+            *lease = UnitLease{job.id(), job.spec(), *unit, job.tables().asset};
+            return Turn::kLeased;
+        }
+        Preparation& preparation = job.preparation();
+        if (preparation.round_begin == TimePoint()) preparation.round_begin = now;
+        if (preparation.learning_seconds > 0) preparation.start_clock(now);  // it goes on
+        *lease = UnitLease{job.id(), job.spec(), *unit, preparation.guide};
+        if (preparation.training_begin == TimePoint()) {
+            preparation.training_begin = preparation.round_begin;
+            start_learning(office_, book, file);
+        }
+        return Turn::kLeased;
+    }
+    return passed_over ? Turn::kNotForThisOne : Turn::kNothingLeft;
+}
+
+Result<std::vector<UnitLease>> Dispatch::lease(const std::string& worker_id, double wait_seconds,
+                                               const std::function<bool()>& cancelled) {
+    if (!(wait_seconds >= 0)) return invalid_argument("a worker waits for 0 or more seconds");
+    const auto deadline = seconds_after(std::chrono::steady_clock::now(), std::min(wait_seconds, kLongestLeaseWait));
+    OpenBook book(office_);
+    WorkerRecord* const worker = book->workers.find(worker_id);
+    if (!worker) return no_worker(worker_id);
+    ++worker->waiting;
+    std::vector<UnitLease> leases;
+    {
+        InLine place(*book);
+        while (!book->closing && !worker->left && !cancelled()) {
+            worker->last_heard = office_.now();
+            std::optional<UnitLease> unit;
+            const bool woken = std::exchange(place.waiter().look, false);
+            const Turn turn = next_unit(book, *worker, &unit);
+            // Where there may be more, the next in line looks, too.
+            if (turn == Turn::kLeased || (woken && turn == Turn::kNotForThisOne)) {
+                place.waiter().look = true;  // not this one again
+                book->wake_one_waiter();
+                place.waiter().look = false;
+            }
+            if (unit) {
+                leases.push_back(*std::move(unit));
+                break;
+            }
+            const auto now = std::chrono::steady_clock::now();
+            if (now >= deadline) break;
+            const auto until = std::min(deadline, seconds_after(now, kLookSeconds));
+            while (!place.waiter().look && std::chrono::steady_clock::now() < until) book.wait_until(place.waiter().woken, until);
+        }
+    }
+    --worker->waiting;
+    if (book->closing) return Status(StatusCode::kUnavailable, "the coordinator is going down");
+    return leases;
+}
+
+void Dispatch::wake() { OpenBook(office_)->wake_all_waiters(); }
+
+Result<std::vector<UnitReference>> Dispatch::heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running) {
+    OpenBook book(office_);
+    WorkerRecord* const worker = book->workers.find(worker_id);
+    if (!worker) return no_worker(worker_id);
+    const TimePoint now = office_.now();
+    worker->last_heard = now;
+    std::vector<UnitReference> revoked;
+    std::set<UnitReference> held;
+    worker->in_work.reset();
+    for (const RunningUnit& item : running) {
+        const JobPtr file = book->find(item.unit.job_id);
+        UnitTable* const units = file ? file->job.open_units(item.unit.key) : nullptr;
+        if (!units || !units->renew(item.unit.key, worker->index, office_.lease_end())) {
+            revoked.push_back(item.unit);
+            continue;
+        }
+        book.look_again(file, office_.lease_end());
+        held.insert(item.unit);
+        if (!item.rendering) continue;
+        worker->in_work = item.unit;
+        if (item.unit.key.kind != UnitKind::kRender) {
+            file->job.preparation().start_clock(now);
+        } else {
+            book.apply(file, file->job.rendering_begins(now));
+            if (const auto end = file->job.end_of_time()) book.look_again(file, *end);
+        }
+    }
+    // A lease whose answer was lost on the way is not in `running`; it expires by itself.
+    worker->held = std::move(held);
+    return revoked;
+}
+
+Status Dispatch::release(const std::string& worker_id, const UnitReference& unit, const Status& why) {
+    const bool lost_bytes = why.code() == StatusCode::kDataLoss || why.code() == StatusCode::kNotFound;
+    const bool repaired = lost_bytes && repair_tables(office_, unit.job_id);
+    OpenBook book(office_);
+    WorkerRecord* const worker = book->workers.find(worker_id);
+    if (!worker) return no_worker(worker_id);
+    worker->held.erase(unit);
+    const JobPtr file = book->find(unit.job_id);
+    UnitTable* const units = file ? file->job.open_units(unit.key) : nullptr;
+    if (!units) return {};
+    // Network errors say nothing about the unit and only cost time.
+    const bool blameless = repaired || why.code() == StatusCode::kCancelled || why.code() == StatusCode::kUnavailable ||
+                           why.code() == StatusCode::kDeadlineExceeded || why.code() == StatusCode::kAborted;
+    if (why.ok() || blameless) {
+        units->release(unit.key, worker->index);
+        book.units_appeared();
+    } else {
+        if (why.code() != StatusCode::kInvalidArgument) book->workers.unit_failed(*worker, office_.now());  // else it is the job
+        const UnitTable::Failures failures = units->fail(unit.key, worker->index);
+        unit_failed(book, file, unit.key, failures, {why.code(), worker->id + ": " + why.message()});
+    }
+    file->job.stop_idle_clock(office_.now());
+    return {};
+}
+
+Status Dispatch::goodbye(const std::string& worker_id) {
+    OpenBook book(office_);
+    WorkerRecord* const worker = book->workers.find(worker_id);
+    if (!worker) return no_worker(worker_id);
+    for (const auto& [number, file] : book->open_jobs()) {
+        UnitTable* const units = file->job.open_units();
+        if (!units || units->leased_count() == 0) continue;
+        units->release_all(worker->index);
+        file->job.stop_idle_clock(office_.now());
+    }
+    worker->held.clear();
+    worker->left = true;
+    book.note().info(worker_id + ": left");
+    book->wake_all_waiters();
+    return {};
+}
+
+std::vector<WorkerStatus> Dispatch::workers(double gone_within_seconds) const {
+    return OpenBook(office_)->workers.statuses(office_.now(), gone_within_seconds);
+}
+
+void Dispatch::tick(OpenBook& book) {
+    const TimePoint now = office_.now();
+    for (const uint64_t number : book->agenda.take_due(now)) {
+        const JobPtr file = book->find(number);
+        UnitTable* const units = file ? file->job.open_units() : nullptr;
+        if (!units) continue;
+        if (const auto expired = units->expire(now); !expired.empty()) leases_expired(book, file, *units, expired, now);
+        file->job.stop_idle_clock(now);
+        if (file->job.time_is_up(now)) {
+            file->job.close();
+            finish_if_complete(office_, book, file);
+        }
+        if (file->job.ended()) continue;
+        if (const auto end = file->job.end_of_time()) book.look_again(file, *end);
+        if (const UnitTable* const open = file->job.open_units())
+            if (const auto expiry = open->next_expiry()) book.look_again(file, *expiry);
+    }
+}
+
+}  // namespace lightloom

@@ -1,0 +1,33 @@
+#pragma once
+// The desk for workers: they register, get units, say what they do and leave. See WorkerService for the errors.
+
+#include <functional>
+
+#include "server/office.h"
+
+namespace lightloom {
+
+class Dispatch {
+  public:
+    explicit Dispatch(Office& office) : office_(office) {}
+
+    Result<WorkerGrant> register_worker(const WorkerHello& hello);
+    Result<std::vector<UnitLease>> lease(const std::string& worker_id, double wait_seconds, const std::function<bool()>& cancelled);
+    /// Makes calls of lease() look at `cancelled` now; they do so by themselves twice a second.
+    void wake();
+    Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running);
+    Status release(const std::string& worker_id, const UnitReference& unit, const Status& why);
+    Status goodbye(const std::string& worker_id);
+    std::vector<WorkerStatus> workers(double gone_within_seconds) const;
+    /// Takes back leases that have run out and closes jobs whose time is over; says when there is more to do.
+    void tick(OpenBook& book);
+
+  private:
+    enum class Turn { kLeased, kNotForThisOne, kNothingLeft };
+    /// Leases a unit to the worker, if there is one for it.
+    Turn next_unit(OpenBook& book, WorkerRecord& worker, std::optional<UnitLease>* lease);
+
+    Office& office_;
+};
+
+}  // namespace lightloom

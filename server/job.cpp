@@ -1,0 +1,224 @@
+#include "server/job.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace lightloom {
+
+Job::Job(Submission submission, JobSpec canonical, TimePoint now)
+    : submission_(std::move(submission)),
+      spec_(std::move(canonical)),
+      created_(now) {}
+
+void Job::tell_rendering(TimePoint now, JobInfo* info) const {
+    if (!first_render_) return;
+    const bool over = ended() || state_ == JobState::kFinishing;
+    info->render_seconds = seconds_between(*first_render_, over ? finishing_ : now);
+    if (ended()) info->finish_seconds = seconds_between(finishing_, ended_);
+    if (over) {
+        info->eta_seconds = 0;
+    } else if (spec_.time_limit_seconds > 0) {
+        info->eta_seconds = std::max(0.0, seconds_left(now));
+    } else if (const double share = sample_share(*info); share > 0) {
+        info->eta_seconds = info->render_seconds * (1 - share) / share;
+    }
+    if (const auto share = noise_share(*info); share && !over) {
+        const double left = info->render_seconds * (1 - *share) / *share;
+        info->eta_seconds = info->eta_seconds < 0 ? left : std::min(info->eta_seconds, left);
+    }
+}
+
+JobInfo Job::info(TimePoint now, const std::optional<WaitsFor>& waits_for) const {
+    JobInfo info;
+    info.job_id = id();
+    info.state = state_;
+    info.spec = spec_;
+    info.algorithm = spec_.algorithm.name();
+    info.message = message_;
+    info.revision = revision_;
+    info.unit_total = only_noise_bounds(spec_) ? 0 : units_ ? units_->unit_total() : ended_units_.total;
+    info.unit_done = units_ ? units_->done_count() : ended_units_.done;
+    info.unit_leased = units_ ? units_->leased_count() : 0;
+    info.samples_per_pixel_done = merged_iterations_;
+    info.dropped_samples = dropped_;
+    info.camera_samples = counters_.camera_samples;
+    info.light_paths = counters_.light_paths;
+    info.rays = counters_.rays;
+    info.worker_count = uint32_t(workers_.size());
+    info.image_digest = image_digest_;
+    info.image_size_bytes = image_size_;
+    info.duplicates_same = incidents.duplicates_same;
+    info.duplicates_different = incidents.duplicates_different;
+    info.tables = tables_;
+    info.rare_light = rare_light_;
+    info.noise = noise_;
+    info.label = submission_.label;
+    info.scene = submission_.scene;
+    info.age_seconds = seconds_between(created_, now);
+    tell_rendering(now, &info);
+    if (prepared_ != TimePoint()) info.prepare_seconds = seconds_between(created_, prepared_);
+    if (waits_for) {
+        info.waits_for = waits_for->id;
+        info.eta_seconds = waits_for->eta_seconds;
+    }
+    preparation_.tell(now, state_ == JobState::kPreparing, &info);
+    return info;
+}
+
+double Job::seconds_left(TimePoint now) const {
+    const double learned = state_ == JobState::kPreparing ? preparation_.seconds_taken(now) : preparation_.learning_seconds;
+    return spec_.time_limit_seconds - learned - (first_render_ ? seconds_between(*first_render_, now) : 0);
+}
+
+bool Job::time_is_up(TimePoint now) const {
+    return state_ == JobState::kRunning && spec_.time_limit_seconds > 0 && first_render_ && !closed_ && seconds_left(now) <= 0;
+}
+
+std::optional<TimePoint> Job::end_of_time() const {
+    if (state_ != JobState::kRunning || spec_.time_limit_seconds <= 0 || !first_render_ || closed_) return std::nullopt;
+    return seconds_after(*first_render_, spec_.time_limit_seconds - preparation_.learning_seconds);
+}
+
+Effects Job::open_round(UnitKind kind, uint32_t number, const TrainingWork& work, std::optional<uint64_t> shuffle_seed) {
+    Effects effects;
+    if (preparation_.round) effects.throw_away(*std::move(preparation_.round));
+    preparation_.round.emplace(kind, number, work, shuffle_seed);
+    preparation_.round_begin = {};
+    preparation_.phase = kind == UnitKind::kProbe ? PreparePhase::kProbing : PreparePhase::kTracing;
+    effects.changed = effects.units = true;
+    return effects;
+}
+
+Effects Job::wait_for_tables() {
+    Effects effects;
+    // The state is that before its own tracing, in case the job has to begin again.
+    preparation_.training_begin = preparation_.work_begin = {};
+    preparation_.learning_seconds = 0;
+    if (preparation_.round) effects.throw_away(*std::move(preparation_.round));
+    preparation_.round.reset();
+    preparation_.phase = PreparePhase::kWaitingForTables;
+    effects.changed = true;
+    return effects;
+}
+
+Effects Job::begin_rendering(RenderPlan plan, TimePoint now) {
+    Effects effects;
+    if (state_ != JobState::kPreparing) {
+        effects.throw_away(std::move(plan));
+        return effects;
+    }
+    prepared_ = now;
+    preparation_.stop_clock(now);
+    spec_ = std::move(plan.spec);
+    layers_ = std::move(plan.layers);
+    units_ = std::move(plan.units);
+    reducer_ = std::move(plan.reducer);
+    tables_ = std::move(plan.tables);
+    effects.throw_away(std::exchange(preparation_.facts, {}));
+    if (preparation_.round) effects.throw_away(*std::move(preparation_.round));
+    preparation_.round.reset();
+    preparation_.guide_bytes.reset();
+    preparation_.guide = {};
+    state_ = JobState::kRunning;
+    const Rect& crop = spec_.frame.crop;
+    effects.info(id() + ": " + std::to_string(crop.width()) + "x" + std::to_string(crop.height()) + ", " +
+                 std::to_string(units_->tile_count()) + " tile(s), " + std::to_string(units_->unit_total()) + " unit(s)");
+    effects.changed = effects.units = true;
+    return effects;
+}
+
+UnitTable* Job::open_units() {
+    if (state_ == JobState::kRunning) return &*units_;
+    return state_ == JobState::kPreparing && preparation_.round ? &preparation_.round->units() : nullptr;
+}
+
+UnitTable* Job::open_units(const UnitKey& unit) {
+    UnitTable* const table = open_units();
+    if (!table) return nullptr;
+    if (state_ == JobState::kRunning) return unit.kind == UnitKind::kRender ? table : nullptr;
+    return unit == preparation_.round->key(unit.group) ? table : nullptr;
+}
+
+Effects Job::rendering_begins(TimePoint now) {
+    Effects effects;
+    if (first_render_) return effects;
+    first_render_ = now;
+    effects.changed = true;
+    return effects;
+}
+
+Effects Job::count(const Work& work) {
+    Effects effects;
+    workers_.insert(work.worker);
+    counters_ += work.counters;
+    dropped_ += work.dropped;
+    const uint32_t groups = reducer_->folded_groups();
+    if (groups > merged_groups_) {
+        merged_groups_ = groups;
+        merged_iterations_ = reducer_->iterations();
+        units_->advance(groups);
+        effects.units = true;  // groups open behind those that are complete
+    }
+    if (const auto noise = reducer_->noise()) {
+        noise_ = noise;
+        closed_ = closed_ || noise->reached;
+    }
+    effects.changed = true;
+    return effects;
+}
+
+Effects Job::finish_if_complete(TimePoint now, bool* finish) {
+    Effects effects;
+    *finish = false;
+    if (state_ != JobState::kRunning) return effects;
+    if (closed_ && merged_groups_ == 0) units_->limit_groups(1);  // an image needs at least one group
+    const bool all = units_->group_total() > 0 && merged_groups_ == units_->group_total();
+    if (!all && !(closed_ && merged_groups_ > 0)) return effects;
+    state_ = JobState::kFinishing;
+    finishing_ = now;
+    units_->close();
+    *finish = effects.changed = true;
+    return effects;
+}
+
+std::vector<UnitTable::Merged> Job::settle(const Image& image) {
+    image_digest_ = image.digest;
+    image_size_ = image.size;
+    merged_groups_ = reducer_->folded_groups();
+    merged_iterations_ = reducer_->iterations();
+    // Results of groups that are not in the image do not count; what was summed just before freeze() does.
+    units_->advance(merged_groups_);
+    auto merged = units_->merged();
+    for (const UnitTable::Merged& unit : merged) workers_.insert(unit.worker);
+    counters_ = reducer_->counters();
+    dropped_ = reducer_->dropped();
+    rare_light_ = image.rare_light;
+    noise_ = image.noise;
+    return merged;
+}
+
+Effects Job::end(JobState state, std::string message, TimePoint now) {
+    Effects effects;
+    if (ended()) return effects;
+    if (state_ == JobState::kPreparing || state_ == JobState::kRunning) finishing_ = now;
+    state_ = state;
+    message_ = std::move(message);
+    ended_ = now;
+    if (units_) {
+        ended_units_ = {units_->unit_total(), units_->done_count()};
+        effects.throw_away(*std::move(units_));
+        units_.reset();
+    }
+    effects.throw_away(std::exchange(preparation_.facts, {}));
+    if (preparation_.round) effects.throw_away(*std::move(preparation_.round));
+    preparation_.round.reset();
+    preparation_.guide_bytes.reset();
+    if (reducer_) effects.discard.push_back(std::move(reducer_));
+    reducer_.reset();
+    effects.throw_away(std::exchange(layers_, {}));
+    effects.info(id() + ": " + std::string(to_string(state_)) + (message_.empty() ? "" : ": ") + message_);
+    effects.changed = effects.ended = effects.units = true;
+    return effects;
+}
+
+}  // namespace lightloom

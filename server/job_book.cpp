@@ -1,0 +1,79 @@
+#include "server/job_book.h"
+
+namespace lightloom {
+namespace {
+
+template <class Key>
+JobPtr find_in(const std::map<Key, JobPtr>& jobs, const Key& key) {
+    const auto known = jobs.find(key);
+    return known == jobs.end() ? nullptr : known->second;
+}
+
+}  // namespace
+
+JobPtr JobBook::add(Job job) {
+    auto file = std::make_shared<JobFile>(std::move(job), next_++);
+    jobs_.emplace(file->number, file);
+    open_.emplace(file->number, file);
+    ids_.emplace(file->job.id(), file);
+    requests_.emplace(file->job.submission().request_id, file);
+    return file;
+}
+
+JobPtr JobBook::find(const std::string& id) const { return find_in(ids_, id); }
+JobPtr JobBook::find(uint64_t number) const { return find_in(jobs_, number); }
+JobPtr JobBook::find_request(const std::string& request_id) const { return find_in(requests_, request_id); }
+
+void JobBook::job_ended(const JobFile& file) {
+    auto node = open_.extract(file.number);
+    if (!node.empty()) ended_.insert(std::move(node));
+}
+
+std::vector<JobPtr> JobBook::forget_ended(size_t kept) {
+    std::vector<JobPtr> forgotten;
+    for (auto next = ended_.begin(); next != ended_.end() && ended_.size() > kept;) {
+        const JobPtr file = next->second;
+        if (file->running_tasks > 0) {
+            ++next;
+            continue;
+        }
+        next = ended_.erase(next);
+        jobs_.erase(file->number);
+        ids_.erase(file->job.id());
+        requests_.erase(file->job.submission().request_id);
+        forgotten.push_back(file);
+    }
+    return forgotten;
+}
+
+JobPtr JobBook::in_its_place(const JobPtr& file) const {
+    const uint64_t maker = ledger.maker_of_last_resort(file->number);
+    return maker == file->number ? file : find(maker);
+}
+
+JobInfo JobBook::info(const JobFile& file, TimePoint now) const {
+    std::optional<Job::WaitsFor> waits_for;
+    if (const auto number = ledger.waits_for(file.number)) {
+        const JobPtr maker = find(*number);
+        waits_for = {maker->job.id(), info(*maker, now).eta_seconds};
+    }
+    return file.job.info(now, waits_for);
+}
+
+void JobBook::wake_one_waiter() {
+    for (Waiter* waiter : waiters) {
+        if (waiter->look) continue;
+        waiter->look = true;
+        waiter->woken.notify_one();
+        return;
+    }
+}
+
+void JobBook::wake_all_waiters() {
+    for (Waiter* waiter : waiters) {
+        waiter->look = true;
+        waiter->woken.notify_one();
+    }
+}
+
+}  // namespace lightloom

@@ -1,0 +1,77 @@
+#pragma once
+// JobBook: all that the coordinator knows: the jobs by number, id and request, the workers, who makes which tables, who waits for a
+// unit, and when to look at which job again. It has no lock of its own: the office keeps it in a Guarded (office.h), and who has
+// a JobBook& holds the lock.
+
+#include <condition_variable>
+#include <list>
+#include <map>
+#include <memory>
+#include <set>
+#include <stop_token>
+#include <string>
+
+#include "server/agenda.h"
+#include "server/job.h"
+#include "server/table_ledger.h"
+#include "server/worker_registry.h"
+
+namespace lightloom {
+
+/// A job and what its tasks and watchers need. Shared, because a job may be forgotten while somebody still works for it.
+struct JobFile {
+    JobFile(Job j, uint64_t n) : job(std::move(j)), number(n) {}
+
+    Job job;                              ///< Only for who holds the lock of the book.
+    const uint64_t number;                ///< In the order of submission.
+    std::condition_variable_any changed;  ///< With the lock of the book: the job's revision has grown, or the coordinator closes.
+    std::stop_source stop;                ///< Ends the tasks of the job.
+    int running_tasks = 0;                ///< Under the lock of the book. A job is forgotten only when none runs.
+};
+using JobPtr = std::shared_ptr<JobFile>;
+
+class JobBook {
+  public:
+    explicit JobBook(double lease_seconds) : workers(lease_seconds) {}
+
+    JobPtr add(Job job);
+    /// Null if there is none.
+    JobPtr find(const std::string& id) const;
+    JobPtr find(uint64_t number) const;
+    JobPtr find_request(const std::string& request_id) const;
+    /// All jobs, oldest first; and those that have not ended.
+    const std::map<uint64_t, JobPtr>& jobs() const { return jobs_; }
+    const std::map<uint64_t, JobPtr>& open_jobs() const { return open_; }
+    /// The job has its last state.
+    void job_ended(const JobFile& file);
+    /// Takes out the oldest jobs that have ended, so that `kept` of them stay; those for which a task runs stay, too.
+    std::vector<JobPtr> forget_ended(size_t kept);
+
+    /// The job whose units a worker gets when it is the turn of `file`: the one that makes the tables for which that job waits,
+    /// which may be a younger one.
+    JobPtr in_its_place(const JobPtr& file) const;
+    JobInfo info(const JobFile& file, TimePoint now) const;
+
+    /// A call that waits for a unit.
+    struct Waiter {
+        std::condition_variable_any woken;
+        bool look = false;  ///< Whether it is to look for a unit now.
+    };
+    std::list<Waiter*> waiters;  ///< In the order in which they came.
+    /// Wakes the first of them that was not woken already.
+    void wake_one_waiter();
+    void wake_all_waiters();
+
+    WorkerRegistry workers;
+    TableLedger ledger;
+    Agenda agenda;
+    std::condition_variable_any agenda_changed;  ///< The ticker waits for it: something is due earlier than before.
+    bool closing = false;
+
+  private:
+    uint64_t next_ = 1;
+    std::map<uint64_t, JobPtr> jobs_, open_, ended_;
+    std::map<std::string, JobPtr> ids_, requests_;
+};
+
+}  // namespace lightloom

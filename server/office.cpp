@@ -1,0 +1,107 @@
+#include "server/office.h"
+
+#include <new>
+#include <stdexcept>
+
+namespace lightloom {
+
+Office::Office(CoordinatorOptions o)
+    : options(std::move(o)),
+      assets(options.directory / "assets"),
+      table_cache(options.table_cache, options.table_cache_bytes),
+      book(options.lease_seconds) {}
+
+void OpenBook::close() {
+    if (!access_) return;
+    access_.reset();
+    for (const Effects::Line& line : noted_.log) log_line(line.level, "{}", {line.text});
+    noted_ = {};  // frees what is large
+    for (const Digest& file : std::exchange(dropped_, {})) {
+        const MutexLock files(office_.tables_mutex);
+        const bool needed = Guarded<JobBook>::Access(office_.book)->ledger.pinned(file);
+        if (!needed) office_.assets.remove(file);
+    }
+}
+
+void OpenBook::changed(const JobPtr& file) {
+    file->job.touch();
+    file->changed.notify_all();
+    for (const uint64_t number : (*this)->ledger.waiting_for(file->number)) changed((*this)->find(number));
+}
+
+void OpenBook::look_again(const JobPtr& file, TimePoint when) {
+    if ((*this)->agenda.at_most(file->number, when)) (*this)->agenda_changed.notify_one();
+}
+
+void OpenBook::release_crowd(const JobPtr& maker) {
+    JobBook& book = **this;
+    const TablesInfo& tables = maker->job.tables();
+    for (const uint64_t number : book.ledger.waiting_for(maker->number)) {
+        const JobPtr file = book.find(number);
+        book.ledger.stop_waiting(number);
+        Preparation& preparation = file->job.preparation();
+        preparation.handed_over = {};
+        // The maker of a time-limited job may have settled for a smaller training set, which makes other tables.
+        if (tables.asset.size_bytes > 0 && tables.cache_key == preparation.table_key) {
+            preparation.handed_over = tables;
+            preparation.tables_file = tables.asset.digest;
+            book.ledger.pin(number, tables.asset.digest);
+        }
+        preparation.phase = PreparePhase::kReadingScene;
+        if (!book.closing) office_.resume(*this, file);
+    }
+}
+
+void OpenBook::apply(const JobPtr& file, Effects effects) {
+    JobBook& book = **this;
+    if (effects.ended) {
+        file->stop.request_stop();
+        release_crowd(file);
+        for (const Digest& tables : book.ledger.forget(file->number)) drop_tables(tables);
+        book.job_ended(*file);
+        forget_old_jobs();
+    }
+    if (effects.changed) changed(file);
+    if (effects.units) units_appeared();
+    noted_ += std::move(effects);
+}
+
+void OpenBook::forget_old_jobs() {
+    const size_t kept = office_.options.kept_jobs;
+    for (const JobPtr& old : (*this)->forget_ended(kept)) {
+        noted_.info(old->job.id() + ": forgotten; " + std::to_string(kept) + " newer jobs have ended");
+        noted_.discard.push_back(old);
+    }
+}
+
+void OpenBook::start(const JobPtr& file, const char* purpose, std::function<Status()> task) {
+    Office& office = office_;
+    const auto run = [&office, file, purpose, work = std::move(task)]() mutable {
+        const auto no_memory = [&] {
+            return Status(StatusCode::kResourceExhausted, std::string("the coordinator has too little memory ") + purpose);
+        };
+        Status status;
+        try {
+            status = work();
+        } catch (const std::bad_alloc&) {  // one job that is too large must not end the coordinator and all other jobs
+            status = no_memory();
+        } catch (const std::length_error&) {
+            status = no_memory();
+        }
+        work = {};
+        OpenBook book(office);
+        if (!status.ok() && !book->closing) book.fail(file, status);
+        --file->running_tasks;
+        book.forget_old_jobs();
+    };
+    ++file->running_tasks;
+    try {
+        office_.tasks.run(run);
+    } catch (const std::exception& e) {  // no thread, or no memory for one
+        --file->running_tasks;
+        fail(file,
+             {StatusCode::kResourceExhausted, std::string("the coordinator cannot start a thread ") + purpose + ": " + e.what()});
+    }
+}
+
+}  // namespace lightloom

@@ -1,0 +1,97 @@
+#pragma once
+// Office: what the desks of the coordinator share: the book of jobs behind its lock, the files, and the threads. A desk opens the
+// book (OpenBook), changes jobs, and notes what has to follow; that is carried out when the book is closed again.
+//
+// Locks: tables_mutex may be taken before the book, never while the book is open. While it is open only the locks of a reducer and
+// of the pool of threads are taken.
+
+#include <functional>
+
+#include "server/coordinator_options.h"
+#include "server/guarded.h"
+#include "server/job_book.h"
+#include "server/table_cache.h"
+#include "server/task_pool.h"
+
+namespace lightloom {
+
+class OpenBook;
+
+struct Office {
+    explicit Office(CoordinatorOptions o);
+
+    TimePoint now() const { return options.clock(); }
+    TimePoint lease_end() const { return seconds_after(now(), options.lease_seconds); }
+
+    const CoordinatorOptions options;
+    AssetStore assets;
+    const TableCache table_cache;
+    /// Lets a job go on that waited for another job's tables; see release_crowd(). Set once, before there are jobs.
+    std::function<void(OpenBook&, const JobPtr&)> resume;
+    Mutex tables_mutex;  ///< Held while files of tables are written, repaired or removed.
+    Guarded<JobBook> book;
+    TaskPool tasks;  ///< Last, so that tasks end before what they use.
+};
+
+/// The book is open, and its lock held, until close() or the end of the scope.
+class OpenBook {
+  public:
+    explicit OpenBook(Office& office) : office_(office) { access_.emplace(office.book); }
+    ~OpenBook() { close(); }
+    OpenBook(const OpenBook&) = delete;
+    OpenBook& operator=(const OpenBook&) = delete;
+
+    JobBook& operator*() const { return **access_; }
+    JobBook* operator->() const { return &**access_; }
+
+    /// Gives the lock back and carries out what was noted.
+    void close();
+    /// Opens it again after close().
+    void reopen() { access_.emplace(office_.book); }
+    /// Waits until the condition is notified or `until` is over, with the book closed; what was noted is carried out before, and
+    /// then it does not wait, because things may have changed meanwhile.
+    template <class Clock, class Duration>
+    void wait_until(std::condition_variable_any& condition, std::chrono::time_point<Clock, Duration> until) {
+        if (noted()) {
+            close();
+            reopen();
+        } else {
+            access_->wait_until(condition, until);
+        }
+    }
+
+    /// Takes over what a transition of the job asks for: tells those concerned now, and notes the rest.
+    void apply(const JobPtr& file, Effects effects);
+    /// A change that only those who watch the job see, or wait for its tables.
+    void changed(const JobPtr& file);
+    /// Units may be leased that could not be before.
+    void units_appeared() { (*this)->wake_one_waiter(); }
+    /// The job has to be looked at again at `when`.
+    void look_again(const JobPtr& file, TimePoint when);
+    /// Lines for the log, and large things that are freed without the lock.
+    Effects& note() { return noted_; }
+    /// The file of these tables may be removed, unless a job needs it by then.
+    void drop_tables(const Digest& file) { dropped_.push_back(file); }
+    /// The job does not need the file any more.
+    void unpin(const JobPtr& file, const Digest& tables) {
+        if ((*this)->ledger.unpin(file->number, tables)) drop_tables(tables);
+    }
+    void fail(const JobPtr& file, const Status& why) { apply(file, file->job.fail(why, office_.now())); }
+    /// Those that waited for the tables of the job go on: it has them, or will not make them.
+    void release_crowd(const JobPtr& maker);
+    /// Forgets the oldest ended jobs, where there are too many.
+    void forget_old_jobs();
+    /// Runs a task of the job on a thread. The task's error, too little memory or a missing thread fails this job only. `purpose`
+    /// completes "the coordinator has too little memory ...".
+    void start(const JobPtr& file, const char* purpose, std::function<Status()> task);
+
+  private:
+    bool noted() const { return !noted_.log.empty() || !noted_.discard.empty() || !dropped_.empty(); }
+
+    Office& office_;
+    std::optional<Guarded<JobBook>::Access> access_;
+    Effects noted_;
+    std::vector<Digest> dropped_;
+};
+
+}  // namespace lightloom

@@ -1,0 +1,131 @@
+#include "server/prepare_job.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "common/core/crash_point.h"
+#include "common/transport/parameters.h"
+#include "server/plan_job.h"
+#include "server/training_budget.h"
+
+namespace lightloom {
+namespace {
+
+/// This is checked before hours of rendering, because the system may hand out memory that it does not have and kill the process
+/// that uses it.
+Status check_memory(const Rect& crop, int64_t memory_bytes) {
+    const int64_t memory = memory_bytes > 0 ? memory_bytes : int64_t(::sysconf(_SC_PHYS_PAGES)) * ::sysconf(_SC_PAGESIZE);
+    if (memory <= 0 || crop.area() <= memory / kFrameBytesPerPixel) return {};
+    return {StatusCode::kResourceExhausted, "the frame has " + pixels_and_memory(crop.area()) + "; the coordinator's host has " +
+                                                std::to_string(memory / 1000000000) +
+                                                " GB, so lower the resolution or give a crop window"};
+}
+
+/// Looks the tables up; otherwise the job waits for them or begins to make them.
+Status prepare_tables(Office& office, const JobPtr& file, JobSpec spec, SceneFacts facts, bool may_wait) {
+    Job& job = file->job;
+    const bool chosen_size = job.submission().submitted.algorithm.chosen(kTrainingPaths);
+    if (spec.samples_per_pixel > 0 && spec.algorithm.has(kTrainingPaths) && !chosen_size) {
+        const uint64_t image_samples = uint64_t(spec.frame.crop.area()) * spec.samples_per_pixel;
+        const uint64_t samples = proportionate_training_samples(image_samples, learning_plan(spec.algorithm).samples);
+        spec.algorithm = spec.algorithm.with(kTrainingPaths, double(samples));
+    }
+    if (adopt_cached_tables(office, file, spec, facts)) return {};
+    OpenBook book(office);
+    if (job.state() != JobState::kPreparing) return {};
+    Preparation& preparation = job.preparation();
+    // A training set that the user chose is not made smaller, and neither is one that a probe has already chosen.
+    const bool open_size =
+        spec.time_limit_seconds > 0 && !chosen_size && !preparation.capped_by_time_limit && spec.algorithm.has(kTrainingPaths);
+    const uint64_t samples = learning_plan(spec.algorithm).samples;
+    preparation.table_key = table_key(office.options.identity, spec);
+    preparation.facts = std::move(facts);
+    preparation.may_wait = may_wait;
+    job.complete_spec(std::move(spec));
+    // Another job may take far longer to make the tables than this one's limit allows: therefore this job probes first,
+    // see TracingPort::settle().
+    const bool probes = open_size && samples > kMinTrainingSamples;
+    if (may_wait && !probes && wait_for_maker(book, file)) return {};
+    if (!probes) {
+        open_first_round(office, book, file);
+        return {};
+    }
+    const auto roomy = uint64_t(std::min(job.spec().time_limit_seconds * kProbeSamplesPerSecond, double(kTrainingUnitSamples)));
+    const uint64_t probe = std::min(std::max(kProbeSamples, roomy), samples);
+    open_training(office, book, file, UnitKind::kProbe, 0, {0, probe, probe});
+    return {};
+}
+
+Status prepare(Office& office, const JobPtr& file) {
+    JobSpec spec;
+    {
+        const OpenBook book(office);
+        spec = file->job.spec();
+    }
+    auto facts = office.options.read_scene(office.assets, spec, file->stop.get_token());
+    if (!facts.ok()) return facts.status();
+    crash_point("server.scene-read");
+    const Rect& crop = facts->frame.crop;
+    if (crop.empty() || crop.area() > kMaxPartialPixels)
+        return invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) + " pixels");
+    LL_RETURN_IF_ERROR(check_memory(crop, office.options.memory_bytes));
+    spec.frame = facts->frame;
+    if (spec.max_depth < 0) spec.max_depth = facts->max_depth;
+    if (spec.algorithm.learning()) return prepare_tables(office, file, std::move(spec), *std::move(facts), true);
+    plan_units(office, file, std::move(spec), *std::move(facts), {});
+    return {};
+}
+
+Status take_over_tables(Office& office, const JobPtr& file) {
+    JobSpec spec;
+    SceneFacts facts;
+    TablesInfo tables;
+    {
+        const OpenBook book(office);
+        if (file->job.state() != JobState::kPreparing) return {};
+        Preparation& preparation = file->job.preparation();
+        tables = std::exchange(preparation.handed_over, {});
+        tables.from_cache = true;
+        tables.capped_by_time_limit = preparation.capped_by_time_limit;
+        facts = std::move(preparation.facts);
+        spec = file->job.spec();
+    }
+    if (tables.asset.size_bytes == 0) return prepare_tables(office, file, std::move(spec), std::move(facts), true);
+    const auto bytes = office.assets.read(tables.asset.digest);
+    if (!bytes.ok()) return prepare_tables(office, file, std::move(spec), std::move(facts), false);
+    return adopt_tables(office, file, spec, facts, *bytes, std::move(tables));
+}
+
+}  // namespace
+
+void start_preparing(Office& office, OpenBook& book, const JobPtr& file) {
+    book.start(file, "to prepare this job: its scene or frame is too large", [&office, file] { return prepare(office, file); });
+}
+
+void start_taking_over(Office& office, OpenBook& book, const JobPtr& file) {
+    book.changed(file);
+    book.start(file, "to prepare this job: its frame or tables are too large",
+               [&office, file] { return take_over_tables(office, file); });
+}
+
+bool wait_for_maker(OpenBook& book, const JobPtr& file) {
+    const auto maker = book->ledger.maker_of(file->job.preparation().table_key, file->number);
+    if (!maker) return false;
+    book->ledger.wait(file->number, *maker);
+    book.note().info(file->job.id() + ": waits for the tables of " + book->find(*maker)->job.id());
+    book.apply(file, file->job.wait_for_tables());
+    book.release_crowd(file);  // who waits for it looks again, and finds the same maker
+    return true;
+}
+
+void open_training(Office& office, OpenBook& book, const JobPtr& file, UnitKind kind, uint32_t round, const TrainingWork& work) {
+    book.apply(file, file->job.open_round(kind, round, work, office.options.shuffle_seed));
+}
+
+void open_first_round(Office& office, OpenBook& book, const JobPtr& file) {
+    book->ledger.make(file->number, file->job.preparation().table_key);
+    open_training(office, book, file, UnitKind::kTraining, 0, learning_plan(file->job.spec().algorithm).work(0));
+}
+
+}  // namespace lightloom
