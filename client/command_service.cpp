@@ -22,6 +22,7 @@ constexpr const char* kSubmitFooter = R"(Examples:
   lightloom submit room.pbrt --server render1:50051 --detach          prints the job's id and returns
   lightloom fetch JOB --server render1:50051 -o out.exr               later
 
+The job's id is printed to standard error at once, unless --quiet: `watch`, `preview` and `cancel` take it from elsewhere.
 Files that the service has already are not sent again. Ctrl-C cancels the job.)";
 
 int submit_job(const ServiceOptions& options) {
@@ -43,6 +44,7 @@ int submit_job(const ServiceOptions& options) {
         std::printf("%s\n", job->job_id.c_str());
         return kSuccess;
     }
+    if (!options.job.quiet) std::fprintf(stderr, "lightloom: %s\n", job->job_id.c_str());
     const auto ended = watch(port, job->job_id, options.job.quiet, true);
     times.wait_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     if (!ended.ok()) return job_error(options, ended.status());

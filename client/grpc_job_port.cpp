@@ -23,18 +23,6 @@ constexpr size_t kDigestsPerCall = 1000;
 
 std::string seconds_text(double seconds) { return std::to_string(std::lround(seconds)) + " s"; }
 
-/// Whether there is a connection before `end`, and still time for a call. Looks after a moment only, so that no server is called
-/// without a pause.
-bool connected_before(Clock::time_point end, grpc::Channel& channel, const std::stop_token& stop) {
-    std::this_thread::sleep_for(kReconnectInterval);
-    // A proxy in front of a coordinator that is gone stays connected.
-    while (Clock::now() < end && !stop.stop_requested()) {
-        // Not GetState(): while nobody waits inside of gRPC, a connection makes a step every 5 s only.
-        if (channel.WaitForConnected(std::chrono::system_clock::now() + kReconnectInterval)) return true;
-    }
-    return false;
-}
-
 /// Cancels a call in which nothing was heard for a while. A deadline would be one of the whole call, whose length is not known.
 class SilenceLimit {
   public:
@@ -118,6 +106,11 @@ Result<std::string> collect(v1::JobService::Stub& stub,
                    [](const v1::Chunk& chunk) { return &chunk; });
 }
 
+template <class Value>
+const Status& status_of(const Result<Value>& result) {
+    return result.status();
+}
+
 Result<JobInfo> job_info(const Result<v1::Job>& answer) {
     if (!answer.ok()) return answer.status();
     return wire::get(*answer);
@@ -131,22 +124,50 @@ GrpcJobPort::GrpcJobPort(std::shared_ptr<grpc::Channel> channel, GrpcJobPortOpti
       jobs_(v1::JobService::NewStub(channel_)),
       assets_(v1::AssetService::NewStub(channel_)) {}
 
+bool GrpcJobPort::connected_before(Clock::time_point end, const std::stop_token& stop) {
+    if (!told_ && options_.on_lost) options_.on_lost();
+    told_ = true;
+    // Looks after a moment only, so that no server is called without a pause.
+    std::this_thread::sleep_for(kReconnectInterval);
+    // A proxy in front of a coordinator that is gone stays connected.
+    while (Clock::now() < end && !stop.stop_requested()) {
+        // Not GetState(): while nobody waits inside of gRPC, a connection makes a step every 5 s only.
+        if (channel_->WaitForConnected(std::chrono::system_clock::now() + kReconnectInterval)) return true;
+    }
+    return false;
+}
+
+template <class Call>
+std::invoke_result_t<Call> GrpcJobPort::insist(const Call& make) {
+    const std::stop_token stop = unless_requested(options_.stop);
+    const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(Seconds(options_.reconnect_seconds));
+    for (;;) {
+        auto answer = make();
+        if (status_of(answer).code() != StatusCode::kUnavailable) {
+            answered_ = true;
+            told_ = false;
+            return answer;
+        }
+        if (!answered_ || !connected_before(end, stop)) return answer;
+    }
+}
+
 Result<JobInfo> GrpcJobPort::submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label) {
     v1::SubmitJobRequest request;
     request.set_request_id(request_id);
     wire::put(spec, request.mutable_spec());
     wire::put(label, request.mutable_label());
-    return job_info(call(*jobs_, &v1::JobService::Stub::SubmitJob, request, 30));
+    return job_info(insist([&] { return call(*jobs_, &v1::JobService::Stub::SubmitJob, request, 30); }));
 }
 
 Result<JobInfo> GrpcJobPort::get_job(const std::string& job_id) {
     v1::GetJobRequest request;
     request.set_job_id(job_id);
-    return job_info(call(*jobs_, &v1::JobService::Stub::GetJob, request, 10));
+    return job_info(insist([&] { return call(*jobs_, &v1::JobService::Stub::GetJob, request, 10); }));
 }
 
 Result<std::vector<JobInfo>> GrpcJobPort::list_jobs() {
-    const auto response = call(*jobs_, &v1::JobService::Stub::ListJobs, {}, 10);
+    const auto response = insist([&] { return call(*jobs_, &v1::JobService::Stub::ListJobs, {}, 10); });
     if (!response.ok()) return response.status();
     return get_all<JobInfo>(response->jobs());
 }
@@ -154,7 +175,7 @@ Result<std::vector<JobInfo>> GrpcJobPort::list_jobs() {
 Result<std::vector<WorkerStatus>> GrpcJobPort::list_workers(double gone_within_seconds) {
     v1::ListWorkersRequest request;
     request.set_gone_within_seconds(gone_within_seconds);
-    const auto response = call(*jobs_, &v1::JobService::Stub::ListWorkers, request, 10);
+    const auto response = insist([&] { return call(*jobs_, &v1::JobService::Stub::ListWorkers, request, 10); });
     if (!response.ok()) return response.status();
     return get_all<WorkerStatus>(response->workers());
 }
@@ -162,7 +183,7 @@ Result<std::vector<WorkerStatus>> GrpcJobPort::list_workers(double gone_within_s
 Result<JobInfo> GrpcJobPort::cancel_job(const std::string& job_id) {
     v1::CancelJobRequest request;
     request.set_job_id(job_id);
-    return job_info(call(*jobs_, &v1::JobService::Stub::CancelJob, request, 10));
+    return job_info(insist([&] { return call(*jobs_, &v1::JobService::Stub::CancelJob, request, 10); }));
 }
 
 Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
@@ -187,14 +208,19 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<voi
             }
             on_change(*info);
             seen = info->revision;
-            heard = true;
+            heard = answered_ = true;
+            told_ = false;
         }
         const grpc::Status status = reader->Finish();
         const bool lost = status.error_code() == grpc::StatusCode::UNAVAILABLE;
         // A stream may have nothing to say for hours; one that ends as soon as it has begun does not begin the wait again.
         if (heard || Clock::now() - begin > patience) end = Clock::now() + patience;
-        const bool again = lost && !stop.stop_requested() && connected_before(end, *channel_, stop);
+        const bool again = lost && !stop.stop_requested() && connected_before(end, stop);
         if (stop.stop_requested()) return {StatusCode::kCancelled, "interrupted"};
+        if (seen > 0 && status.error_code() == grpc::StatusCode::NOT_FOUND)
+            return not_found("job " + job_id +
+                             " is not known any more: the coordinator was restarted without it, or has forgotten it; "
+                             "submit it again");
         if (!again) return wire::from_grpc(status);
     }
 }
@@ -203,7 +229,7 @@ Result<std::string> GrpcJobPort::image(const std::string& job_id, ImageKind kind
     v1::GetImageRequest request;
     request.set_job_id(job_id);
     request.set_kind(kind == ImageKind::kFinal ? v1::IMAGE_KIND_FINAL : v1::IMAGE_KIND_PREVIEW);
-    return collect(*jobs_, &v1::JobService::Stub::GetImage, request, options_);
+    return insist([&] { return collect(*jobs_, &v1::JobService::Stub::GetImage, request, options_); });
 }
 
 Result<Preview> GrpcJobPort::preview(const std::string& job_id, PreviewFormat format, double exposure) {
@@ -212,11 +238,13 @@ Result<Preview> GrpcJobPort::preview(const std::string& job_id, PreviewFormat fo
     request.set_format(format == PreviewFormat::kPng ? v1::PREVIEW_FORMAT_PNG : v1::PREVIEW_FORMAT_EXR);
     request.set_exposure_stops(exposure);
     Preview preview;
-    auto bytes = collect(*jobs_, &v1::JobService::Stub::GetPreview, request, options_, "; `lightloom preview` tries again",
-                         [&](const v1::GetPreviewResponse& message) -> const v1::Chunk* {
-                             if (message.has_header()) preview.samples_per_pixel = message.header().samples_per_pixel();
-                             return message.has_chunk() ? &message.chunk() : nullptr;
-                         });
+    const auto chunk_of = [&](const v1::GetPreviewResponse& message) -> const v1::Chunk* {
+        if (message.has_header()) preview.samples_per_pixel = message.header().samples_per_pixel();
+        return message.has_chunk() ? &message.chunk() : nullptr;
+    };
+    auto bytes = insist([&] {
+        return collect(*jobs_, &v1::JobService::Stub::GetPreview, request, options_, "; `lightloom preview` tries again", chunk_of);
+    });
     if (!bytes.ok()) return bytes.status();
     preview.bytes = *std::move(bytes);
     return preview;
@@ -225,7 +253,7 @@ Result<Preview> GrpcJobPort::preview(const std::string& job_id, PreviewFormat fo
 Result<std::string> GrpcJobPort::manifest(const std::string& job_id) {
     v1::GetManifestRequest request;
     request.set_job_id(job_id);
-    return collect(*jobs_, &v1::JobService::Stub::GetManifest, request, options_);
+    return insist([&] { return collect(*jobs_, &v1::JobService::Stub::GetManifest, request, options_); });
 }
 
 Result<std::vector<Digest>> GrpcJobPort::find_missing(const std::vector<Digest>& digests) {
@@ -234,7 +262,7 @@ Result<std::vector<Digest>> GrpcJobPort::find_missing(const std::vector<Digest>&
         v1::FindMissingRequest request;
         for (size_t i = begin; i < std::min(begin + kDigestsPerCall, digests.size()); ++i)
             wire::put(digests[i], request.add_digests());
-        const auto response = call(*assets_, &v1::AssetService::Stub::FindMissing, request, 30);
+        const auto response = insist([&] { return call(*assets_, &v1::AssetService::Stub::FindMissing, request, 30); });
         if (!response.ok()) return response.status();
         const auto found = get_all<Digest>(response->missing());
         if (!found.ok()) return found.status();
@@ -246,7 +274,7 @@ Result<std::vector<Digest>> GrpcJobPort::find_missing(const std::vector<Digest>&
 Result<v1::QueryWriteResponse> GrpcJobPort::query_write(const Digest& digest) {
     v1::QueryWriteRequest request;
     wire::put(digest, request.mutable_digest());
-    return call(*assets_, &v1::AssetService::Stub::QueryWrite, request, 10, options_.stop);
+    return insist([&] { return call(*assets_, &v1::AssetService::Stub::QueryWrite, request, 10, options_.stop); });
 }
 
 Status GrpcJobPort::write(const Digest& digest, uint64_t size, uint64_t offset, const Source& source) {

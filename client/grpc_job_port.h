@@ -3,7 +3,10 @@
 
 #include <grpcpp/channel.h>
 
+#include <chrono>
+#include <functional>
 #include <stop_token>
+#include <type_traits>
 
 #include "common/work/service.h"
 #include "lightloom/v1/asset_service.grpc.pb.h"
@@ -17,9 +20,11 @@ struct GrpcJobPortOptions {
     std::stop_token stop;
     double silence_seconds = 120;        ///< In which nothing more of an image arrives.
     double upload_silence_seconds = 60;  ///< In which nothing more of a file arrives that another client is sending.
-    double reconnect_seconds = 5;        ///< In which a coordinator that is restarted is back.
+    double reconnect_seconds = 30;       ///< In which a coordinator that answered before is back.
+    std::function<void()> on_lost;       ///< Called when it stops answering and is waited for. May be empty.
 };
 
+/// For one thread at a time.
 class GrpcJobPort final : public JobPort {
   public:
     explicit GrpcJobPort(std::shared_ptr<grpc::Channel> channel, GrpcJobPortOptions options = {});
@@ -45,10 +50,19 @@ class GrpcJobPort final : public JobPort {
     /// One attempt, from `offset`.
     Status write(const Digest& digest, uint64_t size, uint64_t offset, const Source& source);
 
+    /// Makes a call, which may be made twice, until it is answered. Only of a coordinator that has answered before an answer is
+    /// waited for: a client that finds none should say so at once.
+    template <class Call>
+    std::invoke_result_t<Call> insist(const Call& make);
+    /// Waits for a connection until `end`, and tells of that once for every time that it is lost.
+    bool connected_before(std::chrono::steady_clock::time_point end, const std::stop_token& stop);
+
     std::shared_ptr<grpc::Channel> channel_;
     GrpcJobPortOptions options_;
     std::unique_ptr<v1::JobService::Stub> jobs_;
     std::unique_ptr<v1::AssetService::Stub> assets_;
+    bool answered_ = false;  ///< The coordinator has answered something.
+    bool told_ = false;      ///< on_lost() was called since the last answer.
 };
 
 }  // namespace lightloom

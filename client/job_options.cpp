@@ -9,6 +9,7 @@
 #include "client/default_algorithm.h"
 #include "common/cli/command_line.h"
 #include "common/cli/numbers.h"
+#include "common/core/utf8.h"
 #include "common/import/features.h"
 #include "common/path/path_view.h"
 #include "common/scene/scene.h"
@@ -115,7 +116,7 @@ void add_output_settings(cli::App command, JobOptions& options) {
                     "Stop after so many seconds of learning and rendering, at a number of samples that --spp can reproduce; "
                     "reading the scene and waiting for a service's workers come on top")
         ->type_name("SECONDS")
-        ->check(number_between(0.001, 30 * 86400.0))
+        ->check(number_between(kMinTimeLimit, kMaxTimeLimit))
         ->excludes(spp);
     command
         .add_option("--noise", options.noise_target,
@@ -184,6 +185,7 @@ Result<JobSpec> make_spec(const JobOptions& options, const LocalScene& scene) {
     spec.algorithm = *std::move(algorithm);
     spec.seed = options.seed;
     spec.time_limit_seconds = options.time_seconds;
+    LL_RETURN_IF_ERROR(check_time_limit(spec.time_limit_seconds));
     spec.samples_per_pixel = options.samples_per_pixel;
     spec.noise_target = options.noise_target;
     if (spec.noise_target > 0 && spec.samples_per_pixel > 0 && spec.samples_per_pixel < NoiseEstimate::kLeastGroups)
@@ -243,7 +245,8 @@ int exit_code_of(const Status& status) {
 }
 
 int report_error(const Status& status) {
-    std::fprintf(stderr, "lightloom: %s\n", status.message().c_str());
+    // What a service or a worker said may be part of it.
+    std::fprintf(stderr, "lightloom: %s\n", one_line(status.message()).c_str());
     return exit_code_of(status);
 }
 

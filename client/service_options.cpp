@@ -1,5 +1,7 @@
 #include "client/service_options.h"
 
+#include <cstdio>
+
 #include "client/commands.h"
 #include "client/run_job.h"
 #include "common/cli/command_line.h"
@@ -19,7 +21,10 @@ void add_job_argument(cli::App command, ServiceOptions& options) {
 
 GrpcJobPort connect(const ServiceOptions& options) {
     (void)interrupt_token();  // before gRPC makes threads
-    return GrpcJobPort(open_channel(options.server), {.stop = interrupt_token()});
+    const auto tell = [server = options.server] {
+        std::fprintf(stderr, "lightloom: no answer from %s any more; waiting for it to come back\n", server.c_str());
+    };
+    return GrpcJobPort(open_channel(options.server), {.stop = interrupt_token(), .on_lost = tell});
 }
 
 namespace {

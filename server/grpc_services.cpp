@@ -2,6 +2,7 @@
 
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/impl/server_builder_option.h>
 #include <grpcpp/server_builder.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -40,19 +41,30 @@ bool socket_is_served(const std::string& path) {
     return answered;
 }
 
+/// Takes reflection away again: the plugin adds itself to every server of a program that it is linked to.
+class WithoutReflection final : public grpc::ServerBuilderOption {
+  public:
+    void UpdateArguments(grpc::ChannelArguments*) override {}
+    void UpdatePlugins(std::vector<std::unique_ptr<grpc::ServerBuilderPlugin>>* plugins) override {
+        const std::string reflection = grpc::reflection::ProtoServerReflectionPlugin().name();
+        std::erase_if(*plugins, [&](const auto& plugin) { return plugin->name() == reflection; });
+    }
+};
+
 }  // namespace
 
 GrpcServer::GrpcServer() = default;
 
-Result<std::unique_ptr<GrpcServer>> GrpcServer::start(Coordinator& coordinator, const std::string& address) {
+Result<std::unique_ptr<GrpcServer>> GrpcServer::start(Coordinator& coordinator, const std::string& address,
+                                                      const GrpcServerOptions& options) {
     const Status taken(StatusCode::kUnavailable, "cannot listen on " + address + "; is another coordinator running there?");
     constexpr std::string_view kUnix = "unix:";
     if (address.starts_with(kUnix) && socket_is_served(address.substr(kUnix.size()))) return taken;
     grpc::EnableDefaultHealthCheckService(true);
-    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     std::unique_ptr<GrpcServer> server(new GrpcServer);
     server->services_ = std::make_unique<Services>(coordinator);
     grpc::ServerBuilder builder;
+    if (!options.reflection) builder.SetOption(std::make_unique<WithoutReflection>());
     // One coordinator per port: without this a second one would share it silently.
     builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
     set_keepalive([&](const char* name, int value) { builder.AddChannelArgument(name, value); });
@@ -65,11 +77,17 @@ Result<std::unique_ptr<GrpcServer>> GrpcServer::start(Coordinator& coordinator, 
     builder.RegisterService(&server->services_->worker);
     server->server_ = builder.BuildAndStart();
     if (!server->server_ || server->port_ == 0) return taken;
+    server->health_ =
+        std::jthread([service = server->server_->GetHealthCheckService(), ready = options.ready](std::stop_token stop) {
+            follow_health(
+                ready, [&](bool healthy) { service->SetServingStatus(healthy); }, stop);
+        });
     return server;
 }
 
 GrpcServer::~GrpcServer() {
     if (!server_) return;
+    health_ = {};
     services_->closing = true;
     // Waiting handlers check `closing` several times a second; calls that do not end by themselves are cancelled.
     server_->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(3));

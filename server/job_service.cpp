@@ -30,6 +30,7 @@ grpc::Status send(const Result<std::string>& bytes, grpc::ServerWriter<v1::Chunk
 grpc::Status JobServiceImpl::SubmitJob(grpc::ServerContext*, const v1::SubmitJobRequest* request, v1::Job* response) {
     const auto spec = wire::get(request->spec());
     if (!spec.ok()) return wire::to_grpc(spec.status());
+    if (const Status s = check_time_limit(spec->time_limit_seconds); !s.ok()) return wire::to_grpc(s);
     return answer(coordinator_.submit_job(request->request_id(), *spec, wire::get(request->label())), response);
 }
 

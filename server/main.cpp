@@ -19,6 +19,7 @@
 #include "common/work/identity.h"
 #include "server/data_lock.h"
 #include "server/grpc_services.h"
+#include "server/health.h"
 #include "server/host_port.h"
 #include "server/local_ports.h"
 #include "server/scene_reader.h"
@@ -73,7 +74,7 @@ int main(int argc, char** argv) {
     double lease = 10;
     uint32_t threads = 0;
     uint64_t table_cache_mib = 4096;
-    bool plaintext = false;
+    bool plaintext = false, reflection = false;
     std::optional<uint64_t> shuffle;
     app.add_option("--listen", listen, "Where clients and workers connect; port 0 picks a free one; unix:PATH is a socket file")
         ->type_name("HOST:PORT")
@@ -83,7 +84,7 @@ int main(int argc, char** argv) {
                    "such job) and the table cache (tables/)")
         ->type_name("DIR")
         ->capture_default_str();
-    app.add_option("--status", status, "Where the status page is (/healthz, /api/v1/status), or off")
+    app.add_option("--status", status, "Where the status page is (/healthz, /readyz, /api/v1/status), or off")
         ->type_name("HOST:PORT")
         ->capture_default_str();
     app.add_option("--lease", lease, "Seconds without a heartbeat after which a unit goes to another worker")
@@ -105,6 +106,7 @@ int main(int argc, char** argv) {
                    "File for \"GRPC_PORT STATUS_PORT\", written once both listen (a unix: socket has port 0)")
         ->type_name("FILE");
     app.add_flag("--allow-plaintext", plaintext, "Let --listen and --status name other than loopback addresses");
+    app.add_flag("--reflection", reflection, "Let grpcurl and its like list the calls");
     add_log_option(app, level);
     add_completion_option(app);
     add_version_option(app, kBuildId);
@@ -140,11 +142,15 @@ int main(int argc, char** argv) {
     const auto lock = DataLock::take(data);
     if (!lock.ok()) return report_failure(lock.status());
     Coordinator coordinator(std::move(options));
-    auto server = GrpcServer::start(coordinator, listen);
+    Heartbeat heart;
+    // Looking for a job takes the lock under which everything happens: while that answers, the coordinator turns.
+    const Pulse pulse(heart, [&coordinator] { (void)coordinator.get_job({}); });
+    const HealthChecks health = make_health_checks(heart, data);
+    auto server = GrpcServer::start(coordinator, listen, {.reflection = reflection, .ready = health.ready});
     if (!server.ok()) return report_failure(server.status());
     std::unique_ptr<StatusHttp> http;
     if (status != "off") {
-        auto started = StatusHttp::start(coordinator, status);
+        auto started = StatusHttp::start(coordinator, status, health);
         if (!started.ok()) {
             const int failed = report_failure(started.status());
             return started.status().code() == StatusCode::kInvalidArgument ? kBadCommandLine : failed;

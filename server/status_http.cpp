@@ -33,7 +33,19 @@ std::string status_json(const Coordinator& coordinator) {
     return status_text({{"jobs", std::move(jobs)}, {"workers", std::move(workers)}}, 1) + "\n";
 }
 
-http::response<http::string_body> respond(const Coordinator& coordinator, const http::request<http::empty_body>& request) {
+/// What requests are about.
+struct Watched {
+    const Coordinator& coordinator;
+    HealthChecks health;
+};
+
+void respond_health(const std::function<Status()>& check, http::response<http::string_body>& response) {
+    const Status status = check ? check() : Status();
+    if (!status.ok()) response.result(http::status::service_unavailable);
+    response.body() = (status.ok() ? "ok" : status.message()) + "\n";
+}
+
+http::response<http::string_body> respond(const Watched& watched, const http::request<http::empty_body>& request) {
     http::response<http::string_body> response;
     response.version(request.version());
     response.keep_alive(false);
@@ -45,13 +57,15 @@ http::response<http::string_body> respond(const Coordinator& coordinator, const 
         response.set(http::field::allow, "GET");
         response.body() = "GET only\n";
     } else if (target == "/healthz") {
-        response.body() = "ok\n";
+        respond_health(watched.health.live, response);
+    } else if (target == "/readyz") {
+        respond_health(watched.health.ready, response);
     } else if (target == "/api/v1/status") {
         response.set(http::field::content_type, "application/json");
-        response.body() = status_json(coordinator);
+        response.body() = status_json(watched.coordinator);
     } else {
         response.result(http::status::not_found);
-        response.body() = "not found; there are /healthz and /api/v1/status\n";
+        response.body() = "not found; there are /healthz, /readyz and /api/v1/status\n";
     }
     response.prepare_payload();
     return response;
@@ -60,9 +74,9 @@ http::response<http::string_body> respond(const Coordinator& coordinator, const 
 /// A connection has one request and one answer.
 class Session : public std::enable_shared_from_this<Session> {
   public:
-    Session(tcp::socket socket, const Coordinator& coordinator, int& connections)
+    Session(tcp::socket socket, const Watched& watched, int& connections)
         : stream_(std::move(socket)),
-          coordinator_(coordinator),
+          watched_(watched),
           connections_(connections) {
         ++connections_;
         parser_.header_limit(kMaxHeaderBytes);
@@ -79,7 +93,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   private:
     void answer() {
-        response_ = respond(coordinator_, parser_.get());
+        response_ = respond(watched_, parser_.get());
         stream_.expires_after(kTimeout);
         http::async_write(stream_, response_, [self = shared_from_this()](beast::error_code, size_t) {
             beast::error_code ignored;
@@ -91,14 +105,14 @@ class Session : public std::enable_shared_from_this<Session> {
     beast::flat_buffer buffer_{kMaxHeaderBytes + 1024};
     http::request_parser<http::empty_body> parser_;
     http::response<http::string_body> response_;
-    const Coordinator& coordinator_;
+    const Watched& watched_;
     int& connections_;
 };
 
 }  // namespace
 
 struct StatusHttp::Impl {
-    explicit Impl(const Coordinator& c) : coordinator(c), acceptor(context) {}
+    Impl(const Coordinator& coordinator, HealthChecks health) : watched{coordinator, std::move(health)}, acceptor(context) {}
 
     void accept() {
         acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
@@ -106,7 +120,7 @@ struct StatusHttp::Impl {
             // Above the limit a connection is closed without an answer, so that this endpoint never starves the
             // renderer.
             if (!error && connections < kMaxConnections)
-                std::make_shared<Session>(std::move(socket), coordinator, connections)->start();
+                std::make_shared<Session>(std::move(socket), watched, connections)->start();
             if (!error) return accept();
             // A lasting error (no descriptor is left) must not turn this into a busy loop.
             pause.expires_after(kPause);
@@ -116,7 +130,7 @@ struct StatusHttp::Impl {
         });
     }
 
-    const Coordinator& coordinator;
+    const Watched watched;
     int connections = 0;  // for the one thread; outlives `context`, whose end destroys sessions
     asio::io_context context{1};
     tcp::acceptor acceptor;
@@ -133,10 +147,11 @@ StatusHttp::~StatusHttp() {
 
 int StatusHttp::port() const { return impl_->acceptor.local_endpoint().port(); }
 
-Result<std::unique_ptr<StatusHttp>> StatusHttp::start(const Coordinator& coordinator, const std::string& address) {
+Result<std::unique_ptr<StatusHttp>> StatusHttp::start(const Coordinator& coordinator, const std::string& address,
+                                                      HealthChecks health) {
     const auto parsed = parse_host_port(address, "--status");
     if (!parsed.ok()) return parsed.status();
-    auto impl = std::make_unique<Impl>(coordinator);
+    auto impl = std::make_unique<Impl>(coordinator, std::move(health));
     beast::error_code error;
     const auto literal = asio::ip::make_address(parsed->host == "localhost" ? "127.0.0.1" : parsed->host, error);
     if (error) return invalid_argument("--status takes a literal address or localhost, not \"" + parsed->host + "\"");

@@ -1,11 +1,12 @@
 #pragma once
-// The status endpoint: GET /healthz and /api/v1/status over HTTP, for people and monitors. It has one thread, and
+// The status endpoint: GET /healthz, /readyz and /api/v1/status over HTTP, for people and monitors. It has one thread, and
 // everything about it is bounded.
 
 #include <memory>
 #include <string>
 
 #include "server/coordinator.h"
+#include "server/health.h"
 
 namespace lightloom {
 
@@ -13,7 +14,8 @@ class StatusHttp {
   public:
     /// `address`: HOST:PORT of a literal address or "localhost"; port 0 picks a free one. kUnavailable when it cannot be
     /// bound.
-    static Result<std::unique_ptr<StatusHttp>> start(const Coordinator& coordinator, const std::string& address);
+    static Result<std::unique_ptr<StatusHttp>> start(const Coordinator& coordinator, const std::string& address,
+                                                     HealthChecks health = {});
     ~StatusHttp();
     int port() const;
 

@@ -1,5 +1,7 @@
 #include "worker/grpc_worker_port.h"
 
+#include <chrono>
+
 #include "common/core/utf8.h"
 #include "common/work/grpc_call.h"
 
@@ -36,10 +38,17 @@ Result<SubmitAck> submit(v1::WorkerService::Stub& stub,
 
 }  // namespace
 
-GrpcWorkerPort::GrpcWorkerPort(const std::shared_ptr<grpc::Channel>& channel, double read_seconds)
+GrpcWorkerPort::GrpcWorkerPort(std::shared_ptr<grpc::Channel> channel, double read_seconds)
     : read_seconds_(read_seconds),
-      worker_(v1::WorkerService::NewStub(channel)),
-      assets_(v1::AssetService::NewStub(channel)) {}
+      channel_(std::move(channel)),
+      worker_(v1::WorkerService::NewStub(channel_)),
+      assets_(v1::AssetService::NewStub(channel_)) {}
+
+bool GrpcWorkerPort::wait_connected(double seconds) {
+    return channel_->WaitForConnected(
+        std::chrono::system_clock::now() +
+        std::chrono::duration_cast<std::chrono::system_clock::duration>(std::chrono::duration<double>(seconds)));
+}
 
 Result<WorkerGrant> GrpcWorkerPort::register_worker(const WorkerHello& hello) {
     v1::WorkerHello request;

@@ -12,7 +12,7 @@ namespace lightloom {
 class GrpcWorkerPort final : public WorkerPort {
   public:
     /// `read_seconds`: an asset that comes at less than 1 MB/s over this time is given up with kDeadlineExceeded.
-    explicit GrpcWorkerPort(const std::shared_ptr<grpc::Channel>& channel, double read_seconds = 60);
+    explicit GrpcWorkerPort(std::shared_ptr<grpc::Channel> channel, double read_seconds = 60);
     Result<WorkerGrant> register_worker(const WorkerHello& hello) override;
     Result<std::vector<UnitLease>> lease_units(const std::string& worker_id, double wait_seconds, std::stop_token stop) override;
     Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running) override;
@@ -23,9 +23,11 @@ class GrpcWorkerPort final : public WorkerPort {
     Status release_unit(const std::string& worker_id, const UnitReference& unit, const Status& why) override;
     Status goodbye(const std::string& worker_id) override;
     Status read_asset(const Digest& digest, uint64_t offset, const std::function<Status(std::string_view)>& sink) override;
+    bool wait_connected(double seconds) override;
 
   private:
     const double read_seconds_;
+    const std::shared_ptr<grpc::Channel> channel_;
     std::unique_ptr<v1::WorkerService::Stub> worker_;
     std::unique_ptr<v1::AssetService::Stub> assets_;
 };

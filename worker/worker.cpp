@@ -28,6 +28,8 @@ class Backoff {
 };
 
 constexpr double kLeaseWaitSeconds = 1;
+/// Between looks at whether a worker that waits for a connection is to stop.
+constexpr double kConnectSeconds = 0.2;
 constexpr int kSubmitAttempts = 40;
 /// Share of a probe's samples that is traced before it is timed, and the least number per thread.
 constexpr uint64_t kWarmUpShare = 8, kWarmUpPerThread = kTrainingChunkSamples;
@@ -69,6 +71,14 @@ void Worker::wait(double seconds, std::stop_token stop) {
     wake_.wait_for(lock, stop, std::chrono::duration<double>(seconds), [] { return false; });
 }
 
+void Worker::wait_after(const Status& failed, double seconds, std::stop_token stop) {
+    // Inside of the port: while nobody waits there, a connection makes a step every few seconds only.
+    if (failed.code() == StatusCode::kUnavailable)
+        while (!stop.stop_requested() && !port_.wait_connected(kConnectSeconds)) {
+        }
+    wait(seconds, stop);
+}
+
 Status Worker::sign_in(std::stop_token stop, const std::string& stale_id) {
     const std::lock_guard only_one(sign_in_mutex_);
     if (id() != stale_id) return {};  // another lane was faster
@@ -94,7 +104,7 @@ Status Worker::sign_in(std::stop_token stop, const std::string& stale_id) {
         }
         if (!complained) log_warn("waiting for the coordinator: {}", grant.status().message());
         complained = true;
-        wait(backoff.next(), stop);
+        wait_after(grant.status(), backoff.next(), stop);
     }
     return {StatusCode::kCancelled, "stopped"};
 }
@@ -154,7 +164,7 @@ void Worker::lane(std::stop_token stop) {
             if (!sign_in(stop, worker_id).ok()) return;
         } else if (!stop.stop_requested()) {
             log_debug("lease: {}", leases.status().message());
-            wait(backoff.next(), stop);
+            wait_after(leases.status(), backoff.next(), stop);
         }
     }
 }
@@ -265,7 +275,7 @@ Status Worker::submit(const UnitLease& lease, const Send& send, std::stop_token 
         if (code == StatusCode::kNotFound) {
             if (const Status status = sign_in(stop, worker_id); !status.ok()) return status;
         } else if (code == StatusCode::kUnavailable || code == StatusCode::kDeadlineExceeded) {
-            wait(backoff.next(), stop);
+            wait_after(ack.status(), backoff.next(), stop);
             if (stop.stop_requested() && attempt > 2) return {StatusCode::kCancelled, "this worker leaves"};
         } else {
             return ack.status();

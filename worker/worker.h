@@ -66,6 +66,9 @@ class Worker {
     void send_heartbeat();
     void announce_rendering(const UnitReference& unit);
     void wait(double seconds, std::stop_token stop);
+    /// Waits after a call that failed: for a connection if it failed for want of one, and then for `seconds`, so that not all
+    /// workers come at once, nor one that something else refuses.
+    void wait_after(const Status& failed, double seconds, std::stop_token stop);
 
     WorkerPort& port_;
     const WorkerOptions options_;

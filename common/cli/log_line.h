@@ -29,7 +29,8 @@ class LogValue {
     std::variant<std::string_view, int64_t, uint64_t, double> value_;
 };
 
-/// Prints one line, where the log's level lets it through.
+/// Prints one line, where the log's level lets it through. In texts, control characters and bytes that are not UTF-8 are replaced
+/// as by one_line().
 void log_line(LogLevel level, std::string_view format, std::initializer_list<LogValue> values);
 
 /// A format of {fmt} with as many fields ({} or {:.3f}, in order) as there are values, which the compiler checks.

@@ -43,7 +43,7 @@ std::optional<int> parse_and_log(CLI::App& app, int argc, char** argv, const std
     } catch (const CLI::ParseError& error) {
         return end_of_parse(app, error);
     }
-    set_up_logging(app.get_name(), level);
+    set_up_background_logging(app.get_name(), level);
     ::signal(SIGPIPE, SIG_IGN);  // whoever reads the log may go away; a farm does not end with it
     if (const Status armed = arm_crash_point_of_environment(); !armed.ok()) {
         print_error(armed.message());
@@ -76,6 +76,7 @@ void StopSignals::on_stop(std::function<void()> stop, int exit_code) const {
         signals.wait();
         stop();
         signals.wait();
+        flush_log(0.1);
         _exit(exit_code);
     }).detach();
 }

@@ -27,9 +27,9 @@ void add_version_option(CLI::App& app, const std::string& build);
 /// What is to be done when parse() has thrown: prints help or the version, or the mistake as one line "PROGRAM: message" on
 /// standard error. kStopped or kBadCommandLine.
 int end_of_parse(const CLI::App& app, const CLI::ParseError& error);
-/// Parses the command line of such a program, sets up its log at `level`, which an option may set and whose reader may go away, and
-/// arms the crash point that the environment names. An exit code where the program is to end now: after --help, and after a
-/// mistake, which was printed.
+/// Parses the command line of such a program, sets up its log at `level`, which an option may set and whose reader may go away or
+/// stop reading, and arms the crash point that the environment names. An exit code where the program is to end now: after --help,
+/// and after a mistake, which was printed.
 std::optional<int> parse_and_log(CLI::App& app, int argc, char** argv, const std::string& level);
 /// print_error(), behind `prefix`; the exit code of a program that it ends.
 int report_failure(const Status& status, const std::string& prefix = "");

@@ -1,6 +1,7 @@
 #include "common/work/service.h"
 
 #include <algorithm>
+#include <cstdio>
 
 #include "common/core/utf8.h"
 
@@ -67,6 +68,14 @@ Status check_label(const JobLabel& label) {
                                     std::to_string(JobLabel::kMaxBytes) + " bytes long");
     }
     return {};
+}
+
+Status check_time_limit(double seconds) {
+    if (seconds == 0 || (seconds >= kMinTimeLimit && seconds <= kMaxTimeLimit)) return {};
+    char text[160];
+    std::snprintf(text, sizeof text, "a time limit of %.3g s is not from 0.001 s to 30 days; give another, or a number of samples",
+                  seconds);
+    return invalid_argument(text);
 }
 
 std::optional<double> noise_share(const JobInfo& job) {

@@ -106,6 +106,12 @@ struct JobLabel {
 /// kInvalidArgument for a text that is too long, or that a terminal does not show as one line.
 Status check_label(const JobLabel& label);
 
+/// Shortest and longest time limit of a job, in seconds.
+inline constexpr double kMinTimeLimit = 0.001, kMaxTimeLimit = 30 * 86400.0;
+/// Of a job's time limit in seconds, where 0 stands for none: kInvalidArgument for any other number that is not from kMinTimeLimit
+/// to kMaxTimeLimit, or is none at all.
+Status check_time_limit(double seconds);
+
 /// The estimated error of a job's image, and what it decides; see the message NoiseSummary.
 struct NoiseReport {
     NoiseEstimate estimate;
@@ -226,6 +232,11 @@ class WorkerPort {
     virtual Status goodbye(const std::string& worker_id) = 0;
     /// Streams the asset from `offset` to its end into `sink`; stops with the sink's error.
     virtual Status read_asset(const Digest& digest, uint64_t offset, const std::function<Status(std::string_view)>& sink) = 0;
+    /// Waits until there is a connection, `seconds` at most; whether there is one. What is reached without a connection always is.
+    virtual bool wait_connected(double seconds) {
+        (void)seconds;
+        return true;
+    }
 };
 
 }  // namespace lightloom

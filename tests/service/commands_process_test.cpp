@@ -142,6 +142,25 @@ TEST(Commands, AJobThatRunsCanBeLookedAt) {
     EXPECT_EQ(service.digest("now"), service.digest("again"));
 }
 
+TEST(Commands, ASubmissionThatWaitsTellsTheJobsIdAtOnce) {
+    const Service service;
+    Client client(service);
+    // Without a worker neither ends.
+    Process loud("lightloom", {"submit", kScene, "--server", service.address(), "--spp", "4", "-o", service.path("loud.exr")},
+                 service.path("loud.log"));
+    ASSERT_TRUE(wait_until(60, [&] { return service.log("loud").find("lightloom: job-") != std::string::npos; }))
+        << service.log("loud");
+    const std::string log = service.log("loud");
+    const std::string id = log.substr(log.find("job-"), service.jobs().list_jobs()->front().job_id.size());
+    EXPECT_EQ(client.run({"cancel", id}), 0) << client.output;
+    EXPECT_EQ(loud.wait(), 130) << service.log("loud");
+    const auto quiet = service.submit("quiet", {"--spp", "4"});
+    ASSERT_TRUE(wait_until(60, [&] { return service.jobs().list_jobs()->size() == 2; })) << service.log("quiet");
+    EXPECT_EQ(client.run({"cancel", service.jobs().list_jobs()->back().job_id}), 0) << client.output;
+    EXPECT_EQ(quiet->wait(), 130);
+    EXPECT_EQ(service.log("quiet").find("lightloom: job-"), std::string::npos) << service.log("quiet");
+}
+
 TEST(Commands, AJobThatNobodyKnowsIsAFailureWithItsName) {
     const Service service;
     Client client(service);

@@ -32,6 +32,7 @@ class ForwardingPort : public WorkerPort {
     Status read_asset(const Digest& digest, uint64_t offset, const std::function<Status(std::string_view)>& sink) override {
         return port_.read_asset(digest, offset, sink);
     }
+    bool wait_connected(double seconds) override { return port_.wait_connected(seconds); }
 
   protected:
     WorkerPort& port_;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 #include <functional>
 
 #include "client/grpc_job_port.h"
@@ -54,6 +55,11 @@ TEST(Submission, OfAnAlgorithmOrParameterThatDoesNotExistIsRefusedClearly) {
     refuses([](v1::JobSpec& s) { (*s.mutable_parameters())["rr-min"] = "nan"; },
             "parameter rr-min=nan of 'bdpt' must be a number from 0.01 to 1");
     refuses([](v1::JobSpec& s) { (*s.mutable_parameters())["heuristic"] = "1.5"; }, "must be balance, power or maximum");
+    const auto refuses_time = [&](double seconds, const char* reason) {
+        refuses([&](v1::JobSpec& s) { s.clear_samples_per_pixel(), s.set_time_limit_seconds(seconds); }, reason);
+    };
+    for (const double seconds : {1e-300, 1e-4, 31 * 86400.0, -1.0}) refuses_time(seconds, "is not from 0.001 s to 30 days");
+    for (const double seconds : {double(INFINITY), double(NAN)}) refuses_time(seconds, "time_limit_seconds is not a finite number");
     EXPECT_TRUE(service.coordinator->list_jobs().empty());
     EXPECT_TRUE(submit([](v1::JobSpec& s) { (*s.mutable_parameters())["heuristic"] = "power"; }).ok()) << "a name of a choice";
     ASSERT_EQ(service.coordinator->list_jobs().size(), 1u);
@@ -194,6 +200,44 @@ TEST(Watch, GoesOnWhenTheCoordinatorIsBackInTime) {
     watch.join();
     EXPECT_TRUE(ended.ok()) << ended.message();
     EXPECT_GT(changes, 1);
+}
+
+TEST(Watch, TellsThatARestartedCoordinatorDoesNotKnowTheJob) {
+    FakeService before, after;
+    const std::string id = before.submit(before.spec(4));
+    auto server = std::move(GrpcServer::start(*before.coordinator, "127.0.0.1:0")).value();
+    const std::string address = "127.0.0.1:" + std::to_string(server->port());
+    std::atomic<int> lost{0}, changes{0};
+    GrpcJobPort jobs(open_channel(address), {.on_lost = [&] { ++lost; }});
+    Status ended;
+    std::jthread watch([&] { ended = jobs.watch_job(id, [&](const JobInfo&) { ++changes; }, {}); });
+    EXPECT_TRUE(testing::wait_until(60, [&] { return changes > 0; }));
+    server.reset();
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    const auto again = GrpcServer::start(*after.coordinator, address);
+    ASSERT_TRUE(again.ok()) << again.status().message();
+    watch.join();
+    EXPECT_EQ(ended.code(), StatusCode::kNotFound);
+    EXPECT_NE(ended.message().find(id + " is not known any more"), std::string::npos) << ended.message();
+    EXPECT_EQ(lost, 1);
+}
+
+TEST(Calls, GoOnOverARestartOfACoordinatorThatHasAnswered) {
+    FakeService service;
+    auto server = std::move(GrpcServer::start(*service.coordinator, "127.0.0.1:0")).value();
+    const std::string address = "127.0.0.1:" + std::to_string(server->port());
+    GrpcJobPort jobs(open_channel(address)), stranger(open_channel(address), {.reconnect_seconds = 60});
+    ASSERT_TRUE(jobs.list_jobs().ok());
+    server.reset();
+    const auto begin = Clock::now();
+    EXPECT_EQ(stranger.list_jobs().status().code(), StatusCode::kUnavailable);
+    EXPECT_LT(Clock::now() - begin, std::chrono::seconds(10)) << "nobody says that there ever was one";
+    std::jthread restart([&] {
+        std::this_thread::sleep_for(std::chrono::seconds(1));
+        server = std::move(GrpcServer::start(*service.coordinator, address)).value();
+    });
+    const auto submitted = jobs.submit_job("request", service.spec(4), {});
+    EXPECT_TRUE(submitted.ok()) << submitted.status().message();
 }
 
 /// What stands before a coordinator that is gone.

@@ -142,7 +142,7 @@ TEST(Processes, AClientNoticesThatTheCoordinatorHasGoneSilent) {
         return list.ok() && !list->empty() && list->front().state == JobState::kRunning;
     })) << service.log("image");
     service.server->signal(SIGSTOP);
-    EXPECT_TRUE(wait_until(60, [&] { return submitted->ended(); })) << "30 s until it notices, and 5 s for a restart";
+    EXPECT_TRUE(wait_until(120, [&] { return submitted->ended(); })) << "30 s until it notices, and 30 s for a restart";
     submitted->signal(SIGKILL);  // or else it might wait for ever
     EXPECT_EQ(submitted->wait(), 4);
     EXPECT_NE(service.log("image").find("no answer from " + service.address()), std::string::npos) << service.log("image");

@@ -1,10 +1,7 @@
 // Workers against a coordinator in process and over gRPC on loopback, with fake light.
 
-#include <arpa/inet.h>
 #include <grpcpp/create_channel.h>
 #include <gtest/gtest.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include "client/grpc_job_port.h"
 #include "server/grpc_services.h"
@@ -12,12 +9,14 @@
 #include "server/status_http.h"
 #include "tests/service/fake.h"
 #include "tests/service/forwarding_port.h"
+#include "tests/service/http.h"
 #include "worker/grpc_worker_port.h"
 
 namespace lightloom {
 namespace {
 
 using testing::FakeService;
+using testing::http;
 
 /// Workers that run until the object goes.
 class Crew {
@@ -129,23 +128,6 @@ TEST(Workers, JobPortOverGrpcDoesAllThatAClientNeeds) {
                       "nope", [](const JobInfo&) {}, stop.get_token())
                   .code(),
               StatusCode::kCancelled);
-}
-
-/// Sends `request` to a loopback port and returns all that comes back before the connection ends.
-std::string http(int port, const std::string& request) {
-    const int client = ::socket(AF_INET, SOCK_STREAM, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(uint16_t(port));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    std::string answer;
-    if (::connect(client, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0) {
-        (void)!::send(client, request.data(), request.size(), MSG_NOSIGNAL);
-        char buffer[4096];
-        for (ssize_t n; (n = ::recv(client, buffer, sizeof buffer, 0)) > 0;) answer.append(buffer, size_t(n));
-    }
-    ::close(client);
-    return answer;
 }
 
 TEST(StatusPage, AnswersGetAndSurvivesNonsense) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "common/cli/log.h"
 
 namespace lightloom {
@@ -16,6 +18,15 @@ TEST(LogLine, FillsFieldsInOrder) {
     const std::string line = testing::internal::GetCapturedStderr();
     EXPECT_NE(line.find("info"), line.npos) << line;
     EXPECT_NE(line.find("b{}r: -3 of 9223372036854775808 in 0.123 s, view\n"), line.npos) << line;
+}
+
+TEST(LogLine, StaysOneLineWhateverTheTextsHold) {
+    set_up_logging("log_line_test", "info");
+    testing::internal::CaptureStderr();
+    log_info("worker on {}: {}", "evil\n2030-01-01 error \x1b[2J", std::string("\xe2\x80\xae\xff"));
+    const std::string line = testing::internal::GetCapturedStderr();
+    EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
+    EXPECT_NE(line.find("worker on evil\\x0a2030-01-01 error \\x1b[2J: \\u202e\xef\xbf\xbd\n"), line.npos) << line;
 }
 
 TEST(LogLine, KeepsToTheLevel) {

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -65,6 +66,15 @@ class TempDirectory {
     ~TempDirectory() { fs::remove_all(path); }
     fs::path path;
 };
+
+TEST(TimeLimit, IsLongEnoughToBeOfUse) {
+    for (const double seconds : {0.0, 0.001, 1.0, 30 * 86400.0}) EXPECT_TRUE(check_time_limit(seconds).ok()) << seconds;
+    for (const double seconds : {1e-300, 0.00099, -1.0, 30 * 86401.0, double(INFINITY), double(NAN)}) {
+        const Status status = check_time_limit(seconds);
+        EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << seconds;
+        EXPECT_NE(status.message().find("is not from 0.001 s to 30 days"), std::string::npos) << status.message();
+    }
+}
 
 TEST(Plan, TilesCoverTheCropExactlyOnce) {
     for (const FrameLayout& f : {frame(64, 64), frame(512, 512), frame(1280, 720), frame(1921, 1083), frame(3, 5000),
