@@ -30,7 +30,8 @@ Status no_job(const std::string& id) {
 
 Status going_down() { return {StatusCode::kUnavailable, "the coordinator is going down"}; }
 
-/// The spec with all that it leaves to defaults but what the scene decides.
+}  // namespace
+
 Result<JobSpec> canonical_spec(const JobSpec& spec) {
     JobSpec out = spec;
     out.frame = {};
@@ -46,8 +47,7 @@ Result<JobSpec> canonical_spec(const JobSpec& spec) {
                                 " samples per pixel at least, from as many groups of which the noise is estimated");
     if (spec.samples_per_pixel > JobSpec::kMaxSamplesPerPixel)
         return invalid_argument("at most " + std::to_string(JobSpec::kMaxSamplesPerPixel) + " samples per pixel");
-    if (!(spec.time_limit_seconds >= 0 && spec.time_limit_seconds <= 30 * 86400.0))
-        return invalid_argument("the time limit must lie between 0 and 30 days");
+    LL_RETURN_IF_ERROR(check_time_limit(spec.time_limit_seconds));
     if (spec.max_depth < -1 || spec.max_depth >= kMaxEdges)
         return invalid_argument("max depth must lie between 0 and " + std::to_string(kMaxEdges - 1));
     if (spec.width < 0 || spec.height < 0 || spec.width > kMaxFrameSide || spec.height > kMaxFrameSide ||
@@ -55,8 +55,6 @@ Result<JobSpec> canonical_spec(const JobSpec& spec) {
         return invalid_argument("a resolution needs a width and a height between 1 and " + std::to_string(kMaxFrameSide));
     return out;
 }
-
-}  // namespace
 
 Result<std::string> Admission::check_assets(const JobSpec& spec) const {
     const AssetStore& assets = office_.assets;
@@ -84,9 +82,14 @@ std::optional<Result<JobInfo>> Admission::repeated(JobBook& book, const std::str
 Result<JobInfo> Admission::submit(const std::string& request_id, const JobSpec& spec, const JobLabel& label) {
     if (request_id.empty() || request_id.size() > 128) return invalid_argument("a request id has 1 to 128 characters");
     LL_RETURN_IF_ERROR(check_label(label));
+    const MutexLock one_at_a_time(submit_mutex_);
     {
         const OpenBook book(office_);
         if (auto answer = repeated(*book, request_id, spec)) return *answer;
+        if (book->closing) return going_down();
+        if (book->open_jobs().size() >= office_.options.max_jobs)
+            return Status(StatusCode::kResourceExhausted,
+                          "the coordinator has no room for more jobs; submit again when some have ended");
     }
     auto canonical = canonical_spec(spec);
     if (!canonical.ok()) return canonical.status();
@@ -100,13 +103,10 @@ Result<JobInfo> Admission::submit(const std::string& request_id, const JobSpec& 
                                .scene = *std::move(scene),
                                .created_at = utc_now(),
                                .directory = office_.options.directory / "jobs" / id};
+    LL_RETURN_IF_ERROR(office_.archive.accept(submission));
+    crash_point("server.job-kept");
 
     OpenBook book(office_);
-    if (auto answer = repeated(*book, request_id, spec)) return *answer;
-    if (book->closing) return going_down();
-    if (book->open_jobs().size() >= office_.options.max_jobs)
-        return Status(StatusCode::kResourceExhausted,
-                      "the coordinator has no room for more jobs; submit again when some have ended");
     const JobPtr file = book->add(Job(std::move(submission), *std::move(canonical), office_.now()));
     book.note().info(id + ": accepted, " + std::string(spec.algorithm.name()) + " " + spec.scene_root.hex().substr(0, 12));
     crash_point("server.job-accepted");
@@ -118,8 +118,16 @@ Result<JobInfo> Admission::cancel(const std::string& job_id) {
     OpenBook book(office_);
     const JobPtr file = book->find(job_id);
     if (!file) return no_job(job_id);
+    if (file->job.ended()) return book->info(*file, office_.now());
     book.apply(file, file->job.end(JobState::kCancelled, {}, office_.now()));
-    return book->info(*file, office_.now());
+    const JobInfo info = book->info(*file, office_.now());
+    book.close();
+    // That it ended is told to the archive when the book is closed; it is said here once more, to know that it is on disk.
+    const Status kept = office_.archive.end(info);
+    if (!kept.ok())
+        return Status(StatusCode::kUnavailable, "job " + job_id + " is cancelled, but that could not be written down (" + kept.message() +
+                                                    "): after a restart it would go on; cancel it again");
+    return info;
 }
 
 Result<JobInfo> Admission::get(const std::string& job_id) const {

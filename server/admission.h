@@ -6,6 +6,9 @@
 
 namespace lightloom {
 
+/// The spec with all that it leaves to defaults but what the scene decides.
+Result<JobSpec> canonical_spec(const JobSpec& spec);
+
 class Admission {
   public:
     explicit Admission(Office& office) : office_(office) {}
@@ -33,6 +36,9 @@ class Admission {
     Office& office_;
     /// Held before the book is opened. One preview is made at a time, because each takes the memory of several images.
     mutable Mutex preview_mutex_;
+    /// Held before the book is opened: one job is accepted at a time, so that a repeated request is answered only when the first one is
+    /// on disk.
+    Mutex submit_mutex_;
 };
 
 }  // namespace lightloom

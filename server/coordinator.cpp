@@ -2,17 +2,25 @@
 
 #include "common/cli/log_line.h"
 #include "server/prepare_job.h"
+#include "server/resume.h"
 
 namespace lightloom {
+namespace {
 
-Coordinator::Coordinator(CoordinatorOptions options)
-    : office_(std::move(options)),
+/// How often the disk is looked at, by a coordinator that keeps jobs; and how often where it is full.
+constexpr double kRoomSeconds = 5, kPausedSeconds = 1;
+
+}  // namespace
+
+Coordinator::Coordinator(CoordinatorOptions options, std::unique_ptr<JobStore> store)
+    : office_(std::move(options), std::move(store)),
       admission_(office_),
       dispatch_(office_),
       intake_(office_) {
     office_.resume = [this](OpenBook& book, const JobPtr& file) { start_taking_over(office_, book, file); };
-    // Jobs do not outlive the coordinator, so that nothing refers to tables that are found at the start.
-    if (const size_t count = office_.assets.remove_all_that_begin_with(kTablesPrefix); count > 0)
+    restored_ = restore_jobs(office_);
+    const auto needed = [this](const Digest& digest) { return OpenBook(office_)->ledger.pinned(digest); };
+    if (const size_t count = office_.assets.remove_all_that_begin_with(kTablesPrefix, needed); count > 0)
         log_info("removed the tables of {} earlier job(s)", count);
     ticker_ = std::jthread([this](std::stop_token stop) { keep_time(stop); });
 }
@@ -38,11 +46,28 @@ void Coordinator::keep_time(std::stop_token stop) {
     while (!stop.stop_requested()) {
         const TimePoint now = office_.now();
         double seconds = office_.options.longest_sleep_seconds;
+        if (office_.archive.keeps()) seconds = std::min(seconds, book->paused.empty() ? kRoomSeconds : kPausedSeconds);
         // A lease has run out a moment after its end, not at it.
         if (const auto next = book->agenda.next()) seconds = std::min(seconds, seconds_between(now, *next) + 1e-3);
         if (seconds > 0) book.wait_until(book->agenda_changed, seconds_after(std::chrono::steady_clock::now(), seconds));
-        if (!stop.stop_requested()) dispatch_.tick(book);
+        if (stop.stop_requested()) break;
+        dispatch_.tick(book);
+        if (office_.archive.keeps() && seconds_between(room_checked_, now) >= (book->paused.empty() ? kRoomSeconds : kPausedSeconds))
+            look_for_room(book);
     }
+}
+
+void Coordinator::look_for_room(OpenBook& book) {
+    room_checked_ = office_.now();
+    book.close();
+    const Status room = check_room(office_);
+    book.reopen();
+    if (!room.ok() && book->paused.empty()) book.note().error("no units are given out, because the disk is full: " + room.message());
+    if (room.ok() && !book->paused.empty()) {
+        book.note().info("there is room on the disk again: jobs go on");
+        book->wake_all_waiters();
+    }
+    book->paused = room.message();
 }
 
 }  // namespace lightloom

@@ -15,8 +15,12 @@ namespace lightloom {
 
 class Coordinator {
   public:
-    explicit Coordinator(CoordinatorOptions options);
+    /// Without a store nothing outlives the process; with one, the jobs that are in it go on. Throws no errors of the store: see
+    /// restored().
+    explicit Coordinator(CoordinatorOptions options, std::unique_ptr<JobStore> store = nullptr);
     ~Coordinator();
+    /// Whether the jobs of the store could be read.
+    const Status& restored() const { return restored_; }
 
     AssetStore& assets() { return office_.assets; }
 
@@ -63,9 +67,9 @@ class Coordinator {
                                      std::string_view payload, double render_seconds = 0) {
         return intake_.submit_payload(worker_id, unit, descriptor, payload, render_seconds);
     }
-    Result<SubmitAck> submit_partial(const std::string& worker_id, const UnitReference& unit, const Digest& digest, Partial partial,
-                                     double render_seconds = 0) {
-        return intake_.submit_partial(worker_id, unit, digest, std::move(partial), render_seconds);
+    Result<SubmitAck> submit_partial(const std::string& worker_id, const UnitReference& unit, const EncodedPartial& encoded,
+                                     Partial partial, double render_seconds = 0) {
+        return intake_.submit_partial(worker_id, unit, encoded, std::move(partial), render_seconds);
     }
     Result<uint64_t> expected_training_bytes(const UnitReference& unit) const { return intake_.expected_training_bytes(unit); }
     Result<SubmitAck> submit_training(const std::string& worker_id, const UnitReference& unit, const Digest& digest,
@@ -76,11 +80,15 @@ class Coordinator {
   private:
     /// Wakes up whenever a job is due.
     void keep_time(std::stop_token stop);
+    /// Stops giving out units where the disk is full, and goes on where it is not any more.
+    void look_for_room(OpenBook& book);
 
     Office office_;
+    Status restored_;
     Admission admission_;
     Dispatch dispatch_;
     Intake intake_;
+    TimePoint room_checked_;  ///< For the ticker alone.
     std::jthread ticker_;  // last, so that it stops before anything that it uses is destroyed
 };
 

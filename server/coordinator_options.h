@@ -30,6 +30,8 @@ struct CoordinatorOptions {
     uint64_t training_bytes = uint64_t(8) << 30;  ///< Most training data of one job: 7e6 samples of a hard interior.
     size_t max_jobs = 10000;                      ///< Most jobs that have not ended.
     size_t kept_jobs = 1000;                      ///< Ended jobs that are remembered; the oldest are forgotten, their files stay.
+    /// Below this much free space on the disk of `directory` no units are given out.
+    uint64_t disk_reserve_bytes = uint64_t(64) << 20;
     /// The ticker sleeps until something is due, but no longer than this: a clock that jumps (tests) wakes nobody.
     double longest_sleep_seconds = 10;
 };

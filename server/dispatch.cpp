@@ -54,6 +54,7 @@ Result<WorkerGrant> Dispatch::register_worker(const WorkerHello& hello) {
 }
 
 Dispatch::Turn Dispatch::next_unit(OpenBook& book, WorkerRecord& worker, std::optional<UnitLease>* lease) {
+    if (!book->paused.empty()) return Turn::kNothingLeft;
     const TimePoint now = office_.now();
     WorkerRegistry& workers = book->workers;
     if (!worker.has_room() || workers.rests(worker, now)) return Turn::kNotForThisOne;

@@ -63,9 +63,13 @@ Status write_results(Office& office, const JobPtr& file) {
     std::error_code error;
     std::filesystem::create_directories(directory, error);  // if that fails, so does writing, which says why
     crash_point("server.image-encoded");
-    LL_RETURN_IF_ERROR(write_file_atomically((directory / "image.exr").string(), *image));
+    const auto write = [&](const char* name, const std::string& bytes) {
+        return with_room(office, file, [&] { return write_file_atomically((directory / name).string(), bytes); });
+    };
+    LL_RETURN_IF_ERROR(write("image.exr", *image));
     crash_point("server.image-written");
-    LL_RETURN_IF_ERROR(write_file_atomically((directory / "manifest.json").string(), to_json(*manifest)));
+    LL_RETURN_IF_ERROR(write("manifest.json", to_json(*manifest)));
+    LL_RETURN_IF_ERROR(flush_folder(directory.parent_path().string()));
     crash_point("server.manifest-written");
 
     OpenBook book(office);

@@ -7,6 +7,11 @@
 namespace lightloom {
 namespace {
 
+/// A checkpoint is written when that many bytes of results have come since the last one, and four times as many as it takes.
+constexpr uint64_t kLeastCheckpointBytes = uint64_t(64) << 20, kStateBytesPerPixel = 120;
+/// The time that a job with a limit has taken is written down that often.
+constexpr double kSpentSeconds = 5, kSpentShare = 0.01;
+
 Status not_running(const std::string& job_id) { return not_found("job " + job_id + " is not running (any more)"); }
 
 }  // namespace
@@ -32,7 +37,7 @@ Result<SubmitAck> Intake::submit_payload(const std::string& worker_id, const Uni
     const auto expected = expected_partial(unit);
     if (!expected.ok()) return unexpected_result(expected.status());
     auto partial = decode_partial(*expected, descriptor, payload);
-    if (partial.ok()) return submit_partial(worker_id, unit, descriptor.payload_digest, *std::move(partial), render_seconds);
+    if (partial.ok()) return take_partial(worker_id, unit, {descriptor, payload}, *std::move(partial), render_seconds);
 
     OpenBook book(office_);
     WorkerRecord* const worker = book->workers.find(worker_id);
@@ -60,37 +65,95 @@ std::optional<SubmitAck> Intake::repeated_result(OpenBook& book, const JobPtr& f
             ++file->job.incidents.duplicates_same;
             book.changed(file);
             return SubmitAck{SubmitOutcome::kDuplicateSame, {}};
-        case UnitTable::Completion::kDuplicateDifferent:
-            ++file->job.incidents.duplicates_different;
-            book.changed(file);
-            book.note().error(file->job.id() + ": unit " + unit_name(key) + " from " + worker.id +
-                              " differs from the bytes accepted before; one of two workers computes wrongly: compare their hosts "
-                              "and builds");
-            return SubmitAck{SubmitOutcome::kDuplicateDifferent, "the unit was accepted before with other bytes"};
+        case UnitTable::Completion::kDuplicateDifferent: return report_difference(book, file, key, worker.id);
         case UnitTable::Completion::kFirst: break;
     }
     return std::nullopt;
 }
 
-Result<SubmitAck> Intake::submit_partial(const std::string& worker_id, const UnitReference& reference, const Digest& digest,
+Result<SubmitAck> Intake::submit_partial(const std::string& worker_id, const UnitReference& unit, const EncodedPartial& encoded,
                                          Partial partial, double render_seconds) {
+    return take_partial(worker_id, unit, {encoded.descriptor, encoded.payload}, std::move(partial), render_seconds);
+}
+
+std::optional<Result<SubmitAck>> Intake::look_up(const std::string& worker_id, const UnitReference& unit, const Digest& digest,
+                                                 JobPtr* file, WorkerRecord* worker) {
+    OpenBook book(office_);
+    WorkerRecord* const known = book->workers.find(worker_id);
+    if (!known) return Result<SubmitAck>(no_worker(worker_id));
+    known->last_heard = office_.now();
+    *worker = *known;
+    *file = book->find(unit.job_id);
+    UnitTable* const units = *file ? (*file)->job.open_units(unit.key) : nullptr;
+    if (!units) return Result<SubmitAck>(unexpected_result(not_running(unit.job_id)));
+    if (!units->find(unit.key)) return Result<SubmitAck>(SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"});
+    if (!units->is_done(unit.key)) return std::nullopt;
+    known->held.erase(unit);
+    return Result<SubmitAck>(*repeated_result(book, *file, *units, unit.key, *known, digest));
+}
+
+Result<SubmitAck> Intake::not_kept(const JobPtr& file, const UnitKey& unit, const std::string& worker_id, const Status& why) {
+    if (why.code() == StatusCode::kNotFound) return SubmitAck{SubmitOutcome::kStale, "the job ended meanwhile"};
+    if (why.code() == StatusCode::kAlreadyExists) {
+        OpenBook book(office_);
+        return report_difference(book, file, unit, worker_id);
+    }
+    if (why.code() == StatusCode::kResourceExhausted) pause(office_, why);
+    return Status(StatusCode::kUnavailable, "the coordinator cannot keep the result now: " + why.message());
+}
+
+SubmitAck Intake::report_difference(OpenBook& book, const JobPtr& file, const UnitKey& unit, const std::string& worker_id) {
+    ++file->job.incidents.duplicates_different;
+    book.changed(file);
+    book.note().error(file->job.id() + ": unit " + unit_name(unit) + " from " + worker_id +
+                      " differs from the bytes accepted before; one of two workers computes wrongly: compare their hosts and builds");
+    return {SubmitOutcome::kDuplicateDifferent, "the unit was accepted before with other bytes"};
+}
+
+void Intake::checkpoint_if_due(OpenBook& book, const JobPtr& file, uint64_t bytes) {
+    if (!office_.archive.keeps()) return;
+    file->kept_bytes += bytes;
+    const uint64_t state = kStateBytesPerPixel * uint64_t(file->job.spec().frame.crop.area());
+    if (file->in_checkpoint || file->kept_bytes < std::max(kLeastCheckpointBytes, 4 * state) || file->job.merged_groups() == 0) return;
+    file->in_checkpoint = true;
+    file->kept_bytes = 0;
+    book.start(file, "to write a checkpoint of this job", [&office = office_, file, reducer = file->job.reducer()] {
+        const auto saved = reducer->serialize();
+        Status status = saved.ok() ? office.archive.checkpoint(file->job.id(), *saved) : saved.status();
+        crash_point("server.checkpoint-kept");
+        const OpenBook end(office);
+        file->in_checkpoint = false;
+        // Without room or for a job that ended there is none; its results are all kept.
+        const StatusCode code = status.code();
+        if (code == StatusCode::kResourceExhausted || code == StatusCode::kNotFound || file->job.ended()) status = {};
+        return status;
+    });
+}
+
+Result<SubmitAck> Intake::take_partial(const std::string& worker_id, const UnitReference& reference, const Kept& kept, Partial partial,
+                                       double render_seconds) {
     JobPtr file;
+    WorkerRecord sender;
+    const Digest& digest = kept.descriptor.payload_digest;
+    if (auto answer = look_up(worker_id, reference, digest, &file, &sender)) return *std::move(answer);
+    // It is on disk before anybody is told that it is here. Two workers may do this at a time; one of them is merged.
+    const Status on_disk =
+        office_.archive.keep_partial(reference.job_id, reference.key, sender, render_seconds, kept.descriptor, kept.payload);
+    if (!on_disk.ok()) return not_kept(file, reference.key, worker_id, on_disk);
+    crash_point("server.result-kept");
+
     std::shared_ptr<Reducer> reducer;
-    uint32_t index = 0;
+    const uint32_t index = sender.index;
     WorkUnit unit;
     {
         OpenBook book(office_);
-        WorkerRecord* const worker = book->workers.find(worker_id);
-        if (!worker) return no_worker(worker_id);
-        worker->last_heard = office_.now();
-        worker->held.erase(reference);
-        file = book->find(reference.job_id);
-        if (!file || file->job.state() != JobState::kRunning) return unexpected_result(not_running(reference.job_id));
-        index = worker->index;
+        WorkerRecord& worker = book->workers.at(index);
+        worker.held.erase(reference);
+        if (file->job.state() != JobState::kRunning) return unexpected_result(not_running(reference.job_id));
         UnitTable* const units = file->job.open_units(reference.key);
         const auto known = units ? units->find(reference.key) : std::nullopt;
         if (!known) return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};
-        if (auto answer = repeated_result(book, file, *units, reference.key, *worker, digest)) return *std::move(answer);
+        if (auto answer = repeated_result(book, file, *units, reference.key, worker, digest)) return *std::move(answer);
         unit = *known;
         reducer = file->job.reducer();
     }
@@ -109,6 +172,7 @@ Result<SubmitAck> Intake::submit_partial(const std::string& worker_id, const Uni
     }
     if (const std::optional<Status>& why = *refused) {
         ++job.incidents.rejected;
+        office_.archive.drop_soon(job.id(), unit.key);
         unit_failed(book, file, unit.key, job.open_units()->reopen(unit.key), *why);
         return SubmitAck{SubmitOutcome::kRejected, why->message()};
     }
@@ -119,6 +183,8 @@ Result<SubmitAck> Intake::submit_partial(const std::string& worker_id, const Uni
     ++worker.merged;
     book->workers.unit_succeeded(worker);
     book.apply(file, job.count(work));
+    checkpoint_if_due(book, file, kept.payload.size());
+    note_time(file);
     finish_if_complete(office_, book, file);
     crash_point("server.result-counted");
     return SubmitAck{SubmitOutcome::kAccepted, {}};
@@ -148,20 +214,35 @@ Result<SubmitAck> Intake::submit_training(const std::string& worker_id, const Un
     }
     if (!(trace_seconds >= 0 && trace_seconds < 1e9)) trace_seconds = 0;
 
+    JobPtr file;
+    WorkerRecord sender;
+    if (auto answer = look_up(worker_id, reference, digest, &file, &sender)) return *std::move(answer);
+    bool keep = false;  // a probe measures time, and has to be made anew after a restart
+    {
+        OpenBook book(office_);
+        UnitTable* const units = file->job.open_units(reference.key);
+        if (!units) return SubmitAck{SubmitOutcome::kStale, "job " + reference.job_id + " has its training data already"};
+        const auto unit = units->find(reference.key);
+        if (!unit) return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};
+        Status problem = data.status();
+        if (problem.ok()) problem = check_unit_data(*data, file->job.spec(), unit->training);
+        WorkerRecord& worker = book->workers.at(sender.index);
+        worker.held.erase(reference);
+        if (!problem.ok()) return reject_result(book, file, *units, reference.key, worker, problem);
+        keep = reference.key.kind == UnitKind::kTraining && file->job.preparation().rounds_are_fixed;
+    }
+    if (keep) {
+        const Status on_disk =
+            office_.archive.keep_training(reference.job_id, reference.key, sender, trace_seconds, digest, payload);
+        if (!on_disk.ok()) return not_kept(file, reference.key, worker_id, on_disk);
+        crash_point("server.training-kept");
+    }
+
     OpenBook book(office_);
-    WorkerRecord* const worker = book->workers.find(worker_id);
-    if (!worker) return no_worker(worker_id);
+    WorkerRecord* const worker = &book->workers.at(sender.index);
     const TimePoint now = office_.now();
-    worker->last_heard = now;
-    worker->held.erase(reference);
-    const JobPtr file = book->find(reference.job_id);
-    UnitTable* const units = file ? file->job.open_units(reference.key) : nullptr;
+    UnitTable* const units = file->job.open_units(reference.key);
     if (!units) return SubmitAck{SubmitOutcome::kStale, "job " + reference.job_id + " has its training data already"};
-    const auto unit = units->find(reference.key);
-    if (!unit) return SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"};
-    Status problem = data.status();
-    if (problem.ok()) problem = check_unit_data(*data, file->job.spec(), unit->training);
-    if (!problem.ok()) return reject_result(book, file, *units, reference.key, *worker, problem);
     if (auto answer = repeated_result(book, file, *units, reference.key, *worker, digest)) return *std::move(answer);
     book->workers.unit_succeeded(*worker);
     Preparation& preparation = file->job.preparation();
@@ -180,6 +261,14 @@ Result<SubmitAck> Intake::submit_training(const std::string& worker_id, const Un
     book.changed(file);
     crash_point("server.training-counted");
     return SubmitAck{SubmitOutcome::kAccepted, {}};
+}
+
+void Intake::note_time(const JobPtr& file) {
+    const double limit = file->job.spec().time_limit_seconds;
+    const TimePoint now = office_.now();
+    if (limit <= 0 || seconds_between(file->spent_noted, now) < std::max(kSpentSeconds, kSpentShare * limit)) return;
+    file->spent_noted = now;
+    office_.archive.spent_soon(file->job.id(), file->job.preparation().learning_seconds, file->job.rendering_seconds(now));
 }
 
 }  // namespace lightloom

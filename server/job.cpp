@@ -5,15 +5,31 @@
 
 namespace lightloom {
 
-Job::Job(Submission submission, JobSpec canonical, TimePoint now)
+Job::Job(Submission submission, JobSpec canonical, TimePoint now, const Past& past)
     : submission_(std::move(submission)),
+      past_(past),
       spec_(std::move(canonical)),
-      created_(now) {}
+      revision_(past.revision),
+      created_(seconds_after(now, -past.age_seconds)) {}
+
+Job::Job(Submission submission, const JobInfo& last, TimePoint now, const Past& past)
+    : Job(std::move(submission), last.spec, now, past) {
+    state_ = last.state;
+    message_ = last.message;
+    tables_ = last.tables;
+    last_ = last;
+}
+
+double Job::rendering_seconds(TimePoint now) const {
+    if (!first_render_) return past_.rendering_seconds;
+    const bool over = ended() || state_ == JobState::kFinishing;
+    return past_.rendering_seconds + seconds_between(*first_render_, over ? finishing_ : now);
+}
 
 void Job::tell_rendering(TimePoint now, JobInfo* info) const {
     if (!first_render_) return;
     const bool over = ended() || state_ == JobState::kFinishing;
-    info->render_seconds = seconds_between(*first_render_, over ? finishing_ : now);
+    info->render_seconds = rendering_seconds(now);
     if (ended()) info->finish_seconds = seconds_between(finishing_, ended_);
     if (over) {
         info->eta_seconds = 0;
@@ -30,6 +46,12 @@ void Job::tell_rendering(TimePoint now, JobInfo* info) const {
 
 JobInfo Job::info(TimePoint now, const std::optional<WaitsFor>& waits_for) const {
     JobInfo info;
+    if (last_) {
+        info = *last_;
+        info.revision = revision_;
+        info.age_seconds = seconds_between(created_, now);
+        return info;
+    }
     info.job_id = id();
     info.state = state_;
     info.spec = spec_;
@@ -67,7 +89,7 @@ JobInfo Job::info(TimePoint now, const std::optional<WaitsFor>& waits_for) const
 
 double Job::seconds_left(TimePoint now) const {
     const double learned = state_ == JobState::kPreparing ? preparation_.seconds_taken(now) : preparation_.learning_seconds;
-    return spec_.time_limit_seconds - learned - (first_render_ ? seconds_between(*first_render_, now) : 0);
+    return spec_.time_limit_seconds - learned - rendering_seconds(now);
 }
 
 bool Job::time_is_up(TimePoint now) const {
@@ -76,7 +98,7 @@ bool Job::time_is_up(TimePoint now) const {
 
 std::optional<TimePoint> Job::end_of_time() const {
     if (state_ != JobState::kRunning || spec_.time_limit_seconds <= 0 || !first_render_ || closed_) return std::nullopt;
-    return seconds_after(*first_render_, spec_.time_limit_seconds - preparation_.learning_seconds);
+    return seconds_after(*first_render_, spec_.time_limit_seconds - preparation_.learning_seconds - past_.rendering_seconds);
 }
 
 Effects Job::open_round(UnitKind kind, uint32_t number, const TrainingWork& work, std::optional<uint64_t> shuffle_seed) {
@@ -114,6 +136,10 @@ Effects Job::begin_rendering(RenderPlan plan, TimePoint now) {
     units_ = std::move(plan.units);
     reducer_ = std::move(plan.reducer);
     tables_ = std::move(plan.tables);
+    counters_ = plan.counters;
+    dropped_ = plan.dropped;
+    workers_ = std::move(plan.workers);
+    effects += advance();
     effects.throw_away(std::exchange(preparation_.facts, {}));
     if (preparation_.round) effects.throw_away(*std::move(preparation_.round));
     preparation_.round.reset();
@@ -148,10 +174,14 @@ Effects Job::rendering_begins(TimePoint now) {
 }
 
 Effects Job::count(const Work& work) {
-    Effects effects;
     workers_.insert(work.worker);
     counters_ += work.counters;
     dropped_ += work.dropped;
+    return advance();
+}
+
+Effects Job::advance() {
+    Effects effects;
     const uint32_t groups = reducer_->folded_groups();
     if (groups > merged_groups_) {
         merged_groups_ = groups;

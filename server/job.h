@@ -28,8 +28,17 @@ class Job {
         std::string created_at;           ///< UTC, for the manifest only.
         std::filesystem::path directory;  ///< Where its image will be.
     };
+    /// What an earlier coordinator did for the job.
+    struct Past {
+        double age_seconds = 0;        ///< Since the submission.
+        double rendering_seconds = 0;  ///< Time that was taken of the time limit, beside that of Preparation.
+        uint64_t revision = 1;         ///< Above any that somebody has seen.
+    };
     /// `canonical` is the spec with nothing left to defaults but what the scene decides.
-    Job(Submission submission, JobSpec canonical, TimePoint now);
+    Job(Submission submission, JobSpec canonical, TimePoint now, const Past& past);
+    Job(Submission submission, JobSpec canonical, TimePoint now) : Job(std::move(submission), std::move(canonical), now, Past()) {}
+    /// A job that has ended before this coordinator began; `last` is what was told of it then.
+    Job(Submission submission, const JobInfo& last, TimePoint now, const Past& past);
 
     const Submission& submission() const { return submission_; }
     const std::string& id() const { return submission_.id; }
@@ -69,6 +78,10 @@ class Job {
         UnitTable units;
         std::shared_ptr<Reducer> reducer;
         TablesInfo tables;
+        /// Of results that an earlier coordinator has taken, which `units` and `reducer` hold.
+        UnitCounters counters;
+        uint64_t dropped = 0;
+        std::set<uint32_t> workers;
     };
     /// kPreparing -> kRunning; nothing in any other state.
     Effects begin_rendering(RenderPlan plan, TimePoint now);
@@ -97,6 +110,8 @@ class Job {
     Effects count(const Work& work);
     /// No more groups than are complete now, or the first, are rendered: the time limit has passed. In kRunning.
     void close() { closed_ = true; }
+    /// Time that rendering has taken, under earlier coordinators too.
+    double rendering_seconds(TimePoint now) const;
     bool time_is_up(TimePoint now) const;
     /// When time_is_up() will be true; nothing for a job without a limit, or that does not render yet.
     std::optional<TimePoint> end_of_time() const;
@@ -130,11 +145,17 @@ class Job {
   private:
     void tell_rendering(TimePoint now, JobInfo* info) const;
 
+    /// Takes over what is merged by now.
+    Effects advance();
+
     const Submission submission_;
+    const Past past_;
+    /// What is told of a job that had ended before this coordinator began.
+    std::optional<JobInfo> last_;
     JobSpec spec_;
     JobState state_ = JobState::kPreparing;
     std::string message_;
-    uint64_t revision_ = 1;
+    uint64_t revision_;
     TimePoint created_, prepared_, finishing_, ended_;
     std::optional<TimePoint> first_render_;
     Preparation preparation_;

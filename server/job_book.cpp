@@ -57,7 +57,9 @@ JobInfo JobBook::info(const JobFile& file, TimePoint now) const {
         const JobPtr maker = find(*number);
         waits_for = {maker->job.id(), info(*maker, now).eta_seconds};
     }
-    return file.job.info(now, waits_for);
+    JobInfo out = file.job.info(now, waits_for);
+    if (!paused.empty() && !is_terminal(out.state)) out.message = "paused: " + paused;
+    return out;
 }
 
 void JobBook::wake_one_waiter() {

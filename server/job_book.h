@@ -12,6 +12,7 @@
 #include <string>
 
 #include "server/agenda.h"
+#include "server/archive.h"
 #include "server/job.h"
 #include "server/table_ledger.h"
 #include "server/worker_registry.h"
@@ -27,6 +28,11 @@ struct JobFile {
     std::condition_variable_any changed;  ///< With the lock of the book: the job's revision has grown, or the coordinator closes.
     std::stop_source stop;                ///< Ends the tasks of the job.
     int running_tasks = 0;                ///< Under the lock of the book. A job is forgotten only when none runs.
+    /// What an earlier coordinator left of the job, until it is used up. Under the lock of the book.
+    std::shared_ptr<const ArchivedJob> archived;
+    uint64_t kept_bytes = 0;  ///< Of results since the last checkpoint. Under the lock of the book.
+    bool in_checkpoint = false;  ///< Whether a checkpoint is being written. Under the lock of the book.
+    TimePoint spent_noted;    ///< When the archive was told of the time that the job has taken. Under the lock of the book.
 };
 using JobPtr = std::shared_ptr<JobFile>;
 
@@ -66,6 +72,8 @@ class JobBook {
     TableLedger ledger;
     Agenda agenda;
     std::condition_variable_any agenda_changed;  ///< The ticker waits for it: something is due earlier than before.
+    /// Why no job gets units: the disk is full. Empty as long as it is not.
+    std::string paused;
     bool closing = false;
 
   private:

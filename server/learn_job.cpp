@@ -94,8 +94,10 @@ class Tracing final : public TracingPort {
         // A smaller set makes other tables, which have not been looked up yet; those of the whole set may exist by now.
         if (adopt_cached_tables(office_, file_, set.spec, facts)) return false;
         if (set.grows && adopt_smaller(set, facts)) return false;
+        if (!set.grows) LL_RETURN_IF_ERROR(with_room(office_, file_, [&] { return office_.archive.settle(job_.id(), set.spec); }));
         OpenBook book(office_);
         if (!alive()) return over();
+        preparation().rounds_are_fixed = !set.grows;
         job_.complete_spec(set.spec);
         const bool whole = !set.grows || set.samples == set.wanted;
         if (preparation().may_wait && whole && wait_for_maker(book, file_)) return false;

@@ -63,12 +63,10 @@ Result<std::vector<UnitReference>> LocalWorkerPort::heartbeat(const std::string&
 
 Result<SubmitAck> LocalWorkerPort::submit_result(const std::string& worker_id, const UnitLease& lease, Partial partial,
                                                  double render_seconds) {
-    // The partial is encoded only for its digest, by which duplicates are recognised; decoding it again would only cost
-    // time.
+    // Decoding it again would only cost time.
     const auto encoded = encode_partial(partial, lease.spec.frame);
     if (!encoded.ok()) return encoded.status();
-    return coordinator_.submit_partial(worker_id, lease.reference(), encoded->descriptor.payload_digest, std::move(partial),
-                                       render_seconds);
+    return coordinator_.submit_partial(worker_id, lease.reference(), *encoded, std::move(partial), render_seconds);
 }
 
 Result<SubmitAck> LocalWorkerPort::submit_training(const std::string& worker_id, const UnitLease& lease, std::string_view payload,

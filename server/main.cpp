@@ -80,8 +80,8 @@ int main(int argc, char** argv) {
         ->type_name("HOST:PORT")
         ->capture_default_str();
     app.add_option("--data", data,
-                   "Directory for scene files, images, the tables that running jobs read (assets/, removed with the last "
-                   "such job) and the table cache (tables/)")
+                   "Directory for jobs and the results of their units (store/), scene files, images, the tables that running jobs "
+                   "read (assets/, removed with the last such job) and the table cache (tables/)")
         ->type_name("DIR")
         ->capture_default_str();
     app.add_option("--status", status, "Where the status page is (/healthz, /readyz, /api/v1/status), or off")
@@ -141,7 +141,10 @@ int main(int argc, char** argv) {
     if (error) return report_failure(internal_error(error.message()), data + ": ");
     const auto lock = DataLock::take(data);
     if (!lock.ok()) return report_failure(lock.status());
-    Coordinator coordinator(std::move(options));
+    auto store = JobStore::open({.directory = std::filesystem::path(data) / "store"});
+    if (!store.ok()) return report_failure(store.status());
+    Coordinator coordinator(std::move(options), *std::move(store));
+    if (!coordinator.restored().ok()) return report_failure(coordinator.restored(), data + ": ");
     Heartbeat heart;
     // Looking for a job takes the lock under which everything happens: while that answers, the coordinator turns.
     const Pulse pulse(heart, [&coordinator] { (void)coordinator.get_job({}); });

@@ -1,19 +1,24 @@
 #include "server/office.h"
 
+#include <chrono>
+#include <filesystem>
 #include <new>
 #include <stdexcept>
 
 namespace lightloom {
 
-Office::Office(CoordinatorOptions o)
+Office::Office(CoordinatorOptions o, std::unique_ptr<JobStore> store)
     : options(std::move(o)),
       assets(options.directory / "assets"),
       table_cache(options.table_cache, options.table_cache_bytes),
+      archive(std::move(store)),
       book(options.lease_seconds) {}
 
 void OpenBook::close() {
     if (!access_) return;
     access_.reset();
+    for (const JobInfo& info : std::exchange(ended_, {})) office_.archive.end_soon(info);
+    for (const std::string& id : std::exchange(forgotten_, {})) office_.archive.forget_soon(id);
     for (const Effects::Line& line : noted_.log) log_line(line.level, "{}", {line.text});
     noted_ = {};  // frees what is large
     for (const Digest& file : std::exchange(dropped_, {})) {
@@ -59,6 +64,8 @@ void OpenBook::apply(const JobPtr& file, Effects effects) {
         release_crowd(file);
         for (const Digest& tables : book.ledger.forget(file->number)) drop_tables(tables);
         book.job_ended(*file);
+        file->archived.reset();
+        if (office_.archive.keeps()) ended_.push_back(book.info(*file, office_.now()));
         forget_old_jobs();
     }
     if (effects.changed) changed(file);
@@ -71,6 +78,7 @@ void OpenBook::forget_old_jobs() {
     for (const JobPtr& old : (*this)->forget_ended(kept)) {
         noted_.info(old->job.id() + ": forgotten; " + std::to_string(kept) + " newer jobs have ended");
         noted_.discard.push_back(old);
+        forgotten_.push_back(old->job.id());
     }
 }
 
@@ -102,6 +110,37 @@ void OpenBook::start(const JobPtr& file, const char* purpose, std::function<Stat
         fail(file,
              {StatusCode::kResourceExhausted, std::string("the coordinator cannot start a thread ") + purpose + ": " + e.what()});
     }
+}
+
+void pause(Office& office, const Status& why) {
+    OpenBook book(office);
+    if (book->paused.empty()) book.note().error("no units are given out, because the disk is full: " + why.message());
+    book->paused = why.message();
+    book->agenda_changed.notify_one();
+}
+
+Status with_room(Office& office, const JobPtr& file, const std::function<Status()>& work) {
+    for (;;) {
+        Status status = work();
+        if (status.code() != StatusCode::kResourceExhausted) return status;
+        pause(office, status);
+        OpenBook book(office);
+        const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(1);
+        while (!file->job.ended() && !book->closing && std::chrono::steady_clock::now() < until)
+            book.wait_until(file->changed, until);
+        if (file->job.ended() || book->closing) return {StatusCode::kCancelled, "the job ended while the disk was full"};
+    }
+}
+
+Status check_room(const Office& office) {
+    std::error_code error;
+    const auto space = std::filesystem::space(office.options.directory, error);
+    if (error) return internal_error(office.options.directory.string() + ": " + error.message());
+    if (space.available >= office.options.disk_reserve_bytes) return {};
+    return {StatusCode::kResourceExhausted, office.options.directory.string() + " has " + std::to_string(space.available >> 20) +
+                                                " MiB left; the coordinator wants " +
+                                                std::to_string(office.options.disk_reserve_bytes >> 20) +
+                                                " MiB: delete something, or move the directory to a larger disk"};
 }
 
 }  // namespace lightloom

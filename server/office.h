@@ -18,7 +18,8 @@ namespace lightloom {
 class OpenBook;
 
 struct Office {
-    explicit Office(CoordinatorOptions o);
+    /// Without a store nothing outlives the process.
+    Office(CoordinatorOptions o, std::unique_ptr<JobStore> store);
 
     TimePoint now() const { return options.clock(); }
     TimePoint lease_end() const { return seconds_after(now(), options.lease_seconds); }
@@ -26,6 +27,7 @@ struct Office {
     const CoordinatorOptions options;
     AssetStore assets;
     const TableCache table_cache;
+    Archive archive;  ///< Has its own lock, which is never held while the book is wanted.
     /// Lets a job go on that waited for another job's tables; see release_crowd(). Set once, before there are jobs.
     std::function<void(OpenBook&, const JobPtr&)> resume;
     Mutex tables_mutex;  ///< Held while files of tables are written, repaired or removed.
@@ -86,12 +88,24 @@ class OpenBook {
     void start(const JobPtr& file, const char* purpose, std::function<Status()> task);
 
   private:
-    bool noted() const { return !noted_.log.empty() || !noted_.discard.empty() || !dropped_.empty(); }
+    bool noted() const {
+        return !noted_.log.empty() || !noted_.discard.empty() || !dropped_.empty() || !ended_.empty() || !forgotten_.empty();
+    }
 
     Office& office_;
     std::optional<Guarded<JobBook>::Access> access_;
     Effects noted_;
     std::vector<Digest> dropped_;
+    std::vector<JobInfo> ended_;          ///< For the archive.
+    std::vector<std::string> forgotten_;  ///< The same.
 };
+
+/// Repeats `work` until the disk has room for it; meanwhile no job gets units. kCancelled when the job has ended or the coordinator
+/// closes.
+Status with_room(Office& office, const JobPtr& file, const std::function<Status()>& work);
+/// The disk is full: no job gets units until the ticker finds room.
+void pause(Office& office, const Status& why);
+/// Whether there is room on the disk of the data directory for the coordinator to go on; else a line that says how much there is.
+Status check_room(const Office& office);
 
 }  // namespace lightloom

@@ -5,6 +5,8 @@
 #include <thread>
 
 #include "common/core/crash_point.h"
+#include "server/finish_job.h"
+#include "server/resume.h"
 
 namespace lightloom {
 namespace {
@@ -19,27 +21,50 @@ uint32_t open_groups(const JobSpec& spec, uint64_t waiting_bytes) {
     return uint32_t(std::min(1 + waiting_bytes / (Reducer::open_group_bytes(splats) * area), kMaxWindow));
 }
 
+/// Puts down what the job renders, before anything of it is leased.
+Status keep_plan(Office& office, const JobPtr& file, const Job::RenderPlan& plan) {
+    JobInfo info;
+    info.job_id = file->job.id();
+    info.state = JobState::kRunning;
+    info.spec = plan.spec;
+    info.algorithm = plan.spec.algorithm.name();
+    info.tables = plan.tables;
+    return with_room(office, file, [&] { return office.archive.plan(info, office.options.identity); });
+}
+
 }  // namespace
 
-void plan_units(Office& office, const JobPtr& file, JobSpec spec, SceneFacts facts, TablesInfo tables) {
+Status plan_units(Office& office, const JobPtr& file, JobSpec spec, SceneFacts facts, TablesInfo tables) {
     const FrameLayout frame = facts.frame;
     const Plan plan(frame, spec.algorithm);
     // A noise target alone may be out of reach.
     const uint64_t iterations = only_noise_bounds(spec) ? JobSpec::kMaxSamplesPerPixel : spec.samples_per_pixel;
     UnitTable units(plan, iterations, open_groups(spec, office.options.waiting_bytes), office.options.shuffle_seed);
     auto reducer = std::make_shared<Reducer>(frame, plan.tile_count(), facts.response, spec.noise_target);
+    Job::RenderPlan render{std::move(spec), std::move(facts.layers), std::move(units), std::move(reducer), std::move(tables), {}, 0, {}};
+    Job& job = file->job;
+    std::shared_ptr<const ArchivedJob> archived;
+    {
+        const OpenBook book(office);
+        archived = file->archived;
+    }
+    if (archived && archived->planned) {
+        LL_RETURN_IF_ERROR(replay_results(office, *archived, render));
+    } else {
+        LL_RETURN_IF_ERROR(keep_plan(office, file, render));
+    }
 
     OpenBook book(office);
-    Job& job = file->job;
-    if (job.state() != JobState::kPreparing) return;
+    if (job.state() != JobState::kPreparing) return {};
     const Digest guide = job.preparation().guide.digest;
-    book.apply(file, job.begin_rendering(
-                         {std::move(spec), std::move(facts.layers), std::move(units), std::move(reducer), std::move(tables)},
-                         office.now()));
+    file->archived.reset();
+    book.apply(file, job.begin_rendering(std::move(render), office.now()));
     book->ledger.stop_making(file->number);
     book.release_crowd(file);
     book.unpin(file, guide);
     crash_point("server.units-planned");
+    finish_if_complete(office, book, file);  // an earlier coordinator may have had all results
+    return {};
 }
 
 Status store_tables(Office& office, const Digest& digest, std::string_view bytes) {
@@ -62,7 +87,7 @@ Status adopt_tables(Office& office, const JobPtr& file, const JobSpec& spec, con
     }
     LL_RETURN_IF_ERROR(store_tables(office, digest, bytes));
     crash_point("server.tables-stored");
-    plan_units(office, file, spec, facts, std::move(tables));
+    LL_RETURN_IF_ERROR(plan_units(office, file, spec, facts, std::move(tables)));
     OpenBook book(office);
     if (file->job.ended() && !book->ledger.pinned(digest)) book.drop_tables(digest);  // it ended while they were stored
     return {};

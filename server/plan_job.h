@@ -6,7 +6,7 @@
 namespace lightloom {
 
 /// Lets the job render, if it still prepares. `spec` is complete.
-void plan_units(Office& office, const JobPtr& file, JobSpec spec, SceneFacts facts, TablesInfo tables);
+Status plan_units(Office& office, const JobPtr& file, JobSpec spec, SceneFacts facts, TablesInfo tables);
 
 /// Stores tables where workers fetch them; what is there already and sound stays.
 Status store_tables(Office& office, const Digest& digest, std::string_view bytes);

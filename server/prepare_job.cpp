@@ -7,6 +7,7 @@
 #include "common/core/crash_point.h"
 #include "common/transport/parameters.h"
 #include "server/plan_job.h"
+#include "server/resume.h"
 #include "server/training_budget.h"
 
 namespace lightloom {
@@ -57,11 +58,45 @@ Status prepare_tables(Office& office, const JobPtr& file, JobSpec spec, SceneFac
     return {};
 }
 
+/// Goes on with a job that an earlier coordinator began to render. False if its results are of no use: then it begins anew.
+Result<bool> resume_rendering(Office& office, const JobPtr& file, const ArchivedJob& archived, const SceneFacts& facts) {
+    const JobInfo& planned = *archived.planned;
+    std::string why;
+    if (archived.planned_by != name_of(office.options.identity)) {
+        why = "another build rendered it";
+    } else if (planned.spec.frame != facts.frame) {
+        why = "its frame is another one now";
+    } else if (planned.tables.asset.size_bytes == 0) {
+        LL_RETURN_IF_ERROR(plan_units(office, file, planned.spec, facts, planned.tables));
+        return true;
+    } else {
+        auto bytes = office.assets.read(planned.tables.asset.digest);
+        if (!bytes.ok()) {
+            auto entry = office.table_cache.find(planned.tables.cache_key, planned.spec.algorithm.learning()->parts);
+            if (entry && entry->info.asset.digest == planned.tables.asset.digest) bytes = std::move(entry->bytes);
+        }
+        if (bytes.ok()) {
+            LL_RETURN_IF_ERROR(adopt_tables(office, file, planned.spec, facts, *bytes, planned.tables));
+            return true;
+        }
+        why = "its tables are gone: " + bytes.status().message();
+    }
+    OpenBook book(office);
+    book.note().warn(file->job.id() + ": what was rendered before the restart is of no use, because " + why);
+    file->archived.reset();
+    book.unpin(file, file->job.preparation().tables_file);
+    book.close();
+    office.archive.drop_all_soon(file->job.id());
+    return false;
+}
+
 Status prepare(Office& office, const JobPtr& file) {
     JobSpec spec;
+    std::shared_ptr<const ArchivedJob> archived;
     {
         const OpenBook book(office);
         spec = file->job.spec();
+        archived = file->archived;
     }
     auto facts = office.options.read_scene(office.assets, spec, file->stop.get_token());
     if (!facts.ok()) return facts.status();
@@ -70,11 +105,15 @@ Status prepare(Office& office, const JobPtr& file) {
     if (crop.empty() || crop.area() > kMaxPartialPixels)
         return invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) + " pixels");
     LL_RETURN_IF_ERROR(check_memory(crop, office.options.memory_bytes));
+    if (archived && archived->planned) {
+        const auto resumed = resume_rendering(office, file, *archived, *facts);
+        if (!resumed.ok()) return resumed.status();
+        if (*resumed) return {};
+    }
     spec.frame = facts->frame;
     if (spec.max_depth < 0) spec.max_depth = facts->max_depth;
     if (spec.algorithm.learning()) return prepare_tables(office, file, std::move(spec), *std::move(facts), true);
-    plan_units(office, file, std::move(spec), *std::move(facts), {});
-    return {};
+    return plan_units(office, file, std::move(spec), *std::move(facts), {});
 }
 
 Status take_over_tables(Office& office, const JobPtr& file) {
@@ -121,6 +160,7 @@ bool wait_for_maker(OpenBook& book, const JobPtr& file) {
 
 void open_training(Office& office, OpenBook& book, const JobPtr& file, UnitKind kind, uint32_t round, const TrainingWork& work) {
     book.apply(file, file->job.open_round(kind, round, work, office.options.shuffle_seed));
+    start_replaying_training(office, book, file);
 }
 
 void open_first_round(Office& office, OpenBook& book, const JobPtr& file) {

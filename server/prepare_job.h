@@ -12,7 +12,7 @@ void start_taking_over(Office& office, OpenBook& book, const JobPtr& file);
 
 /// True if another job makes the tables that this one needs; then it waits for them, and makes none itself.
 bool wait_for_maker(OpenBook& book, const JobPtr& file);
-/// Opens a round of training units.
+/// Opens a round of training units. What an earlier coordinator has of it is entered.
 void open_training(Office& office, OpenBook& book, const JobPtr& file, UnitKind kind, uint32_t round, const TrainingWork& work);
 /// The first round of the set that the job's spec names. From now on others may wait for its tables.
 void open_first_round(Office& office, OpenBook& book, const JobPtr& file);

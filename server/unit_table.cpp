@@ -145,6 +145,12 @@ std::vector<UnitTable::Expired> UnitTable::expire(TimePoint now) {
     return expired;
 }
 
+bool UnitTable::is_done(const UnitKey& key) const {
+    if (key.group < merged_groups_) return is_ours(key);
+    const Entry* const e = entry(key);
+    return e && e->state == State::kDone;
+}
+
 std::optional<TimePoint> UnitTable::next_expiry() const {
     std::optional<TimePoint> next;
     for (const UnitKey& key : leased_) {

@@ -61,6 +61,8 @@ class UnitTable {
     /// The same for a unit that a worker could not render; see lease().
     Failures fail(const UnitKey& key, uint32_t worker);
 
+    /// Whether a result of the unit has been entered.
+    bool is_done(const UnitKey& key) const;
     /// The unit of an opened group.
     std::optional<WorkUnit> find(const UnitKey& key) const;
     /// Groups below `count` are merged: the window moves on, and of their units only worker and digest are kept.

@@ -26,32 +26,41 @@ void WorkerRegistry::refuse(const WorkerHello& hello, const std::string& why, Ti
     refused_.push_back({hello, why, now});
 }
 
-WorkerRecord& WorkerRegistry::add(const WorkerHello& hello, TimePoint now) {
+WorkerRecord& WorkerRegistry::insert(uint32_t index, const WorkerHello& hello) {
     auto worker = std::make_unique<WorkerRecord>();
-    worker->index = uint32_t(workers_.size());
-    worker->id = "worker-" + std::to_string(worker->index + 1) + "-" + hello.host + "-" + std::to_string(hello.process_id);
+    worker->index = index;
+    worker->id = "worker-" + std::to_string(index + 1) + "-" + hello.host + "-" + std::to_string(hello.process_id);
     worker->hello = hello;
-    worker->last_heard = now;
+    indices_.emplace(worker->id, index);
+    return *(workers_[index] = std::move(worker));
+}
+
+WorkerRecord& WorkerRegistry::add(const WorkerHello& hello, TimePoint now) {
+    WorkerRecord& worker = insert(workers_.empty() ? 0 : workers_.rbegin()->first + 1, hello);
+    worker.last_heard = now;
     std::erase_if(refused_, [&](const Refused& r) { return r.hello.host == hello.host; });
-    indices_.emplace(worker->id, worker->index);
-    workers_.push_back(std::move(worker));
-    return *workers_.back();
+    return worker;
+}
+
+void WorkerRegistry::restore(uint32_t index, const WorkerHello& hello) {
+    if (!workers_.contains(index)) insert(index, hello).left = true;
 }
 
 WorkerRecord* WorkerRegistry::find(const std::string& id) const {
     const auto known = indices_.find(id);
     if (known == indices_.end()) return nullptr;
-    WorkerRecord* const worker = workers_[known->second].get();
+    WorkerRecord* const worker = workers_.at(known->second).get();
     return worker->left ? nullptr : worker;
 }
 
 size_t WorkerRegistry::idle() const {
-    return size_t(std::count_if(workers_.begin(), workers_.end(), [](const auto& w) { return w->held.empty() && w->waiting > 0; }));
+    return size_t(
+        std::count_if(workers_.begin(), workers_.end(), [](const auto& w) { return w.second->held.empty() && w.second->waiting > 0; }));
 }
 
 WorkerRegistry::Crew WorkerRegistry::crew(TimePoint now) const {
     Crew crew;
-    for (const auto& worker : workers_) {
+    for (const auto& [index, worker] : workers_) {
         if (lost(*worker, now)) continue;
         ++crew.workers;
         crew.most_threads = std::max(crew.most_threads, worker->hello.thread_count);
@@ -61,7 +70,9 @@ WorkerRegistry::Crew WorkerRegistry::crew(TimePoint now) const {
 
 bool WorkerRegistry::anyone_else(const std::set<uint32_t>& workers, TimePoint now) const {
     return std::any_of(workers_.begin(), workers_.end(),
-                       [&](const auto& w) { return !lost(*w, now) && now >= w->rests_until && !workers.contains(w->index); });
+                       [&](const auto& w) {
+                           return !lost(*w.second, now) && now >= w.second->rests_until && !workers.contains(w.first);
+                       });
 }
 
 void WorkerRegistry::unit_failed(WorkerRecord& worker, TimePoint now) {
@@ -89,7 +100,8 @@ WorkerState WorkerRegistry::state(const WorkerRecord& worker, TimePoint now) con
 
 std::vector<WorkerStatus> WorkerRegistry::statuses(TimePoint now, double gone_within_seconds) const {
     std::vector<WorkerStatus> out;
-    for (const auto& w : workers_) {
+    for (const auto& [index, w] : workers_) {
+        if (w->left && w->last_heard == TimePoint()) continue;  // it left before this coordinator began
         WorkerStatus status{.worker_id = w->id,
                             .host = w->hello.host,
                             .process_id = w->hello.process_id,

@@ -49,9 +49,11 @@ class WorkerRegistry {
 
     /// Adds a worker; the reference stays valid.
     WorkerRecord& add(const WorkerHello& hello, TimePoint now);
+    /// A worker that had this number under an earlier coordinator, whose results it delivered. It has left.
+    void restore(uint32_t index, const WorkerHello& hello);
     /// Finds a worker; null if it is unknown or has left.
     WorkerRecord* find(const std::string& id) const;
-    WorkerRecord& at(uint32_t index) const { return *workers_.at(index); }
+    WorkerRecord& at(uint32_t index) const { return *workers_.at(index); }  // throws if there is none
 
     /// Remembers a worker that was not let in, until one registers from the same host. Only the last few are kept.
     void refuse(const WorkerHello& hello, const std::string& why, TimePoint now);
@@ -85,8 +87,10 @@ class WorkerRegistry {
     }
 
     double lease_seconds_;
-    std::vector<std::unique_ptr<WorkerRecord>> workers_;  // by index
-    std::map<std::string, uint32_t> indices_;             // by id
+    WorkerRecord& insert(uint32_t index, const WorkerHello& hello);
+
+    std::map<uint32_t, std::unique_ptr<WorkerRecord>> workers_;  // by index
+    std::map<std::string, uint32_t> indices_;                    // by id
     struct Refused {
         WorkerHello hello;
         std::string why;

@@ -50,11 +50,23 @@ Status write_file_atomically(const std::string& path, std::string_view bytes) {
     if (!stream && error == 0) crash_point("file.before-rename");
     if (!stream && error == 0 && std::rename(temporary.c_str(), target.c_str()) != 0) error = errno;
     if (!stream && error == 0) crash_point("file.after-rename");
+    if (!stream && error == 0) {
+        const std::filesystem::path folder = std::filesystem::path(target).parent_path();
+        if (const Status flushed = flush_folder(folder.empty() ? "." : folder.string()); !flushed.ok()) return flushed;
+    }
     if (error != 0) {
         if (!stream) unlink(temporary.c_str());
         return failure(path, "cannot be written", error);
     }
     return Status::ok_status();
+}
+
+Status flush_folder(const std::string& path) {
+    const int folder = open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (folder < 0) return errno == EACCES ? Status() : failure(path, "cannot be opened", errno);  // one may write without reading
+    const int error = fsync(folder) != 0 && errno != EINVAL ? errno : 0;
+    close(folder);
+    return error == 0 ? Status() : failure(path, "cannot be flushed", error);
 }
 
 Result<std::string> read_file(const std::string& path) {

@@ -69,8 +69,8 @@ class AssetStore {
     /// Removes the complete files that were used least recently until the rest have at most `max_bytes`, but never
     /// `newest`; also removes uploads that broke off more than an hour ago.
     void trim(uint64_t max_bytes, const Digest& newest) const;
-    /// Removes the complete files that begin with `prefix`; returns their number.
-    size_t remove_all_that_begin_with(std::string_view prefix);
+    /// Removes the complete files that begin with `prefix`, but those that are needed; returns their number.
+    size_t remove_all_that_begin_with(std::string_view prefix, const std::function<bool(const Digest&)>& needed);
 
     /// One upload in progress. If it is destroyed before it is complete, a later upload goes on from its bytes.
     class Upload {

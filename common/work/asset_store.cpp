@@ -116,7 +116,7 @@ void AssetStore::trim(uint64_t max_bytes, const Digest& newest) const {
                [&](const fs::path& path) { return path.parent_path() == incoming ? CacheFile::kUnfinished : CacheFile::kEntry; });
 }
 
-size_t AssetStore::remove_all_that_begin_with(std::string_view prefix) {
+size_t AssetStore::remove_all_that_begin_with(std::string_view prefix, const std::function<bool(const Digest&)>& needed) {
     size_t count = 0;
     std::error_code error;
     std::vector<fs::path> found;
@@ -125,7 +125,9 @@ size_t AssetStore::remove_all_that_begin_with(std::string_view prefix) {
         if (item->is_directory(error) && item->path().filename() == "incoming") item.disable_recursion_pending();
         if (!item->is_regular_file(error)) continue;
         std::ifstream in(item->path(), std::ios::binary);
-        if (in.read(first.data(), std::streamsize(first.size())) && first == prefix) found.push_back(item->path());
+        if (!in.read(first.data(), std::streamsize(first.size())) || first != prefix) continue;
+        const auto digest = Digest::from_hex(item->path().filename().string());
+        if (!digest.ok() || !needed(*digest)) found.push_back(item->path());
     }
     for (const fs::path& path : found) count += fs::remove(path, error);
     return count;
