@@ -125,8 +125,8 @@ Result<JobInfo> Admission::cancel(const std::string& job_id) {
     // That it ended is told to the archive when the book is closed; it is said here once more, to know that it is on disk.
     const Status kept = office_.archive.end(info);
     if (!kept.ok())
-        return Status(StatusCode::kUnavailable, "job " + job_id + " is cancelled, but that could not be written down (" + kept.message() +
-                                                    "): after a restart it would go on; cancel it again");
+        return Status(StatusCode::kUnavailable, "job " + job_id + " is cancelled, but that could not be written down (" +
+                                                    kept.message() + "): after a restart it would go on; cancel it again");
     return info;
 }
 

@@ -36,8 +36,8 @@ class Admission {
     Office& office_;
     /// Held before the book is opened. One preview is made at a time, because each takes the memory of several images.
     mutable Mutex preview_mutex_;
-    /// Held before the book is opened: one job is accepted at a time, so that a repeated request is answered only when the first one is
-    /// on disk.
+    /// Held before the book is opened: one job is accepted at a time, so that a repeated request is answered only when the first
+    /// one is on disk.
     Mutex submit_mutex_;
 };
 

@@ -83,13 +83,9 @@ Status Archive::keep_training(const std::string& job_id, const UnitKey& unit, co
                               const Digest& digest, std::string_view payload) {
     if (!store_) return {};
     const std::string who = to_bytes<v1::WorkerHello>(worker.hello);
-    return store_->put_result(job_id, {.unit = unit,
-                                       .digest = digest,
-                                       .worker = worker.index,
-                                       .who = who,
-                                       .seconds = seconds,
-                                       .header = {},
-                                       .payload = payload});
+    return store_->put_result(
+        job_id,
+        {.unit = unit, .digest = digest, .worker = worker.index, .who = who, .seconds = seconds, .header = {}, .payload = payload});
 }
 
 Status Archive::checkpoint(const std::string& job_id, const Reducer::Saved& saved) {
@@ -148,8 +144,7 @@ Result<ArchivedJob> Archive::read(const StoredJob& stored, const std::filesystem
     }
     for (const StoredEvent& event : stored.events) {
         if (event.kind == kPlannedBy) out.planned_by = event.bytes;
-        if (event.kind == kSpent)
-            (void)std::sscanf(event.bytes.c_str(), "%lg %lg", &out.learning_seconds, &out.rendering_seconds);
+        if (event.kind == kSpent) (void)std::sscanf(event.bytes.c_str(), "%lg %lg", &out.learning_seconds, &out.rendering_seconds);
         if (event.kind == kPlanned) {
             auto planned = from_bytes<v1::Job>(event.bytes);
             if (!planned.ok()) return planned.status();
@@ -166,8 +161,8 @@ Result<ArchivedJob> Archive::read(const StoredJob& stored, const std::filesystem
     return out;
 }
 
-Result<std::vector<ArchivedJob>> Archive::load(const std::filesystem::path& jobs_directory, std::map<uint32_t, WorkerHello>& workers,
-                                               std::vector<std::string>& unreadable) {
+Result<std::vector<ArchivedJob>> Archive::load(const std::filesystem::path& jobs_directory,
+                                               std::map<uint32_t, WorkerHello>& workers, std::vector<std::string>& unreadable) {
     std::vector<ArchivedJob> out;
     if (!store_) return out;
     const auto jobs = store_->load();

@@ -31,7 +31,7 @@ struct ArchivedJob {
     /// Of a job that rendered: its complete spec and its tables, and which build it was.
     std::optional<JobInfo> planned;
     std::string planned_by;
-    std::optional<JobSpec> settled;  ///< The spec with the size of training set that a time limit had room for.
+    std::optional<JobSpec> settled;                      ///< The spec with the size of training set that a time limit had room for.
     double learning_seconds = 0, rendering_seconds = 0;  ///< Time that was taken of the time limit.
     std::vector<StoredResult> results;
     std::optional<StoredCheckpoint> checkpoint;
@@ -65,7 +65,8 @@ class Archive {
     void drop_soon(const std::string& job_id, const UnitKey& unit);
     void drop_all_soon(const std::string& job_id);
 
-    /// All jobs, oldest first, and the workers that results name. `unreadable` takes a line for each job that this build cannot read.
+    /// All jobs, oldest first, and the workers that results name. `unreadable` takes a line for each job that this build cannot
+    /// read.
     Result<std::vector<ArchivedJob>> load(const std::filesystem::path& jobs_directory, std::map<uint32_t, WorkerHello>& workers,
                                           std::vector<std::string>& unreadable);
     Result<Partial> read_partial(const StoredResult& result, const PartialExpectation& expected) const;

@@ -52,7 +52,8 @@ void Coordinator::keep_time(std::stop_token stop) {
         if (seconds > 0) book.wait_until(book->agenda_changed, seconds_after(std::chrono::steady_clock::now(), seconds));
         if (stop.stop_requested()) break;
         dispatch_.tick(book);
-        if (office_.archive.keeps() && seconds_between(room_checked_, now) >= (book->paused.empty() ? kRoomSeconds : kPausedSeconds))
+        if (office_.archive.keeps() &&
+            seconds_between(room_checked_, now) >= (book->paused.empty() ? kRoomSeconds : kPausedSeconds))
             look_for_room(book);
     }
 }
@@ -62,7 +63,8 @@ void Coordinator::look_for_room(OpenBook& book) {
     book.close();
     const Status room = check_room(office_);
     book.reopen();
-    if (!room.ok() && book->paused.empty()) book.note().error("no units are given out, because the disk is full: " + room.message());
+    if (!room.ok() && book->paused.empty())
+        book.note().error("no units are given out, because the disk is full: " + room.message());
     if (room.ok() && !book->paused.empty()) {
         book.note().info("there is room on the disk again: jobs go on");
         book->wake_all_waiters();

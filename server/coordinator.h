@@ -89,7 +89,7 @@ class Coordinator {
     Dispatch dispatch_;
     Intake intake_;
     TimePoint room_checked_;  ///< For the ticker alone.
-    std::jthread ticker_;  // last, so that it stops before anything that it uses is destroyed
+    std::jthread ticker_;     // last, so that it stops before anything that it uses is destroyed
 };
 
 }  // namespace lightloom

@@ -105,8 +105,9 @@ Result<SubmitAck> Intake::not_kept(const JobPtr& file, const UnitKey& unit, cons
 SubmitAck Intake::report_difference(OpenBook& book, const JobPtr& file, const UnitKey& unit, const std::string& worker_id) {
     ++file->job.incidents.duplicates_different;
     book.changed(file);
-    book.note().error(file->job.id() + ": unit " + unit_name(unit) + " from " + worker_id +
-                      " differs from the bytes accepted before; one of two workers computes wrongly: compare their hosts and builds");
+    book.note().error(
+        file->job.id() + ": unit " + unit_name(unit) + " from " + worker_id +
+        " differs from the bytes accepted before; one of two workers computes wrongly: compare their hosts and builds");
     return {SubmitOutcome::kDuplicateDifferent, "the unit was accepted before with other bytes"};
 }
 
@@ -114,7 +115,8 @@ void Intake::checkpoint_if_due(OpenBook& book, const JobPtr& file, uint64_t byte
     if (!office_.archive.keeps()) return;
     file->kept_bytes += bytes;
     const uint64_t state = kStateBytesPerPixel * uint64_t(file->job.spec().frame.crop.area());
-    if (file->in_checkpoint || file->kept_bytes < std::max(kLeastCheckpointBytes, 4 * state) || file->job.merged_groups() == 0) return;
+    if (file->in_checkpoint || file->kept_bytes < std::max(kLeastCheckpointBytes, 4 * state) || file->job.merged_groups() == 0)
+        return;
     file->in_checkpoint = true;
     file->kept_bytes = 0;
     book.start(file, "to write a checkpoint of this job", [&office = office_, file, reducer = file->job.reducer()] {
@@ -130,8 +132,8 @@ void Intake::checkpoint_if_due(OpenBook& book, const JobPtr& file, uint64_t byte
     });
 }
 
-Result<SubmitAck> Intake::take_partial(const std::string& worker_id, const UnitReference& reference, const Kept& kept, Partial partial,
-                                       double render_seconds) {
+Result<SubmitAck> Intake::take_partial(const std::string& worker_id, const UnitReference& reference, const Kept& kept,
+                                       Partial partial, double render_seconds) {
     JobPtr file;
     WorkerRecord sender;
     const Digest& digest = kept.descriptor.payload_digest;

@@ -20,8 +20,8 @@ class Intake {
     /// Takes a partial that came over the wire; it is checked against the unit before anything reads it.
     Result<SubmitAck> submit_payload(const std::string& worker_id, const UnitReference& unit, const PartialDescriptor& descriptor,
                                      std::string_view payload, double render_seconds);
-    /// Takes a partial from this process, and what encode_partial() makes of it; `render_seconds` is the time that it took, or 0 if nobody has
-    /// measured that.
+    /// Takes a partial from this process, and what encode_partial() makes of it; `render_seconds` is the time that it took, or 0 if
+    /// nobody has measured that.
     Result<SubmitAck> submit_partial(const std::string& worker_id, const UnitReference& unit, const EncodedPartial& encoded,
                                      Partial partial, double render_seconds);
     /// Most bytes of the training data of a unit; errors as those of expected_partial().
@@ -38,8 +38,8 @@ class Intake {
     };
     Result<SubmitAck> take_partial(const std::string& worker_id, const UnitReference& unit, const Kept& kept, Partial partial,
                                    double render_seconds);
-    /// The answer to a result that came before, or to one that is not wanted; nothing if it is to be kept. `*file` and `*worker` are
-    /// set then.
+    /// The answer to a result that came before, or to one that is not wanted; nothing if it is to be kept. `*file` and `*worker`
+    /// are set then.
     std::optional<Result<SubmitAck>> look_up(const std::string& worker_id, const UnitReference& unit, const Digest& digest,
                                              JobPtr* file, WorkerRecord* worker);
     /// What the worker is told when its result could not be kept.

@@ -30,9 +30,9 @@ struct JobFile {
     int running_tasks = 0;                ///< Under the lock of the book. A job is forgotten only when none runs.
     /// What an earlier coordinator left of the job, until it is used up. Under the lock of the book.
     std::shared_ptr<const ArchivedJob> archived;
-    uint64_t kept_bytes = 0;  ///< Of results since the last checkpoint. Under the lock of the book.
+    uint64_t kept_bytes = 0;     ///< Of results since the last checkpoint. Under the lock of the book.
     bool in_checkpoint = false;  ///< Whether a checkpoint is being written. Under the lock of the book.
-    TimePoint spent_noted;    ///< When the archive was told of the time that the job has taken. Under the lock of the book.
+    TimePoint spent_noted;       ///< When the archive was told of the time that the job has taken. Under the lock of the book.
 };
 using JobPtr = std::shared_ptr<JobFile>;
 

@@ -41,7 +41,8 @@ Status plan_units(Office& office, const JobPtr& file, JobSpec spec, SceneFacts f
     const uint64_t iterations = only_noise_bounds(spec) ? JobSpec::kMaxSamplesPerPixel : spec.samples_per_pixel;
     UnitTable units(plan, iterations, open_groups(spec, office.options.waiting_bytes), office.options.shuffle_seed);
     auto reducer = std::make_shared<Reducer>(frame, plan.tile_count(), facts.response, spec.noise_target);
-    Job::RenderPlan render{std::move(spec), std::move(facts.layers), std::move(units), std::move(reducer), std::move(tables), {}, 0, {}};
+    Job::RenderPlan render{
+        std::move(spec), std::move(facts.layers), std::move(units), std::move(reducer), std::move(tables), {}, 0, {}};
     Job& job = file->job;
     std::shared_ptr<const ArchivedJob> archived;
     {

@@ -24,8 +24,8 @@ struct Preparation {
     bool may_wait = true;      ///< Whether the job may wait for another job's tables: not after damage.
     Digest tables_file;        ///< Digest of the tables that the job will refer to, from before they are stored; zero before.
     TablesInfo handed_over;    ///< Tables of another job, for one that waited for them; without an asset if there are none.
-    /// Whether the rounds of the training set follow from the spec, so that their results are worth keeping. Those of a set that grows
-    /// by measured time do not.
+    /// Whether the rounds of the training set follow from the spec, so that their results are worth keeping. Those of a set that
+    /// grows by measured time do not.
     bool rounds_are_fixed = true;
     TimePoint training_begin;  ///< When the first training unit was leased; unset before.
     TimePoint round_begin;     ///< The same for the open round.

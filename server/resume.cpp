@@ -56,8 +56,8 @@ std::vector<const StoredResult*> replay_partials(Office& office, const ArchivedJ
         const auto read = [&]() -> Status {
             if (!unit) return data_loss("there is no such unit");
             const RenderUnit& work = unit->render;
-            const auto partial = office.archive.read_partial(
-                result, {plan.spec.frame, work.tile, work.samples_per_pixel(), work.light_path_count});
+            const auto partial =
+                office.archive.read_partial(result, {plan.spec.frame, work.tile, work.samples_per_pixel(), work.light_path_count});
             if (!partial.ok()) return partial.status();
             const auto refused = plan.reducer->add(*unit, *partial);
             if (!refused.ok()) return refused.status();
@@ -95,7 +95,7 @@ Status replay_training(Office& office, const JobPtr& file) {
         auto part = office.archive.read_training(result);
         OpenBook book(office);
         UnitTable* const units = file->job.open_units(result.unit);
-        if (!units) return {};  // the job ended meanwhile
+        if (!units) return {};                     // the job ended meanwhile
         (void)units->has_more_than(SIZE_MAX - 1);  // opens all units of the round
         const auto unit = units->find(result.unit);
         Status problem = unit ? part.status() : data_loss("there is no such unit");

@@ -54,8 +54,8 @@ WorkerRecord* WorkerRegistry::find(const std::string& id) const {
 }
 
 size_t WorkerRegistry::idle() const {
-    return size_t(
-        std::count_if(workers_.begin(), workers_.end(), [](const auto& w) { return w.second->held.empty() && w.second->waiting > 0; }));
+    return size_t(std::count_if(workers_.begin(), workers_.end(),
+                                [](const auto& w) { return w.second->held.empty() && w.second->waiting > 0; }));
 }
 
 WorkerRegistry::Crew WorkerRegistry::crew(TimePoint now) const {
@@ -69,10 +69,9 @@ WorkerRegistry::Crew WorkerRegistry::crew(TimePoint now) const {
 }
 
 bool WorkerRegistry::anyone_else(const std::set<uint32_t>& workers, TimePoint now) const {
-    return std::any_of(workers_.begin(), workers_.end(),
-                       [&](const auto& w) {
-                           return !lost(*w.second, now) && now >= w.second->rests_until && !workers.contains(w.first);
-                       });
+    return std::any_of(workers_.begin(), workers_.end(), [&](const auto& w) {
+        return !lost(*w.second, now) && now >= w.second->rests_until && !workers.contains(w.first);
+    });
 }
 
 void WorkerRegistry::unit_failed(WorkerRecord& worker, TimePoint now) {

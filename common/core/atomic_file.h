@@ -13,8 +13,8 @@ namespace lightloom {
 /// written to directly.
 Status write_file_atomically(const std::string& path, std::string_view bytes);
 
-/// Flushes the names in a folder to disk, so that what was made or renamed in it is still there after a power failure. A folder of a
-/// kind that cannot be flushed counts as flushed.
+/// Flushes the names in a folder to disk, so that what was made or renamed in it is still there after a power failure. A folder of
+/// a kind that cannot be flushed counts as flushed.
 Status flush_folder(const std::string& path);
 
 /// Reads the whole file. The error, kNotFound or kInvalidArgument, names the path.

@@ -29,12 +29,16 @@ inline constexpr std::string_view kCrashLabels[] = {
     "worker.before-submit",      // before a result is sent, every attempt counts
     "worker.after-submit",       // the coordinator has answered
     "worker.unit-released",      // a unit was given back
+    "server.job-kept",           // a job is on disk, nobody knows of it
     "server.job-accepted",       // a job is known, its submitter has no answer yet
     "server.scene-read",         // the scene of a job was read
     "server.units-planned",      // a job may begin to render
     "server.unit-leased",        // a unit was given away, its worker has no answer yet
     "server.result-received",    // all bytes of an image's unit are here, nothing was looked at
     "server.training-received",  // the same for a unit of the training set
+    "server.result-kept",        // a result is on disk; nothing was added, its worker has no answer yet
+    "server.training-kept",      // the same for a unit of the training set
+    "server.checkpoint-kept",    // the sums of an image are on disk
     "server.before-merge",       // a result is valid and the first of its unit; nothing was added
     "server.after-merge",        // it was added, but the job does not count it yet
     "server.result-counted",     // the job counts it, its worker has no answer yet
@@ -46,6 +50,11 @@ inline constexpr std::string_view kCrashLabels[] = {
     "server.image-written",      // the image is on disk, its manifest is not
     "server.manifest-written",   // both are on disk, the job has not ended yet
     "server.job-ended",          // the job has its last state, nobody was told
+    "server.segment-created",    // a file for payloads has its name, and nothing is in it
+    "server.payloads-written",   // the payloads of a batch are in their segments, not flushed; the transaction is open
+    "server.payloads-synced",    // they are flushed, the transaction is still open
+    "server.batch-committed",    // the batch is on disk, nobody was told
+    "server.checkpoint-saved",   // a checkpoint's file is on disk, nothing refers to it
     "asset.appended",            // a part of a file has arrived, or all of it
     "asset.before-commit",       // a file is complete, flushed and checked; it has no name yet
     "asset.committed",           // it has its name
