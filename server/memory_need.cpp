@@ -22,7 +22,7 @@ constexpr uint64_t kMaxOpenGroups = 256;
 
 bool splats(const JobSpec& spec) { return spec.algorithm.light_paths_per_iteration(spec.frame.crop.area()) > 0; }
 
-std::string gigabytes(uint64_t bytes) {
+std::string gb_text(uint64_t bytes) {
     char text[32];
     std::snprintf(text, sizeof text, "%.*f", bytes < 100'000'000 ? 3 : 1, double(bytes) * 1e-9);
     return text;
@@ -61,9 +61,9 @@ std::string memory_text(const MemoryNeed& need) {
                                       {"writing it ", need.writing}}) {
         if (bytes == 0) continue;
         if (!parts.empty()) parts += ", ";
-        parts += what + gigabytes(bytes);
+        parts += what + gb_text(bytes);
     }
-    return gigabytes(need.peak()) + " GB" + (parts.empty() ? "" : " (" + parts + ")");
+    return gb_text(need.peak()) + " GB" + (parts.empty() ? "" : " (" + parts + ")");
 }
 
 Status check_memory(const JobSpec& spec, const MemoryNeed& need, uint64_t host_bytes, uint64_t other_jobs_bytes) {
@@ -73,10 +73,10 @@ Status check_memory(const JobSpec& spec, const MemoryNeed& need, uint64_t host_b
     const bool learning = need.training > need.image + std::max(need.groups, need.writing);
     const bool alone = peak <= host_bytes;
     std::string text = "the job's " + std::to_string(spec.frame.crop.area()) + " pixels need about " + memory_text(need) +
-                       " of memory; the coordinator's host has " + gigabytes(host_bytes) + " GB";
+                       " of memory; the coordinator's host has " + gb_text(host_bytes) + " GB";
     if (alone)
         return {StatusCode::kResourceExhausted,
-                text + ", of which other jobs need " + gigabytes(other_jobs_bytes) + "; submit it again when they have ended"};
+                text + ", of which other jobs need " + gb_text(other_jobs_bytes) + "; submit it again when they have ended"};
     text += learning ? "; choose fewer training-paths" : "; lower the resolution or give a crop window";
     return {StatusCode::kResourceExhausted, text};
 }
