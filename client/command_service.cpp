@@ -12,10 +12,14 @@
 #include "client/run_job.h"
 #include "client/service_options.h"
 #include "common/cli/numbers.h"
+#include "common/core/utf8.h"
 #include "server/status_json.h"
 
 namespace lightloom::client {
 namespace {
+
+/// How often a job is submitted, if the service loses files of its scene.
+constexpr int kJobAttempts = 3;
 
 constexpr const char* kSubmitFooter = R"(Examples:
   lightloom submit room.pbrt --server render1:50051 -o out.exr --png out.png --spp 256
@@ -34,21 +38,25 @@ int submit_job(const ServiceOptions& options) {
     if (!local.ok()) return report_error(local.status());
     if (Status s = check_bound(options.job, local->spec); !s.ok()) return report_error(s);
     ClientTimes times{.import_seconds = local->scene.import_seconds, .digest_seconds = local->scene.digest_seconds};
-    auto begin = std::chrono::steady_clock::now();
-    if (Status s = upload_scene(port, local->scene); !s.ok()) return service_error(options, s);
-    times.upload_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    begin = std::chrono::steady_clock::now();
-    const auto job = submit(port, local->spec, make_label(options.name, options.job.scene));
-    if (!job.ok()) return service_error(options, job.status());
-    if (options.detach) {
-        std::printf("%s\n", job->job_id.c_str());
-        return kSuccess;
+    const JobLabel label = make_label(options.name, options.job.scene);
+    for (int attempt = 1;; ++attempt) {
+        const auto job = submit_scene(port, local->scene, local->spec, label, times);
+        if (!job.ok()) return service_error(options, job.status());
+        if (options.detach) {
+            std::printf("%s\n", job->job_id.c_str());
+            return kSuccess;
+        }
+        if (!options.job.quiet) std::fprintf(stderr, "lightloom: %s\n", job->job_id.c_str());
+        const auto begin = std::chrono::steady_clock::now();
+        const auto ended = watch(port, job->job_id, options.job.quiet, true);
+        times.wait_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+        if (ended.ok()) return fetch(port, *ended, options.job, times, AfterFetch::kImageStays);
+        // A job that failed because the service lost files of the scene is worth another attempt, with these files.
+        const bool failed = ended.status().code() == StatusCode::kAborted;
+        if (!failed || attempt == kJobAttempts || !lacks_files(port, local->scene)) return job_error(options, ended.status());
+        std::fprintf(stderr, "lightloom: %s; it is submitted again, with the files that are missing\n",
+                     one_line(ended.status().message()).c_str());
     }
-    if (!options.job.quiet) std::fprintf(stderr, "lightloom: %s\n", job->job_id.c_str());
-    const auto ended = watch(port, job->job_id, options.job.quiet, true);
-    times.wait_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    if (!ended.ok()) return job_error(options, ended.status());
-    return fetch(port, *ended, options.job, times, AfterFetch::kImageStays);
 }
 
 int watch_job(const ServiceOptions& options) {

@@ -24,6 +24,8 @@ using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kManifest = ".manifest.json";
+/// How often the files of a scene are sent, if the service loses them.
+constexpr int kSendAttempts = 3;
 /// Where halves cannot hold a rendered image.
 constexpr const char *kFloatInstead = ".float.exr", *kFloatManifest = ".float.manifest.json";
 
@@ -168,14 +170,23 @@ Status check_outputs(const JobOptions& options, const std::vector<const char*>& 
     return check_output_files(scene ? files_of(*scene) : std::vector<std::filesystem::path>(), outputs);
 }
 
+namespace {
+
+/// The files of a scene, and their list; of those with the same bytes, one.
+std::vector<Digest> digests_of(const LocalScene& scene) {
+    std::set<Digest> digests{scene.manifest.root()};
+    for (const AssetEntry& entry : scene.manifest.entries) digests.insert(entry.digest);
+    return {digests.begin(), digests.end()};
+}
+
+}  // namespace
+
 Status upload_scene(JobPort& port, const LocalScene& scene) {
     const std::string text = scene.manifest.canonical_text();
     const Digest root = sha256(text);
-    std::map<Digest, const AssetEntry*> entries;  // of files with the same bytes, one
+    std::map<Digest, const AssetEntry*> entries;
     for (const AssetEntry& entry : scene.manifest.entries) entries.emplace(entry.digest, &entry);
-    std::vector<Digest> digests{root};
-    for (const auto& [digest, entry] : entries) digests.push_back(digest);
-    const auto missing = port.find_missing(digests);
+    const auto missing = port.find_missing(digests_of(scene));
     if (!missing.ok()) return missing.status();
     for (const Digest& digest : *missing) {
         if (interrupt_token().stop_requested()) return {StatusCode::kCancelled, "interrupted"};
@@ -198,6 +209,25 @@ Result<JobInfo> submit(JobPort& port, const JobSpec& spec, const JobLabel& label
         const bool lost = code == StatusCode::kUnavailable || code == StatusCode::kDeadlineExceeded;
         if (job.ok() || !lost || attempt == 3) return job;
         std::this_thread::sleep_for(std::chrono::milliseconds(200 << attempt));
+    }
+}
+
+bool lacks_files(JobPort& port, const LocalScene& scene) {
+    const auto missing = port.find_missing(digests_of(scene));
+    return missing.ok() && !missing->empty();
+}
+
+Result<JobInfo> submit_scene(JobPort& port, const LocalScene& scene, const JobSpec& spec, const JobLabel& label,
+                             ClientTimes& times) {
+    for (int attempt = 1;; ++attempt) {
+        const auto begin = Clock::now();
+        LL_RETURN_IF_ERROR(upload_scene(port, scene));
+        times.upload_seconds += seconds_since(begin);
+        auto job = submit(port, spec, label);
+        // A file may have turned out to be damaged in the service's store, or may have been collected meanwhile.
+        const StatusCode code = job.status().code();
+        const bool files = code == StatusCode::kDataLoss || code == StatusCode::kFailedPrecondition;
+        if (!files || attempt == kSendAttempts || !lacks_files(port, scene)) return job;
     }
 }
 

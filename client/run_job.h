@@ -26,6 +26,11 @@ std::vector<const char*> beside_image(const JobOptions& options, AfterFetch afte
 Status check_outputs(const JobOptions& options, const std::vector<const char*>& beside, const LocalScene* scene);
 /// Sends what the coordinator lacks of the scene's files.
 Status upload_scene(JobPort& port, const LocalScene& scene);
+/// Whether the coordinator lacks any of them.
+bool lacks_files(JobPort& port, const LocalScene& scene);
+/// Sends what the coordinator lacks, and submits; again where it turns out to have lost files. Adds to `times`.
+Result<JobInfo> submit_scene(JobPort& port, const LocalScene& scene, const JobSpec& spec, const JobLabel& label,
+                             ClientTimes& times);
 /// Submits under a fresh request id.
 Result<JobInfo> submit(JobPort& port, const JobSpec& spec, const JobLabel& label = {});
 /// Watches until the end, and calls `on_change` with every state that it sees, the last one included; on an interrupt, cancels the

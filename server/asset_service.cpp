@@ -1,7 +1,5 @@
 #include "server/asset_service.h"
 
-#include <fstream>
-
 #include "server/grpc_answers.h"
 
 namespace lightloom {
@@ -17,7 +15,10 @@ grpc::Status AssetServiceImpl::FindMissing(grpc::ServerContext*, const v1::FindM
     for (const v1::Digest& item : request->digests()) {
         const auto digest = wire::get(item);
         if (!digest.ok()) return wire::to_grpc(digest.status());
-        if (!store_.contains(*digest)) wire::put(*digest, response->add_missing());
+        if (store_.contains(*digest))
+            store_.touch(*digest);  // a submission follows, and until then nobody knows that it is needed
+        else
+            wire::put(*digest, response->add_missing());
     }
     return grpc::Status::OK;
 }
@@ -60,24 +61,13 @@ grpc::Status AssetServiceImpl::Read(grpc::ServerContext* context, const v1::Read
                                     grpc::ServerWriter<v1::Chunk>* writer) {
     const auto digest = wire::get(request->digest());
     if (!digest.ok()) return wire::to_grpc(digest.status());
-    std::ifstream in(store_.path_of(*digest), std::ios::binary | std::ios::ate);
-    if (!in) return {grpc::StatusCode::NOT_FOUND, "asset " + digest->hex() + " is not here"};
-    const uint64_t size = uint64_t(in.tellg());
-    uint64_t offset = request->offset_bytes();
-    if (offset > size) return {grpc::StatusCode::OUT_OF_RANGE, "the asset has " + std::to_string(size) + " bytes"};
-    in.seekg(std::streamoff(offset));
     v1::Chunk chunk;
-    while (offset < size && !closing_ && !context->IsCancelled()) {
-        std::string* data = chunk.mutable_data();
-        data->resize(std::min<uint64_t>(kMaxChunkBytes, size - offset));
-        in.read(data->data(), std::streamsize(data->size()));
-        if (!in) return {grpc::StatusCode::DATA_LOSS, "asset " + digest->hex() + " cannot be read"};
+    return wire::to_grpc(store_.stream(*digest, request->offset_bytes(), [&](uint64_t offset, std::string_view bytes) -> Status {
         chunk.set_offset_bytes(offset);
-        if (!writer->Write(chunk)) break;
-        offset += data->size();
-    }
-    if (offset < size) return {grpc::StatusCode::UNAVAILABLE, "the asset was not sent to its end; continue from there"};
-    return grpc::Status::OK;
+        chunk.set_data(bytes.data(), bytes.size());
+        if (!closing_ && !context->IsCancelled() && writer->Write(chunk)) return {};
+        return {StatusCode::kUnavailable, "the asset was not sent to its end; continue from there"};
+    }));
 }
 
 }  // namespace lightloom

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <thread>
 
 #include "common/cli/command_line.h"
@@ -17,6 +18,7 @@
 #include "common/core/atomic_file.h"
 #include "common/core/large_blocks.h"
 #include "common/work/identity.h"
+#include "server/collection.h"
 #include "server/data_lock.h"
 #include "server/grpc_services.h"
 #include "server/health.h"
@@ -71,9 +73,9 @@ int main(int argc, char** argv) {
                      "lightloom-server"};
     app.footer(kFooter);
     std::string listen = "127.0.0.1:50051", data = "lightloom-data", status = "127.0.0.1:9464", level = "info", port_file;
-    double lease = 10;
+    double lease = 10, keep_days = 0;
     uint32_t threads = 0;
-    uint64_t table_cache_mib = 4096;
+    uint64_t table_cache_mib = 4096, disk_limit_mib = 0;
     bool plaintext = false, reflection = false;
     std::optional<uint64_t> shuffle;
     app.add_option("--listen", listen, "Where clients and workers connect; port 0 picks a free one; unix:PATH is a socket file")
@@ -101,6 +103,17 @@ int main(int argc, char** argv) {
                    "least recently go first; 0 keeps none")
         ->type_name("MIB")
         ->check(whole_number_between(0, uint64_t(1) << 30))
+        ->capture_default_str();
+    app.add_option("--keep-days", keep_days,
+                   "Remove images of jobs, and scene files, that have not been used for so many days; 0 keeps them")
+        ->type_name("DAYS")
+        ->check(number_between(0, 36500))
+        ->capture_default_str();
+    app.add_option("--disk-limit", disk_limit_mib,
+                   "MiB of images and scene files, above which those used longest ago are removed; what a job needs, or what is "
+                   "younger than an hour, stays; 0 is no limit")
+        ->type_name("MIB")
+        ->check(whole_number_between(0, uint64_t(1) << 40))
         ->capture_default_str();
     app.add_option("--port-file", port_file,
                    "File for \"GRPC_PORT STATUS_PORT\", written once both listen (a unix: socket has port 0)")
@@ -160,6 +173,19 @@ int main(int argc, char** argv) {
         }
         http = std::move(started).value();
     }
+    const auto in_use = [&coordinator] {
+        InUse used;
+        std::set<Digest> scenes;
+        for (const JobInfo& job : coordinator.list_jobs()) {
+            if (is_terminal(job.state)) continue;
+            used.jobs.insert(job.job_id);
+            scenes.insert(job.spec.scene_root);
+            used.assets.insert(job.tables.asset.digest);
+        }
+        used.assets.merge(files_of_scenes(coordinator.assets(), scenes));
+        return used;
+    };
+    const Collector collector(data, {.keep_days = keep_days, .disk_limit = disk_limit_mib << 20}, in_use);
     std::optional<OwnWorker> own;
     if (threads > 0) own.emplace(coordinator, *identity, threads, std::filesystem::path(data) / "worker");
     const bool tcp = !listen.starts_with("unix:");

@@ -9,7 +9,7 @@ namespace lightloom {
 class FetchingWorker {
   public:
     /// `port` must outlive the worker; for `directory` see SceneFetcher.
-    FetchingWorker(WorkerPort& port, const std::filesystem::path& directory, WorkerOptions options);
+    FetchingWorker(WorkerPort& port, const std::filesystem::path& directory, WorkerOptions options, const CacheLimits& limits = {});
     Status check_directory() const { return fetcher_.check_directory(); }
     Status run(std::stop_token stop) { return worker_.run(std::move(stop)); }
 

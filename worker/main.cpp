@@ -52,6 +52,7 @@ int main(int argc, char** argv) {
     std::string server = "127.0.0.1:50051", level = "info", golden_override;
     std::string cache = default_cache().string();
     uint32_t threads = processor_count();
+    uint64_t cache_mib = 0;
     app.add_option("--server", server, "The coordinator")->type_name("HOST:PORT")->capture_default_str();
     app.add_option("-t,--threads", threads, "Threads to render with (default: all processors)")
         ->type_name("N")
@@ -60,6 +61,11 @@ int main(int argc, char** argv) {
                    "Directory for scene files, and for tables up to 1 GiB; may be shared by the workers of a host "
                    "(default: lightloom in $XDG_CACHE_HOME or ~/.cache)")
         ->type_name("DIR");
+    app.add_option("--cache-limit", cache_mib,
+                   "MiB of scene files in it, above which those used least recently are removed; 0 is no limit")
+        ->type_name("MIB")
+        ->check(whole_number_between(0, uint64_t(1) << 40))
+        ->capture_default_str();
     add_log_option(app, level);
     add_completion_option(app);
     add_version_option(app, kBuildId);
@@ -84,8 +90,9 @@ int main(int argc, char** argv) {
         identity->golden_digest = *digest;
     }
     GrpcWorkerPort port(open_channel(server));
-    FetchingWorker worker(
-        port, cache, {.identity = *identity, .thread_count = threads, .host = host_name(), .process_id = uint64_t(::getpid())});
+    FetchingWorker worker(port, cache,
+                          {.identity = *identity, .thread_count = threads, .host = host_name(), .process_id = uint64_t(::getpid())},
+                          {.scenes = cache_mib << 20});
     if (const Status usable = worker.check_directory(); !usable.ok()) return report_failure(usable, "--cache ");
     const Status status = worker.run(stop.get_token());
     return status.ok() ? kStopped : report_failure(status);

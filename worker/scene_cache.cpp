@@ -31,16 +31,23 @@ std::string scratch_name() {
     return "scenes-" + std::to_string(::getpid()) + "-" + std::to_string(device());
 }
 
+/// The error of a file that the coordinator has not, or not whole, as people need it.
+Status named(const std::string& what, const Status& status) {
+    if (status.code() != StatusCode::kNotFound && status.code() != StatusCode::kDataLoss) return status;
+    return {status.code(),
+            what + " is lost or damaged in the coordinator's store (" + status.message() + "); submit the scene again"};
+}
+
 }  // namespace
 
 // "tables" is taken: the client keeps the table cache of its own coordinator there, by default below the same
 // directory.
-SceneFetcher::SceneFetcher(WorkerPort& port, std::filesystem::path directory, uint64_t max_table_bytes)
+SceneFetcher::SceneFetcher(WorkerPort& port, std::filesystem::path directory, const CacheLimits& limits)
     : port_(port),
       scratch_(directory / scratch_name()),
       store_(directory / "assets"),
       table_store_(directory / "worker-tables"),
-      max_table_bytes_(max_table_bytes) {}
+      limits_(limits) {}
 
 SceneFetcher::~SceneFetcher() {
     std::error_code ignored;
@@ -67,11 +74,14 @@ Status SceneFetcher::fetch(AssetStore& store, const Digest& digest, uint64_t siz
             continue;
         }
         if (!upload.ok()) return upload.status();
-        LL_RETURN_IF_ERROR(port_.read_asset(digest, upload->offset(), [&](std::string_view bytes) -> Status {
+        Status status = port_.read_asset(digest, upload->offset(), [&](std::string_view bytes) -> Status {
             if (stop.stop_requested()) return {StatusCode::kCancelled, "stopped"};
             return upload->append(bytes);
-        }));
-        LL_RETURN_IF_ERROR(upload->finish());
+        });
+        if (status.code() == StatusCode::kDataLoss) upload->discard();
+        if (status.ok()) status = upload->finish();
+        if (status.code() == StatusCode::kAborted) continue;  // this worker stood still, and another one took over
+        if (!status.ok()) return status;
     }
     return {};
 }
@@ -79,12 +89,13 @@ Status SceneFetcher::fetch(AssetStore& store, const Digest& digest, uint64_t siz
 Result<AssetManifest> SceneFetcher::file_list(const Digest& root, std::stop_token stop) {
     if (!store_.contains(root)) {
         std::string text;
-        LL_RETURN_IF_ERROR(port_.read_asset(root, 0, [&](std::string_view bytes) -> Status {
+        const Status got = port_.read_asset(root, 0, [&](std::string_view bytes) -> Status {
             if (text.size() + bytes.size() > kMaxManifestBytes)
                 return {StatusCode::kResourceExhausted, "the scene's file list is too long"};
             text += bytes;
             return {};
-        }));
+        });
+        if (!got.ok()) return named("the scene's file list", got);
         for (;;) {
             const Status status = store_.put(root, text);
             if (status.ok()) break;
@@ -102,6 +113,13 @@ Result<AssetManifest> SceneFetcher::file_list(const Digest& root, std::stop_toke
     return AssetManifest::parse(*text);
 }
 
+void SceneFetcher::keep_within_limit(const Digest& root, const AssetManifest& manifest) const {
+    if (limits_.scenes == 0) return;
+    store_.touch(root);
+    for (const AssetEntry& entry : manifest.entries) store_.touch(entry.digest);
+    store_.trim(limits_.scenes, root);
+}
+
 Result<AssetManifest> SceneFetcher::lay_out(const Digest& root, const std::filesystem::path& directory, std::stop_token stop) {
     Status status;
     for (int attempt = 0; attempt < kFetchAttempts; ++attempt) {
@@ -109,10 +127,17 @@ Result<AssetManifest> SceneFetcher::lay_out(const Digest& root, const std::files
         status = manifest.status();
         if (status.ok()) {
             for (const AssetEntry& entry : manifest->entries)
-                if (status.ok()) status = fetch(store_, entry.digest, entry.size_bytes, stop);
+                if (status.ok())
+                    status = named("\"" + entry.path + "\" of the scene", fetch(store_, entry.digest, entry.size_bytes, stop));
         }
-        if (status.ok()) status = store_.materialise(*manifest, directory);
-        if (status.ok()) return manifest;
+        if (status.ok()) {
+            status = store_.materialise(*manifest, directory);
+            if (status.code() == StatusCode::kNotFound) status = data_loss(status.message());  // another worker has just removed it
+        }
+        if (status.ok()) {
+            keep_within_limit(root, *manifest);
+            return manifest;
+        }
         if (status.code() != StatusCode::kDataLoss) return status;
         log_warn("files of scene {} are fetched again: {}", root.hex().substr(0, 12), status.message());
     }
@@ -144,7 +169,7 @@ Result<std::string> SceneFetcher::tables(const AssetReference& tables, std::stop
             auto bytes = table_store_.read(tables.digest);  // fails if another worker has just trimmed them away
             if (bytes.ok()) {
                 table_store_.touch(tables.digest);
-                table_store_.trim(max_table_bytes_, tables.digest);
+                table_store_.trim(limits_.tables, tables.digest);
                 return bytes;
             }
             status = bytes.status();

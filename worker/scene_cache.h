@@ -19,11 +19,17 @@ using TableSource = std::function<Result<std::string>(const AssetReference& tabl
 /// A table source without a directory, for workers in the coordinator's process. `port` must outlive it.
 TableSource direct_tables(WorkerPort& port);
 
-/// Fetches from the coordinator behind `port`. `directory` may be shared by several workers of a host. Above
-/// `max_table_bytes`, the least recently used tables in it are removed.
+/// Most bytes that are kept.
+struct CacheLimits {
+    uint64_t tables = uint64_t(1) << 30;
+    uint64_t scenes = 0;  ///< 0: no limit.
+};
+
+/// Fetches from the coordinator behind `port`. `directory` may be shared by several workers of a host. Above a limit, the least
+/// recently used tables or scene files in it are removed.
 class SceneFetcher {
   public:
-    SceneFetcher(WorkerPort& port, std::filesystem::path directory, uint64_t max_table_bytes = uint64_t(1) << 30);
+    SceneFetcher(WorkerPort& port, std::filesystem::path directory, const CacheLimits& limits = {});
     ~SceneFetcher();
     /// Whether files can be stored there; a worker that cannot fails every unit that it gets.
     Status check_directory() const;
@@ -33,14 +39,18 @@ class SceneFetcher {
   private:
     Status fetch(AssetStore& store, const Digest& digest, uint64_t size_bytes, std::stop_token stop);
     Result<AssetManifest> file_list(const Digest& root, std::stop_token stop);
-    /// Fetches the files of a scene and puts them into `directory` under their names. What is damaged is fetched again.
+    /// Fetches the files of a scene and puts them into `directory` under their names. What is damaged, or what another worker has
+    /// just removed, is fetched again.
     Result<AssetManifest> lay_out(const Digest& root, const std::filesystem::path& directory, std::stop_token stop);
+
+    /// Marks the files of this scene as used, and removes others above the limit.
+    void keep_within_limit(const Digest& root, const AssetManifest& manifest) const;
 
     WorkerPort& port_;
     std::filesystem::path scratch_;  ///< Belongs to this process; removed at the end.
     AssetStore store_;               ///< Scene files, and the lists of them.
     AssetStore table_store_;
-    const uint64_t max_table_bytes_;
+    const CacheLimits limits_;
 };
 
 /// Keeps the last few scenes and renderers, and the last tracer.

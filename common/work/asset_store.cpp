@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <vector>
 
 #include "common/core/atomic_file.h"
 #include "common/core/crash_point.h"
@@ -33,31 +34,67 @@ Status write_all(int file, std::string_view bytes, const fs::path& path) {
     return {};
 }
 
+using Clock = std::chrono::steady_clock;
+
+/// Closes a file when it goes.
+struct OpenFile {
+    explicit OpenFile(int number) : file(number) {}
+    OpenFile(const OpenFile&) = delete;
+    ~OpenFile() {
+        if (file >= 0) ::close(file);
+    }
+    const int file;
+};
+
+/// Reads up to `size` bytes; fewer at the end of the file only.
+Result<size_t> read_some(int file, char* buffer, size_t size, const fs::path& path) {
+    size_t got = 0;
+    while (got < size) {
+        const ssize_t n = ::read(file, buffer + got, size - got);
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) return io_error(path, errno);
+        if (n == 0) break;
+        got += size_t(n);
+    }
+    return got;
+}
+
+Status taken_over() { return {StatusCode::kAborted, "another upload took over, because nothing more had come for a while"}; }
+
+/// Whether `path` still names the open file.
+bool still_named(int file, const fs::path& path) {
+    struct stat ours {
+    }, named{};
+    return ::fstat(file, &ours) == 0 && ::stat(path.c_str(), &named) == 0 && ours.st_ino == named.st_ino &&
+           ours.st_dev == named.st_dev;
+}
+
 }  // namespace
 
+/// What holds an upload's place. Its mutex is held while bytes are written or verified, which is no stall.
+struct AssetStore::Lock {
+    std::mutex mutex;
+    int file = -1;  ///< Locked against other processes. Negative after another upload took over.
+    Clock::time_point last = Clock::now();
+};
+
 Result<Digest> digest_file(const fs::path& path) {
-    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    if (file < 0) return io_error(path, errno);
+    const OpenFile in(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+    if (in.file < 0) return io_error(path, errno);
     Sha256 hash;
     std::vector<char> buffer(size_t(1) << 18);
     for (;;) {
-        const ssize_t n = ::read(file, buffer.data(), buffer.size());
-        if (n < 0 && errno == EINTR) continue;
-        if (n < 0) {
-            const int error = errno;
-            ::close(file);
-            return io_error(path, error);
-        }
-        if (n == 0) break;
-        hash.update(buffer.data(), size_t(n));
+        const auto n = read_some(in.file, buffer.data(), buffer.size(), path);
+        if (!n.ok()) return n.status();
+        hash.update(buffer.data(), *n);
+        if (*n < buffer.size()) return hash.finish();
     }
-    ::close(file);
-    return hash.finish();
 }
 
-AssetStore::AssetStore(fs::path directory, uint64_t max_asset_bytes)
+AssetStore::AssetStore(fs::path directory, uint64_t max_asset_bytes, std::chrono::milliseconds stall)
     : directory_(std::move(directory)),
-      max_asset_bytes_(max_asset_bytes) {
+      max_asset_bytes_(max_asset_bytes),
+      stall_(stall) {
     std::error_code ignored;  // the first write reports a directory that cannot be made
     fs::create_directories(directory_ / "incoming", ignored);
 }
@@ -84,8 +121,34 @@ uint64_t AssetStore::committed_size(const Digest& digest) const {
 Result<std::string> AssetStore::read(const Digest& digest) const {
     auto bytes = read_file(path_of(digest).string());
     if (!bytes.ok()) return not_found("asset " + digest.hex() + " is not in the store");
-    if (sha256(*bytes) != digest) return data_loss("asset " + digest.hex() + " is damaged on disk");
-    return bytes;
+    if (sha256(*bytes) == digest) return bytes;
+    remove(digest);
+    return data_loss("asset " + digest.hex() + " is damaged on disk; it was removed");
+}
+
+Status AssetStore::stream(const Digest& digest, uint64_t offset, const ChunkSink& sink) const {
+    const fs::path path = path_of(digest);
+    const OpenFile in(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+    if (in.file < 0) return not_found("asset " + digest.hex() + " is not in the store");
+    struct stat facts {};
+    if (::fstat(in.file, &facts) != 0) return io_error(path, errno);
+    const auto size = uint64_t(facts.st_size);
+    if (offset > size) return {StatusCode::kOutOfRange, "the asset has " + std::to_string(size) + " bytes"};
+    if (::lseek(in.file, off_t(offset), SEEK_SET) < 0) return io_error(path, errno);
+    const bool whole = offset == 0;
+    Sha256 hash;
+    std::string buffer(std::min(kMaxChunkBytes, size - offset), '\0');
+    while (offset < size) {
+        const auto n = read_some(in.file, buffer.data(), std::min<uint64_t>(buffer.size(), size - offset), path);
+        if (!n.ok()) return n.status();
+        if (*n == 0) break;  // it was cut short meanwhile
+        if (whole) hash.update(buffer.data(), *n);
+        LL_RETURN_IF_ERROR(sink(offset, std::string_view(buffer.data(), *n)));
+        offset += *n;
+    }
+    if (!whole || hash.finish() == digest) return {};
+    remove(digest);
+    return data_loss("asset " + digest.hex() + " is damaged on disk; it was removed");
 }
 
 Status AssetStore::put(const Digest& digest, std::string_view bytes) {
@@ -96,7 +159,7 @@ Status AssetStore::put(const Digest& digest, std::string_view bytes) {
     return upload->finish();
 }
 
-void AssetStore::remove(const Digest& digest) {
+void AssetStore::remove(const Digest& digest) const {
     std::error_code ignored;
     fs::remove(path_of(digest), ignored);
 }
@@ -137,68 +200,86 @@ Result<AssetStore::Upload> AssetStore::begin_upload(const Digest& digest, uint64
     if (size_bytes > max_asset_bytes_)
         return Status(StatusCode::kResourceExhausted,
                       "asset of " + std::to_string(size_bytes) + " bytes; the limit is " + std::to_string(max_asset_bytes_));
-    {
-        const std::lock_guard lock(mutex_);
-        if (!uploading_.insert(digest).second)
-            return Status(StatusCode::kAborted, "another upload of asset " + digest.hex() + " is running");
-    }
+    const auto lock = take_lock(digest);
+    if (!lock.ok()) return lock.status();
     const fs::path path = incoming_path(digest);
-    const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-    const int error = errno;
-    Upload upload(this, digest, size_bytes, 0, file);
-    if (file < 0) return io_error(path, error);
-    // Another process may share the directory, and it may have published or removed this very file between open() and
-    // flock().
-    struct stat ours {
-    }, named{};
-    if (::flock(file, LOCK_EX | LOCK_NB) != 0 || contains(digest) || ::fstat(file, &ours) != 0 ||
-        ::stat(path.c_str(), &named) != 0 || ours.st_ino != named.st_ino)
-        return Status(StatusCode::kAborted, "asset " + digest.hex() + " is being stored by another process");
-    const off_t offset = ::lseek(file, 0, SEEK_END);
-    upload.offset_ = uint64_t(offset);
-    if (uint64_t(offset) > size_bytes) {  // left by an upload that declared another size
+    Upload upload(this, digest, size_bytes, *lock);
+    const std::lock_guard busy((*lock)->mutex);
+    int& file = (*lock)->file;
+    file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+    if (file < 0) return io_error(path, errno);
+    const Status theirs(StatusCode::kAborted, "asset " + digest.hex() + " is being stored by another process");
+    if (::flock(file, LOCK_EX | LOCK_NB) != 0) {
+        std::error_code error;
+        const auto written = fs::last_write_time(path, error);
+        // That process is stopped. What it has stored is no file of this name any more, and it notices that if it goes on.
+        if (!error && fs::file_time_type::clock::now() - written > stall_) fs::remove(path, error);
+        return theirs;
+    }
+    // Another process may have published or removed this very file between open() and flock().
+    if (contains(digest) || !still_named(file, path)) return theirs;
+    ::futimens(file, nullptr);  // others see by this that somebody is here
+    upload.offset_ = uint64_t(::lseek(file, 0, SEEK_END));
+    if (upload.offset_ > size_bytes) {  // left by an upload that declared another size
         if (::ftruncate(file, 0) != 0) return io_error(path, errno);
         upload.offset_ = 0;
     }
     return Result<Upload>(std::move(upload));
 }
 
-AssetStore::Upload::Upload(AssetStore* store, const Digest& digest, uint64_t size, uint64_t offset, int file)
+Result<std::shared_ptr<AssetStore::Lock>> AssetStore::take_lock(const Digest& digest) {
+    const std::lock_guard guard(mutex_);
+    std::shared_ptr<Lock>& held = uploading_[digest];
+    if (held) {
+        const std::unique_lock idle(held->mutex, std::try_to_lock);
+        if (!idle || Clock::now() - held->last < stall_)
+            return Status(StatusCode::kAborted, "another upload of asset " + digest.hex() + " is running");
+        if (held->file >= 0) ::close(held->file);  // which unlocks it
+        held->file = -1;
+    }
+    held = std::make_shared<Lock>();
+    return held;
+}
+
+AssetStore::Upload::Upload(AssetStore* store, const Digest& digest, uint64_t size, std::shared_ptr<Lock> lock)
     : store_(store),
       digest_(digest),
       size_(size),
-      offset_(offset),
-      file_(file) {}
-
-AssetStore::Upload::Upload(Upload&& other) noexcept
-    : store_(other.store_),
-      digest_(other.digest_),
-      size_(other.size_),
-      offset_(other.offset_),
-      file_(other.file_) {
-    other.store_ = nullptr;
-    other.file_ = -1;
-}
+      lock_(std::move(lock)) {}
 
 AssetStore::Upload::~Upload() {
-    if (file_ >= 0) ::close(file_);
-    if (!store_) return;
-    const std::lock_guard lock(store_->mutex_);
-    store_->uploading_.erase(digest_);
+    if (!lock_) return;
+    const std::lock_guard guard(store_->mutex_);
+    const auto held = store_->uploading_.find(digest_);
+    if (held != store_->uploading_.end() && held->second == lock_) store_->uploading_.erase(held);
+    // Nobody else has this lock now, but whoever takes over at this moment.
+    if (lock_->file >= 0) ::close(lock_->file);
+    lock_->file = -1;
 }
 
 Status AssetStore::Upload::append(std::string_view bytes) {
+    const std::lock_guard busy(lock_->mutex);
+    if (lock_->file < 0) return taken_over();
     if (bytes.size() > size_ - offset_) return invalid_argument("more data than the declared size");
-    LL_RETURN_IF_ERROR(write_all(file_, bytes, store_->incoming_path(digest_)));
+    LL_RETURN_IF_ERROR(write_all(lock_->file, bytes, store_->incoming_path(digest_)));
     offset_ += bytes.size();
+    lock_->last = Clock::now();
     crash_point("asset.appended");
     return {};
 }
 
+void AssetStore::Upload::discard() {
+    const std::lock_guard busy(lock_->mutex);
+    if (lock_->file >= 0 && ::ftruncate(lock_->file, 0) == 0) offset_ = 0;
+}
+
 Status AssetStore::Upload::finish() {
+    const std::lock_guard busy(lock_->mutex);
     const fs::path from = store_->incoming_path(digest_);
+    if (lock_->file < 0 || !still_named(lock_->file, from)) return taken_over();
     if (offset_ != size_) return invalid_argument("upload ended before the declared size; resume it");
-    if (::fsync(file_) != 0) return io_error(from, errno);
+    if (::fsync(lock_->file) != 0) return io_error(from, errno);
+    ::futimens(lock_->file, nullptr);  // verifying a large file takes its time
     auto digest = digest_file(from);
     if (!digest.ok()) return digest.status();
     std::error_code error;
@@ -215,16 +296,18 @@ Status AssetStore::Upload::finish() {
 }
 
 Status AssetStore::materialise(const AssetManifest& manifest, const fs::path& directory) const {
+    Status damaged;  // of the first such file; all are looked for, so that they can be sent again together
     for (const AssetEntry& entry : manifest.entries) {
         LL_RETURN_IF_ERROR(validate_asset_path(entry.path));
         const fs::path from = path_of(entry.digest), to = directory / entry.path;
         auto digest = digest_file(from);
-        if (!digest.ok()) return digest.status();
         std::error_code error;
-        if (*digest != entry.digest) {
+        if (digest.ok() && *digest != entry.digest) {
             fs::remove(from, error);
-            return data_loss("cached file of \"" + entry.path + "\" was damaged; it was removed, try again");
+            digest = data_loss("\"" + entry.path + "\" of the scene was damaged on disk and is removed; it has to be sent again");
         }
+        if (damaged.ok()) damaged = digest.status();
+        if (!damaged.ok()) continue;
         fs::create_directories(to.parent_path(), error);
         if (error) return internal_error(to.parent_path().string() + ": " + error.message());
         fs::remove(to, error);
@@ -234,7 +317,7 @@ Status AssetStore::materialise(const AssetManifest& manifest, const fs::path& di
             if (error) return internal_error(to.string() + ": " + error.message());
         }
     }
-    return {};
+    return damaged;
 }
 
 }  // namespace lightloom

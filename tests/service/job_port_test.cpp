@@ -93,6 +93,17 @@ TEST_F(Upload, WaitsForAnotherOneOfTheSameFileAndGoesOnWhereThatBreaksOff) {
     EXPECT_TRUE(stored.ok()) << stored.status().message();
 }
 
+TEST_F(Upload, TakesOverFromOneThatStandsStill) {
+    ASSERT_TRUE(other->append(std::string(100, 'x')).ok());
+    GrpcJobPort jobs(channel_to(server->port()));
+    const auto begin = Clock::now();
+    const Status status = jobs.upload_bytes(digest, bytes);
+    EXPECT_TRUE(status.ok()) << status.message();
+    EXPECT_GT(Clock::now() - begin, std::chrono::seconds(9)) << "the other one may only be slow";
+    EXPECT_TRUE(service.coordinator->assets().read(digest).ok());
+    EXPECT_EQ(other->append("x").code(), StatusCode::kAborted) << "it is too late";
+}
+
 TEST_F(Upload, GivesUpWhenTheOtherOneStandsStill) {
     const TempDirectory directory;
     const std::string path = (directory.path / "a.ply").string();

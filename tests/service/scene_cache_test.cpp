@@ -91,10 +91,48 @@ TEST(SceneFetcher, DamagedFilesAreFetchedAgain) {
             EXPECT_EQ(*kept.read(digest), bytes);
         }
     }
-    // Where the coordinator's copy is damaged as well, that is said, after some attempts.
-    std::filesystem::remove(kept.path_of(spec.scene_root));
-    ASSERT_TRUE(write_file_atomically(service.coordinator->assets().path_of(spec.scene_root).string(), "damaged").ok());
-    EXPECT_EQ(fetch().code(), StatusCode::kDataLoss);
+    // Where the coordinator's copy is damaged as well, it is removed there, so that a client is asked for it; and that is said.
+    AssetStore& theirs = service.coordinator->assets();
+    for (const auto& [digest, name] :
+         {std::pair{list->entries.front().digest, "\"scene.pbrt\" of the scene"}, {spec.scene_root, "the scene's file list"}}) {
+        std::filesystem::remove(kept.path_of(digest));
+        ASSERT_TRUE(write_file_atomically(theirs.path_of(digest).string(), "damaged").ok());
+        const Status lost = fetch();
+        EXPECT_EQ(lost.code(), StatusCode::kNotFound);
+        EXPECT_NE(lost.message().find(std::string(name) + " is lost or damaged in the coordinator's store"), std::string::npos)
+            << lost.message();
+        EXPECT_FALSE(theirs.contains(digest));
+    }
+}
+
+TEST(SceneFetcher, SceneFilesUsedLeastRecentlyAreRemovedAboveTheLimit) {
+    FakeService service;
+    const JobSpec spec = put_scene(service);
+    const TempDirectory directory;
+    LocalWorkerPort port(*service.coordinator);
+    AssetStore kept(directory.path / "assets");
+    const auto fetch = [&](uint64_t limit) {
+        const Status status = SceneFetcher(port, directory.path, {.scenes = limit}).scene(spec, {}).status();
+        EXPECT_TRUE(status.ok()) << status.message();
+    };
+    fetch(0);
+    const AssetManifest list = *AssetManifest::parse(*kept.read(spec.scene_root));
+    const uint64_t size = list.canonical_text().size() + list.entries.front().size_bytes;
+    const std::string old(1000, 'o'), older(1000, 'O');
+    for (const std::string& bytes : {old, older}) {
+        ASSERT_TRUE(kept.put(sha256(bytes), bytes).ok());
+        std::filesystem::last_write_time(kept.path_of(sha256(bytes)),
+                                         std::filesystem::file_time_type::clock::now() - std::chrono::hours(bytes == old ? 1 : 2));
+    }
+    fetch(0);
+    EXPECT_TRUE(kept.contains(sha256(older))) << "without a limit all stay";
+    fetch(size + 1000);
+    EXPECT_FALSE(kept.contains(sha256(older)));
+    EXPECT_TRUE(kept.contains(sha256(old)));
+    fetch(size);
+    EXPECT_FALSE(kept.contains(sha256(old)));
+    EXPECT_TRUE(kept.contains(spec.scene_root) && kept.contains(list.entries.front().digest)) << "what is in use is the youngest";
+    fetch(1);  // and yet it is read
 }
 
 /// Jobs on one scene that differ in --crop alone.
@@ -136,7 +174,7 @@ struct Tables : ::testing::Test {
     FakeService service;
     const TempDirectory directory;
     LocalWorkerPort port{*service.coordinator};
-    SceneFetcher fetcher{port, directory.path, 2500};
+    SceneFetcher fetcher{port, directory.path, {.tables = 2500}};
 };
 
 TEST_F(Tables, ThatWereUsedLeastRecentlyAreRemovedAboveTheLimit) {

@@ -1,4 +1,7 @@
 find_package(nlohmann_json REQUIRED)
 lightloom_test(work_test LINK lt_work)
+lightloom_test(asset_store_test LINK lt_work)
 lightloom_test(wire_test LINK lt_work)
 lightloom_test(job_fields_test LINK lt_server nlohmann_json::nlohmann_json)
+lightloom_test(memory_need_test LINK lt_server)
+lightloom_test(collection_test LINK lt_server)

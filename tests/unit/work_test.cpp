@@ -1,15 +1,12 @@
-// The plan, the spec's digest, file lists and the asset store.
+// The plan, the spec's digest and file lists.
 
 #include "common/work/job.h"
 #include "common/work/service.h"
 
-#include <dirent.h>
-#include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -22,21 +19,6 @@
 #include "common/work/service.h"
 #include "tests/support/algorithm_of.h"
 #include "tests/support/estimates.h"
-
-namespace {
-int reads_left = -1;  ///< Of directory entries before the next one fails; negative: none fails.
-}  // namespace
-
-/// Instead of the C library's.
-extern "C" dirent* readdir(DIR* directory) {
-    static const auto real = reinterpret_cast<dirent* (*)(DIR*)>(::dlsym(RTLD_NEXT, "readdir"));
-    if (reads_left == 0) {
-        errno = EIO;
-        return nullptr;
-    }
-    if (reads_left > 0) --reads_left;
-    return real(directory);
-}
 
 namespace lightloom {
 namespace {
@@ -372,62 +354,6 @@ TEST(AssetManifest, CanonicalTextIsTheOnlyOneAccepted) {
     }
     EXPECT_FALSE(AssetManifest::of_files(directory.path, {"../x"}).ok());
     EXPECT_EQ(AssetManifest::of_files(directory.path, {"none"}).status().code(), StatusCode::kNotFound);
-}
-
-TEST(AssetStore, UploadsResumeAndAreVerified) {
-    const TempDirectory directory;
-    AssetStore store(directory.path, 1 << 20);
-    const std::string bytes(100000, 'q');
-    const Digest digest = sha256(bytes);
-    {
-        auto upload = store.begin_upload(digest, bytes.size());
-        ASSERT_TRUE(upload.ok());
-        ASSERT_TRUE(upload->append(std::string_view(bytes).substr(0, 40000)).ok());
-        EXPECT_EQ(store.begin_upload(digest, bytes.size()).status().code(), StatusCode::kAborted);
-    }
-    EXPECT_FALSE(store.contains(digest));
-    EXPECT_EQ(store.committed_size(digest), 40000u);
-    auto upload = store.begin_upload(digest, bytes.size());
-    ASSERT_TRUE(upload.ok());
-    ASSERT_EQ(upload->offset(), 40000u);
-    ASSERT_TRUE(upload->append(std::string_view(bytes).substr(40000)).ok());
-    EXPECT_EQ(upload->append("x").code(), StatusCode::kInvalidArgument);
-    ASSERT_TRUE(upload->finish().ok());
-    ASSERT_TRUE(store.contains(digest));
-    EXPECT_EQ(*store.read(digest), bytes);
-
-    const Digest wrong = sha256("something else");
-    EXPECT_EQ(store.put(wrong, "not it").code(), StatusCode::kDataLoss);
-    EXPECT_FALSE(store.contains(wrong));
-    EXPECT_EQ(store.committed_size(wrong), 0u);
-    EXPECT_EQ(store.begin_upload(wrong, 2 << 20).status().code(), StatusCode::kResourceExhausted);
-}
-
-TEST(AssetStore, DamageIsNoticedBeforeUse) {
-    const TempDirectory directory;
-    AssetStore store(directory.path / "store");
-    const Digest digest = sha256("content");
-    ASSERT_TRUE(store.put(digest, "content").ok());
-    AssetManifest manifest{"a", {{"a", digest, 7}}};
-    ASSERT_TRUE(store.materialise(manifest, directory.path / "out").ok());
-    std::ofstream(store.path_of(digest)) << "c0ntent";
-    EXPECT_EQ(store.materialise(manifest, directory.path / "out2").code(), StatusCode::kDataLoss);
-    EXPECT_FALSE(store.contains(digest));
-}
-
-/// As when a network file system breaks off in the middle of a directory.
-TEST(AssetStore, TrimmingEndsQuietlyWhereADirectoryCannotBeRead) {
-    const TempDirectory directory;
-    AssetStore store(directory.path / "store");
-    const std::string newest = "newest";
-    for (int reads = 0; reads < 20; ++reads) {
-        for (const std::string& bytes : {newest, std::string("a"), std::string("b")})
-            ASSERT_TRUE(store.put(sha256(bytes), bytes).ok());
-        reads_left = reads;
-        EXPECT_NO_THROW(store.trim(0, sha256(newest))) << reads;
-        reads_left = -1;
-        EXPECT_TRUE(store.contains(sha256(newest)));
-    }
 }
 
 /// A kind that no golden unit computes could differ between two hosts unseen.
