@@ -9,7 +9,7 @@ packages=(
     build-essential cmake ninja-build pkg-config help2man gnuplot-nox
     libembree-dev libopenexr-dev libtbb-dev libpng-dev zlib1g-dev libstb-dev
     libgrpc++-dev protobuf-compiler protobuf-compiler-grpc libprotobuf-dev libssl-dev
-    libspdlog-dev nlohmann-json3-dev libcli11-dev libboost-dev
+    libspdlog-dev nlohmann-json3-dev libcli11-dev libboost-dev libsqlite3-dev
 )
 case ${1:-develop} in
     render) ;;

@@ -167,6 +167,34 @@ Result<DevelopedImage> Reducer::developed(bool with_variance, const std::functio
     }
 }
 
+Result<Reducer::Saved> Reducer::serialize() const {
+    Saved saved;
+    {
+        const std::lock_guard lock(mutex_);
+        saved.groups = group_count();
+        if (saved.groups == 0) return failed_precondition("no group of iterations is complete yet; there is nothing to save");
+        saved.bytes = encode_reducer_state({tile_count_, noise_target_, counters_, dropped_, rare_light_, noise_}, *complete_);
+    }
+    seal_state(saved.bytes);
+    return saved;
+}
+
+Status Reducer::restore(std::string_view bytes) {
+    Accumulation complete(frame_, response_);
+    auto state = decode_reducer_state(bytes, complete);
+    if (!state.ok()) return state.status();
+    if (state->tile_count != tile_count_ || state->noise_target != noise_target_)
+        return failed_precondition("the saved sums are those of another job");
+    const std::lock_guard lock(mutex_);
+    if (complete_ || frozen_) return failed_precondition("sums can be restored only before the first partial");
+    complete_ = std::move(complete);
+    counters_ = state->counters;
+    dropped_ = std::move(state->dropped);
+    rare_light_ = state->rare_light;
+    noise_ = state->noise;
+    return {};
+}
+
 RareLightReport Reducer::rare_light_report(double image_mean) const {
     const std::lock_guard lock(mutex_);
     return rare_light_of(image_mean);

@@ -9,11 +9,14 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/film/accumulation.h"
 #include "common/work/job.h"
 #include "common/work/service.h"
+#include "server/reducer_state.h"
 
 namespace lightloom {
 
@@ -49,10 +52,7 @@ class Reducer {
     UnitCounters counters() const;
     /// Non-finite samples that were dropped from these groups, and the first few of them.
     uint64_t dropped() const;
-    struct Dropped {
-        UnitKey unit;
-        DroppedSample sample;
-    };
+    using Dropped = DroppedOfUnit;
     static constexpr size_t kMaxDropped = 64;
     std::vector<Dropped> first_dropped() const;
     /// Develops the complete groups, with their variance if that is asked for; kFailedPrecondition before the first. Results are
@@ -65,6 +65,18 @@ class Reducer {
     std::optional<NoiseReport> noise() const;
     /// The same of exactly these groups, which takes time in proportion to the pixels.
     std::optional<NoiseReport> final_noise() const;
+    /// The state of the complete groups, and how many they are.
+    struct Saved {
+        uint32_t groups = 0;
+        std::string bytes;
+    };
+    /// kFailedPrecondition before the first complete group. Results wait while the sums are copied, for some 50 ms for each
+    /// 10^6 pixels; takes as much memory as these sums.
+    Result<Saved> serialize() const;
+    /// Gives a reducer that was made with the same arguments, and has got no partial yet, the complete groups of another one: from
+    /// then on it is as if it had merged them itself. Units of groups that were open have to be added again. Errors are those of
+    /// decode_reducer_state(); then it is as new.
+    Status restore(std::string_view bytes);
     /// The consequences of the first unit's RareLight for the image of the complete groups, whose mean luminance is `image_mean`.
     RareLightReport rare_light_report(double image_mean) const;
 

@@ -44,12 +44,47 @@ bool UnitTable::open_group() {
     const uint32_t next = opened_groups();
     if (closed_ || next >= group_limit_ || open_.size() >= window_) return false;
     if (iterations_ > 0 && next >= group_total_) return false;
+    open_next();
+    return true;
+}
+
+void UnitTable::open_next() {
+    const uint32_t next = opened_groups();
     std::vector<Entry>& entries = open_.emplace_back();
     for (const WorkUnit& unit : plan_.units(group(next))) {
         entries.push_back({.unit = unit});
         pending_.insert(unit.key);
     }
-    return true;
+}
+
+Status UnitTable::restore(uint32_t merged_groups, std::span<const Known> known) {
+    const auto wrong = [](const UnitKey& key) {
+        return data_loss("the saved result of group " + std::to_string(key.group) + ", tile " + std::to_string(key.tile) +
+                         " is of no unit of the job");
+    };
+    uint32_t opened = merged_groups;
+    std::vector<bool> merged(size_t(merged_groups) * tile_count());
+    done_.resize(merged.size());
+    for (const Known& result : known) {
+        const UnitKey& key = result.unit;
+        if (!is_ours(key) || (iterations_ > 0 && key.group >= group_total_) ||
+            (key.group >= merged_groups && key.group - merged_groups >= kMostOpenGroups))
+            return wrong(key);
+        opened = std::max(opened, key.group + 1);
+        if (key.group >= merged_groups) continue;
+        const size_t index = size_t(key.group) * tile_count() + key.tile;
+        merged[index] = true;
+        done_[index] = {prefix(result.digest), result.worker};
+    }
+    if (const auto missing = std::find(merged.begin(), merged.end(), false); missing != merged.end())
+        return data_loss("the saved results of the merged group " +
+                         std::to_string(size_t(missing - merged.begin()) / tile_count()) + " are not complete");
+    merged_groups_ = merged_groups;
+    done_count_ = merged.size();
+    while (opened_groups() < opened) open_next();
+    for (const Known& result : known)
+        if (result.unit.group >= merged_groups) (void)complete(result.unit, result.worker, result.digest);
+    return {};
 }
 
 void UnitTable::advance(uint32_t count) {

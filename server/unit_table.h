@@ -9,6 +9,7 @@
 #include <functional>
 #include <optional>
 #include <set>
+#include <span>
 #include <vector>
 
 #include "common/core/digest.h"
@@ -58,6 +59,18 @@ class UnitTable {
     Failures reopen(const UnitKey& key);
     /// The same for a unit that a worker could not render; see lease().
     Failures fail(const UnitKey& key, uint32_t worker);
+
+    /// A result that came before this table was made.
+    struct Known {
+        UnitKey unit;
+        uint32_t worker = 0;
+        Digest digest;
+    };
+    /// Makes a new table what another one was when the groups below `merged_groups` had been merged and the results `known` had
+    /// come, in any order: all of those groups, and some of later ones, which are opened whatever the window is. Nothing is leased,
+    /// and nobody is to blame for anything. kDataLoss, and the table is good for nothing, if a merged group lacks a result, or
+    /// a result is not of this table.
+    Status restore(uint32_t merged_groups, std::span<const Known> known);
 
     /// The unit of an opened group.
     std::optional<WorkUnit> find(const UnitKey& key) const;
@@ -111,7 +124,12 @@ class UnitTable {
     /// The record of a unit of an open group.
     Entry* entry(const UnitKey& key);
     bool open_group();
+    /// The same, whatever may be leased.
+    void open_next();
     void make_pending(Entry& e);
+
+    /// A restored group lies at most so many after the merged ones: what is further on was not leased by any coordinator.
+    static constexpr uint32_t kMostOpenGroups = 1u << 20;
 
     Plan plan_;
     uint64_t iterations_;

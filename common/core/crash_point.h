@@ -46,6 +46,11 @@ inline constexpr std::string_view kCrashLabels[] = {
     "server.image-written",      // the image is on disk, its manifest is not
     "server.manifest-written",   // both are on disk, the job has not ended yet
     "server.job-ended",          // the job has its last state, nobody was told
+    "server.segment-created",    // a file for payloads has its name, and nothing is in it
+    "server.payloads-written",   // the payloads of a batch are in their segments, not flushed; the transaction is open
+    "server.payloads-synced",    // they are flushed, the transaction is still open
+    "server.batch-committed",    // the batch is on disk, nobody was told
+    "server.checkpoint-saved",   // a checkpoint's file is on disk, nothing refers to it
     "asset.appended",            // a part of a file has arrived, or all of it
     "asset.before-commit",       // a file is complete, flushed and checked; it has no name yet
     "asset.committed",           // it has its name

@@ -225,4 +225,44 @@ void Accumulation::variance(size_t first, size_t count, float* values) const {
     for (size_t i = 3 * first; i < 3 * (first + count); ++i) *values++ = float(moment_[i] * factor);
 }
 
+void Accumulation::write_state(std::string& out) const {
+    StateWriter state(out);
+    for (const int n : {frame_.width, frame_.height, frame_.crop.x0, frame_.crop.y0, frame_.crop.x1, frame_.crop.y1}) state.put(n);
+    state.put(response_.exposure);
+    for (const FilmResponse::Triple& row : response_.colour) state.put_array(row.data(), row.size());
+    state.put(camera_count_);
+    state.put(light_paths_);
+    state.put(dropped_);
+    state.put(iterations_);
+    state.put(group_count_);
+    state.put(camera_bound_);
+    state.put(splat_bound_);
+    spread_.write_state(state);
+    camera_.write_state(state);
+    splat_.write_state(state);
+    state.put(uint8_t(!moment_.empty()));
+    state.put_array(moment_.data(), moment_.size());
+}
+
+void Accumulation::read_state(StateReader& in) {
+    for (const int n : {frame_.width, frame_.height, frame_.crop.x0, frame_.crop.y0, frame_.crop.x1, frame_.crop.y1})
+        if (in.get<int>() != n) return in.fail();
+    FilmResponse response;
+    response.exposure = in.get<double>();
+    for (FilmResponse::Triple& row : response.colour) in.get_array(row.data(), row.size());
+    if (response.exposure != response_.exposure || response.colour != response_.colour) return in.fail();
+    camera_count_ = in.get<uint64_t>();
+    light_paths_ = in.get<uint64_t>();
+    dropped_ = in.get<uint64_t>();
+    iterations_ = in.get<uint64_t>();
+    group_count_ = in.get<uint32_t>();
+    camera_bound_ = in.get<double>();
+    splat_bound_ = in.get<double>();
+    spread_.read_state(in);
+    camera_.read_state(in);
+    splat_.read_state(in);
+    if (in.get<uint8_t>() != 0) in.get_vector(moment_, camera_.size());
+    if (moment_.empty() != (group_count_ == 0)) in.fail();
+}
+
 }  // namespace lightloom

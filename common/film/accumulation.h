@@ -87,6 +87,12 @@ class Accumulation {
     void develop(size_t first, size_t count, float* values) const;
     void variance(size_t first, size_t count, float* values) const;
 
+    /// Appends all that later groups and images depend on, some 24 bytes for each of a pixel's arrays of sums.
+    void write_state(std::string& out) const;
+    /// Takes the place of an empty accumulation of the same frame and response. The reader has failed, and this is good for nothing
+    /// any more, unless the bytes are those of such an accumulation.
+    void read_state(StateReader& in);
+
   private:
     /// NoiseEstimate::kEpsilon for values before exposure.
     double epsilon() const { return NoiseEstimate::kEpsilon / (response_.exposure * response_.exposure); }

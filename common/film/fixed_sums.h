@@ -10,6 +10,8 @@
 #include <memory>
 #include <vector>
 
+#include "common/core/state_bytes.h"
+
 namespace lightloom {
 
 using Int128 = __int128;
@@ -88,6 +90,32 @@ class FixedSums {
         const int shift = int((bits >> 52) & 0x7ff) - 1075;
         const Int128 magnitude = Int128((bits & 0xfffffffffffffull) | 0x10000000000000ull) << shift;
         return (bits >> 63) ? -magnitude : magnitude;
+    }
+
+    /// Everything but the number of sums.
+    void write_state(StateWriter& out) const {
+        out.put(uint8_t(!empty()));
+        if (empty()) return;
+        out.put_array(low_.data(), low_.size());
+        out.put(uint64_t(std::count_if(high_.begin(), high_.end(), [](const auto& block) { return block != nullptr; })));
+        for (size_t i = 0; i < high_.size(); ++i) {
+            if (!high_[i]) continue;
+            out.put(uint64_t(i));
+            out.put_array(high_[i]->data(), kBlock);
+        }
+    }
+    /// Reads what sums of the same number wrote, into sums that are empty; the reader tells whether it could.
+    void read_state(StateReader& in) {
+        if (in.get<uint8_t>() == 0 || !in.ok()) return;
+        in.get_vector(low_, count_);
+        const uint64_t blocks = in.get<uint64_t>();
+        if (in.ok()) high_.resize((count_ + kBlock - 1) / kBlock);
+        for (uint64_t n = 0; n < blocks && in.ok(); ++n) {
+            const uint64_t i = in.get<uint64_t>();
+            if (i >= high_.size() || high_[i]) return in.fail();
+            high_[i] = std::make_unique<Block>();
+            in.get_array(high_[i]->data(), kBlock);
+        }
     }
 
   private:

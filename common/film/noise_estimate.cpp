@@ -58,6 +58,18 @@ void GroupSpread::add(double value) {
     moment_ += delta * (value - mean_);
 }
 
+void GroupSpread::write_state(StateWriter& out) const {
+    out.put(count_);
+    out.put(mean_);
+    out.put(moment_);
+}
+
+void GroupSpread::read_state(StateReader& in) {
+    count_ = in.get<uint32_t>();
+    mean_ = in.get<double>();
+    moment_ = in.get<double>();
+}
+
 double GroupSpread::relative_error() const {
     if (count_ == 0 || !(mean_ > 0)) return 0;
     // The square of a normal variable has the relative standard deviation sqrt(2).

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <functional>
 
+#include "common/core/state_bytes.h"
+
 namespace lightloom {
 
 /// What the groups of an image tell of its error. It knows only what has been sampled: light that no sample has found yet is not
@@ -42,6 +44,9 @@ class GroupSpread {
     void add(double value);
     /// Standard error of the mean over these groups, relative to the mean.
     double relative_error() const;
+
+    void write_state(StateWriter& out) const;
+    void read_state(StateReader& in);
 
   private:
     uint32_t count_ = 0;
