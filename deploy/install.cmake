@@ -5,7 +5,7 @@ include(GNUInstallDirs)
 install(TARGETS lightloom lightloom-server lightloom-worker RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(FILES LICENSE deploy/copyright DESTINATION ${CMAKE_INSTALL_DOCDIR})
 # As in the tree, so that their links lead somewhere.
-foreach(document README.md client/README.md server/README.md deploy/README.md common/README.md common/path/README.md
+foreach(document README.md client/README.md server/README.md server/store/README.md deploy/README.md common/README.md common/path/README.md
         common/import/README.md common/metrics/README.md tests/README.md tests/bench/README.md tests/readme/README.md
         tests/scenes/README.md tests/scenes/pictures/four-algorithms.png)
     cmake_path(GET document PARENT_PATH folder)

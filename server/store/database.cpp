@@ -36,6 +36,16 @@ void bind(sqlite3_stmt* statement, int index, const SqlValue& value) {
                value.value());
 }
 
+/// The system's error of the last access to the database or its log that failed; sqlite3_system_errno() forgets it on the way.
+int system_error(sqlite3* handle) {
+    int error = 0;
+    sqlite3_file* log = nullptr;
+    sqlite3_file_control(handle, "main", SQLITE_FCNTL_JOURNAL_POINTER, &log);
+    if (log && log->pMethods) log->pMethods->xFileControl(log, SQLITE_FCNTL_LAST_ERRNO, &error);
+    if (error == 0) sqlite3_file_control(handle, "main", SQLITE_FCNTL_LAST_ERRNO, &error);
+    return error;
+}
+
 }  // namespace
 
 bool SqlRow::is_null(int column) const { return sqlite3_column_type(statement_, column) == SQLITE_NULL; }
@@ -54,7 +64,7 @@ Result<Database> Database::open(const std::filesystem::path& file, std::span<con
     Database database(handle, file.string());
     if (!handle) return Status(StatusCode::kResourceExhausted, file.string() + ": cannot be opened: out of memory");
     if (opened != SQLITE_OK) return database.failure();
-    sqlite3_busy_timeout(handle, 5000);
+    sqlite3_busy_timeout(handle, 1000);
     LL_RETURN_IF_ERROR(database.script(kSettings));
     LL_RETURN_IF_ERROR(database.check());
     LL_RETURN_IF_ERROR(database.migrate(migrations));
@@ -107,14 +117,15 @@ Status Database::migrate(std::span<const std::string_view> migrations) {
 
 Status Database::failure() {
     const int code = sqlite3_extended_errcode(handle_);
-    const int kind = code & 0xff, error = sqlite3_system_errno(handle_);
+    const int kind = code & 0xff;
     const std::string line = file_ + ": " + sqlite3_errmsg(handle_);
+    const int error = kind == SQLITE_IOERR ? system_error(handle_) : 0;
     if (code == SQLITE_IOERR_FSYNC || code == SQLITE_IOERR_DIR_FSYNC) flush_failed_ = true;
     if (kind == SQLITE_CORRUPT || kind == SQLITE_NOTADB) return data_loss(line + "; " + kRescue);
-    if (kind == SQLITE_FULL || kind == SQLITE_NOMEM || (kind == SQLITE_IOERR && !flush_failed_ && is_no_room(error)))
+    if (kind == SQLITE_FULL || kind == SQLITE_NOMEM || (code == SQLITE_IOERR_WRITE && is_no_room(error)))
         return {StatusCode::kResourceExhausted, line};
     if (kind == SQLITE_BUSY) return failed_precondition(line + "; another process uses it");
-    return internal_error(line + (kind == SQLITE_IOERR ? std::string(" (error ") + std::to_string(error) + " of the system)" : ""));
+    return internal_error(line + " (" + std::to_string(code) + ", error " + std::to_string(error) + " of the system)");
 }
 
 Status Database::script(const std::string& sql) {

@@ -96,18 +96,19 @@ std::filesystem::path SegmentLog::path(uint32_t segment) const {
     return directory_ / name;
 }
 
-Result<SegmentLog> SegmentLog::open(const std::filesystem::path& directory, uint32_t last_known, uint64_t segment_bytes,
+Result<SegmentLog> SegmentLog::open(const std::filesystem::path& directory, const PayloadPlace& last_known, uint64_t segment_bytes,
                                     StoreFiles& files) {
     SegmentLog log(directory, segment_bytes, files);
     const auto found = log.segments();
     if (!found.ok()) return found.status();
     const uint32_t last = found->empty() ? 0 : found->back();
-    log.next_ = std::max(last, last_known) + 1;
-    if (last > 0 && last >= last_known) LL_RETURN_IF_ERROR(log.open_last(last));
+    log.next_ = std::max(last, last_known.segment) + 1;
+    const uint64_t known_end = last == last_known.segment ? last_known.offset + kHeaderBytes + last_known.length : 0;
+    if (last > 0 && last >= last_known.segment) LL_RETURN_IF_ERROR(log.open_last(last, known_end));
     return log;
 }
 
-Status SegmentLog::open_last(uint32_t segment) {
+Status SegmentLog::open_last(uint32_t segment, uint64_t known_end) {
     const std::filesystem::path name = path(segment);
     file_ = ::open(name.c_str(), O_RDWR | O_CLOEXEC);
     if (file_ < 0) return file_error(name, "cannot be opened", errno);
@@ -119,6 +120,10 @@ Status SegmentLog::open_last(uint32_t segment) {
         if (!read_exactly(file_, &header, kHeaderBytes, size_) || !header.is_valid(segment)) break;
         const uint64_t room = size - size_ - kHeaderBytes;
         if (header.length > room || !has_sum(file_, header.length, size_ + kHeaderBytes, header.payload_sum)) break;
+    }
+    if (size_ < known_end) {  // It was damaged, not torn: records behind the damage can still be read.
+        close();
+        return {};
     }
     if (size_ == size) return {};
     if (::ftruncate(file_, off_t(size_)) != 0) return file_error(name, "its torn end cannot be cut", errno);

@@ -5,7 +5,8 @@
 //   4  CRC-32C of the header's bytes from 8 on             28  number of the segment
 //
 // What is not flushed may be torn by a power failure; the end of the last segment behind its last whole record is cut when the
-// log is opened. Nothing is ever changed in place, and room comes back when a whole segment is removed.
+// log is opened, unless it is known to have held more. Nothing is ever changed in place, and room comes back when a whole segment
+// is removed.
 
 #include <cstdint>
 #include <filesystem>
@@ -34,9 +35,10 @@ class SegmentLog {
     static constexpr uint64_t kSegmentBytes = uint64_t(64) << 20;
     static constexpr uint64_t kHeaderBytes = 32;
 
-    /// `directory` exists. A record that would make a segment larger than `segment_bytes` begins another one. New segments have
-    /// numbers above `last_known`, so that no reference to a segment that was lost points to another one.
-    static Result<SegmentLog> open(const std::filesystem::path& directory, uint32_t last_known = 0,
+    /// `directory` exists. A record that would make a segment larger than `segment_bytes` begins another one. `last_known` is the
+    /// last record that somebody refers to (segment 0: nobody does). New records lie behind it, also if it was lost or damaged, so
+    /// that no reference ever leads to another record.
+    static Result<SegmentLog> open(const std::filesystem::path& directory, const PayloadPlace& last_known = {},
                                    uint64_t segment_bytes = kSegmentBytes, StoreFiles& files = StoreFiles::system());
     SegmentLog(SegmentLog&& other) noexcept;
     SegmentLog& operator=(SegmentLog&&) = delete;
@@ -74,7 +76,7 @@ class SegmentLog {
           segment_bytes_(segment_bytes),
           files_(&files) {}
     std::filesystem::path path(uint32_t segment) const;
-    Status open_last(uint32_t segment);
+    Status open_last(uint32_t segment, uint64_t known_end);
     Status begin_segment();
     Status break_with(Status why);
     void close();

@@ -45,12 +45,14 @@ Result<std::unique_ptr<JobStore>> JobStore::open(Options options) {
     auto database = Database::open(file, store_migrations());
     if (!database.ok()) return database.status();
     LL_RETURN_IF_ERROR(options.files->sync_directory(options.directory));
-    int64_t last = 0;
-    LL_RETURN_IF_ERROR(database->each("SELECT MAX(segment) FROM result", {}, [&](const SqlRow& row) {
-        last = row.integer(0);
-        return Status();
-    }));
-    auto log = SegmentLog::open(segments, uint32_t(last), options.segment_bytes, *options.files);
+    PayloadPlace last;
+    LL_RETURN_IF_ERROR(database->each(
+        "SELECT segment, offset, length FROM result WHERE segment IS NOT NULL ORDER BY segment DESC, offset DESC LIMIT 1", {},
+        [&](const SqlRow& row) {
+            last = {uint32_t(row.integer(0)), uint64_t(row.integer(1)), uint64_t(row.integer(2))};
+            return Status();
+        }));
+    auto log = SegmentLog::open(segments, last, options.segment_bytes, *options.files);
     if (!log.ok()) return log.status();
     std::unique_ptr<JobStore> store(new JobStore(std::move(options), *std::move(database), *std::move(log)));
     LL_RETURN_IF_ERROR(store->count_live());
@@ -219,7 +221,8 @@ Status JobStore::put_checkpoint(const std::string& id, uint32_t groups, std::str
     std::snprintf(name, sizeof name, "%06llu.state", static_cast<unsigned long long>(next_checkpoint_++));
     const StoredCheckpoint checkpoint{groups, name, sha256(state), state.size()};
     const std::filesystem::path path = checkpoints() / name;
-    LL_RETURN_IF_ERROR(write_file_atomically(path.string(), state));
+    if (const Status written = write_file_atomically(path.string(), state); !written.ok())
+        return written.code() == StatusCode::kResourceExhausted ? written : internal_error(written.message());
     Status status = options_.files->sync_directory(checkpoints());
     crash_point("server.checkpoint-saved");
     if (status.ok()) status = hand_over([&](Batch& batch) { return insert_checkpoint(batch, id, checkpoint); }).get();
