@@ -86,7 +86,6 @@ struct FakeService {
         identity = {"build", "profile", sha256("golden")};
         const AssetManifest manifest{"scene.pbrt", {{"scene.pbrt", sha256("scene"), 5}}};
         root = manifest.root();
-        CoordinatorOptions options;
         options.directory = directory.path;
         options.identity = identity;
         options.scene_files_needed = false;
@@ -97,8 +96,25 @@ struct FakeService {
         options.clock = [this] { return TimePoint(std::chrono::milliseconds(now_ms)); };
         options.longest_sleep_seconds = 0.02;  // nobody tells the ticker that the clock was turned
         if (change) change(options);
-        coordinator = std::make_unique<Coordinator>(std::move(options));
+        start();
         EXPECT_TRUE(coordinator->assets().put(root, manifest.canonical_text()).ok());
+    }
+
+    /// With `durable`, of a coordinator that keeps jobs.
+    void start() {
+        std::unique_ptr<JobStore> store;
+        if (durable) {
+            auto opened = JobStore::open({.directory = directory.file("store")});
+            ASSERT_TRUE(opened.ok()) << opened.status().message();
+            store = *std::move(opened);
+        }
+        coordinator = std::make_unique<Coordinator>(options, std::move(store));
+        EXPECT_TRUE(coordinator->restored().ok()) << coordinator->restored().message();
+    }
+    /// The coordinator is stopped, and another one begins in the same directory.
+    void restart() {
+        coordinator.reset();
+        start();
     }
 
     JobSpec spec(uint32_t spp) const {
@@ -144,6 +160,8 @@ struct FakeService {
     Digest root;
     std::atomic<int64_t> now_ms{1000000};
     int requests = 0;
+    bool durable = false;
+    CoordinatorOptions options;
     std::unique_ptr<Coordinator> coordinator;
 };
 

@@ -1,0 +1,219 @@
+// A coordinator that forgets nothing: what was acknowledged is there after a restart, and jobs go on to the same bytes.
+
+#include <gtest/gtest.h>
+
+#include "common/core/atomic_file.h"
+#include "tests/service/fake.h"
+
+namespace lightloom {
+namespace {
+
+using testing::FakeService;
+
+const FrameLayout kFrame{40, 30, {0, 0, 40, 30}};
+
+struct DurableService : FakeService {
+    explicit DurableService(const std::function<void(CoordinatorOptions&)>& change = {})
+        : FakeService(kFrame, std::nullopt, change) {
+        durable = true;
+        restart();
+    }
+    /// Delivers up to `count` units; returns how many there were.
+    int work(const std::string& worker, int count) {
+        int done = 0;
+        for (; done < count; ++done) {
+            const auto leases = lease(worker);
+            if (leases.empty()) break;
+            EXPECT_EQ(deliver(worker, leases[0]).outcome, SubmitOutcome::kAccepted);
+        }
+        return done;
+    }
+    JobInfo wait_running(const std::string& id) {
+        return wait(id, [](const JobInfo& job) { return job.state != JobState::kPreparing; });
+    }
+    Digest finish(const std::string& id) {
+        const std::string worker = add_worker();
+        for (int i = 0; i < 1000 && !is_terminal(coordinator->get_job(id)->state); ++i) {
+            work(worker, 1000);
+            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        }
+        const JobInfo info = wait_end(id);
+        EXPECT_EQ(info.state, JobState::kSucceeded) << info.message;
+        return info.image_digest;
+    }
+};
+
+Digest undisturbed(uint32_t samples) {
+    FakeService service(kFrame);
+    const std::string id = service.submit(service.spec(samples));
+    const std::string worker = service.add_worker();
+    for (auto leases = service.lease(worker); !leases.empty(); leases = service.lease(worker)) service.deliver(worker, leases[0]);
+    return service.wait_end(id).image_digest;
+}
+
+TEST(Durable, AJobGoesOnAfterEveryRestartToTheSameBytes) {
+    DurableService service;
+    const std::string id = service.submit(service.spec(60));
+    uint64_t done = 0;
+    for (int restart = 0; restart < 5; ++restart) {
+        done += uint64_t(service.work(service.add_worker(), 3));
+        service.restart();
+        const JobInfo info = service.wait_running(id);
+        EXPECT_EQ(info.state, JobState::kRunning);
+        EXPECT_EQ(info.unit_done, done) << "no acknowledged unit is asked for again";
+        EXPECT_EQ(info.worker_count, restart + 1u);
+    }
+    EXPECT_EQ(service.finish(id), undisturbed(60));
+    const std::string manifest = *service.coordinator->manifest(id);
+    EXPECT_NE(manifest.find("worker-1-host-1"), std::string::npos) << "workers of earlier coordinators are named";
+}
+
+TEST(Durable, ALateResultOfAnUnfinishedUnitCountsAndARepeatedOneIsRecognised) {
+    DurableService service;
+    const std::string id = service.submit(service.spec(40));
+    const std::string worker = service.add_worker();
+    const auto first = service.lease(worker), second = service.lease(worker);
+    service.deliver(worker, first[0]);
+    service.restart();
+    service.wait_running(id);
+    const auto nobody = service.coordinator->submit_payload(worker, second[0].reference(), {}, {});
+    EXPECT_FALSE(nobody.ok() && nobody->outcome == SubmitOutcome::kAccepted) << "the worker has to register again";
+    const std::string again = service.add_worker();
+    EXPECT_EQ(service.deliver(again, second[0]).outcome, SubmitOutcome::kAccepted);
+    EXPECT_EQ(service.deliver(again, first[0]).outcome, SubmitOutcome::kDuplicateSame);
+    EXPECT_EQ(service.finish(id), undisturbed(40));
+}
+
+TEST(Durable, FinishedImagesAreServedAfterARestart) {
+    DurableService service;
+    const std::string id = service.submit(service.spec(10));
+    const Digest digest = service.finish(id);
+    const std::string image = *service.coordinator->image(id, ImageKind::kFinal);
+    const JobInfo before = *service.coordinator->get_job(id);
+    service.restart();
+    const JobInfo after = *service.coordinator->get_job(id);
+    EXPECT_EQ(after.state, JobState::kSucceeded);
+    EXPECT_EQ(after.image_digest, digest);
+    EXPECT_EQ(after.unit_total, before.unit_total);
+    EXPECT_EQ(after.label.name, before.label.name);
+    EXPECT_EQ(*service.coordinator->image(id, ImageKind::kFinal), image);
+    EXPECT_TRUE(service.coordinator->manifest(id).ok());
+    EXPECT_TRUE(service.coordinator->preview(id, PreviewFormat::kPng).ok());
+}
+
+TEST(Durable, ARequestWhoseAnswerWasLostIsOneJob) {
+    DurableService service;
+    const auto first = service.coordinator->submit_job("the request", service.spec(5));
+    ASSERT_TRUE(first.ok());
+    service.restart();
+    const auto again = service.coordinator->submit_job("the request", service.spec(5));
+    ASSERT_TRUE(again.ok()) << again.status().message();
+    EXPECT_EQ(again->job_id, first->job_id);
+    EXPECT_EQ(service.coordinator->submit_job("the request", service.spec(6)).status().code(), StatusCode::kAlreadyExists);
+    EXPECT_EQ(service.coordinator->list_jobs().size(), 1u);
+}
+
+TEST(Durable, CancelledAndFailedJobsStayWhatTheyAre) {
+    DurableService service;
+    const std::string cancelled = service.submit(service.spec(5)), failed = service.submit(service.spec(6));
+    ASSERT_TRUE(service.coordinator->cancel_job(cancelled).ok());
+    const std::string worker = service.add_worker();
+    const auto leases = service.lease(worker);
+    ASSERT_EQ(leases.size(), 1u);
+    service.coordinator->release_unit(worker, leases[0].reference(), invalid_argument("it is wrong"));
+    const std::string message = service.wait_end(failed).message;
+    service.restart();
+    EXPECT_EQ(service.coordinator->get_job(cancelled)->state, JobState::kCancelled);
+    EXPECT_EQ(service.coordinator->get_job(failed)->state, JobState::kFailed);
+    EXPECT_EQ(service.coordinator->get_job(failed)->message, message);
+    EXPECT_TRUE(service.lease(service.add_worker()).empty());
+}
+
+TEST(Durable, QueuedJobsKeepTheirOrder) {
+    DurableService service;
+    std::vector<std::string> ids;
+    for (uint32_t i = 1; i <= 5; ++i) ids.push_back(service.submit(service.spec(i)));
+    service.restart();
+    const auto jobs = service.coordinator->list_jobs();
+    ASSERT_EQ(jobs.size(), ids.size());
+    for (size_t i = 0; i < ids.size(); ++i) EXPECT_EQ(jobs[i].job_id, ids[i]);
+    for (const std::string& id : ids) service.wait_running(id);
+    EXPECT_EQ(service.lease(service.add_worker())[0].job_id, ids[0]);
+}
+
+TEST(Durable, RevisionsGrowOverARestart) {
+    DurableService service;
+    const std::string id = service.submit(service.spec(5));
+    service.restart();
+    const JobInfo second = service.wait_running(id);
+    service.restart();
+    EXPECT_GT(service.wait_running(id).revision, second.revision) << "who watches the job must see that it changed";
+}
+
+TEST(Durable, WhatAnotherBuildRenderedIsRenderedAgain) {
+    DurableService service;
+    const std::string id = service.submit(service.spec(20));
+    service.work(service.add_worker(), 4);
+    service.options.identity.build_id = "another build";
+    service.identity = service.options.identity;
+    service.restart();
+    EXPECT_EQ(service.wait_running(id).unit_done, 0u);
+    EXPECT_EQ(service.finish(id), undisturbed(20));
+}
+
+TEST(Durable, TheTimeThatWasTakenStaysTaken) {
+    DurableService service;
+    JobSpec spec = service.spec(0);
+    spec.time_limit_seconds = 100;
+    const std::string id = service.submit(spec);
+    const std::string worker = service.add_worker();
+    auto leases = service.lease(worker);
+    ASSERT_TRUE(service.coordinator->heartbeat(worker, {{leases[0].reference(), true}}).ok());
+    service.now_ms += 60000;
+    EXPECT_EQ(service.deliver(worker, leases[0]).outcome, SubmitOutcome::kAccepted);
+    service.restart();
+    service.wait_running(id);
+    const std::string next = service.add_worker();
+    leases = service.lease(next);
+    ASSERT_TRUE(service.coordinator->heartbeat(next, {{leases[0].reference(), true}}).ok());
+    EXPECT_NEAR(service.coordinator->get_job(id)->render_seconds, 60, 1);
+    service.now_ms += 41000;
+    const JobInfo info = service.wait_end(id);
+    EXPECT_EQ(info.state, JobState::kSucceeded) << info.message;
+    EXPECT_EQ(info.samples_per_pixel_done, 1u);
+}
+
+/// A frame of 1.5 10^5 pixels makes payloads of which a few are due for a checkpoint.
+TEST(Durable, ACheckpointTakesThePlaceOfResults) {
+    const FrameLayout large{500, 300, {0, 0, 500, 300}};
+    const auto render = [&](bool durable) {
+        FakeService service(large);
+        service.durable = durable;
+        if (durable) service.restart();
+        const std::string id = service.submit(service.spec(60));
+        for (int i = 0; !is_terminal(service.coordinator->get_job(id)->state); ++i) {
+            const std::string worker = service.add_worker();
+            for (auto leases = service.lease(worker); !leases.empty(); leases = service.lease(worker)) {
+                service.deliver(worker, leases[0]);
+                if (durable && ++i % 17 == 0) break;
+            }
+            if (durable && !is_terminal(service.coordinator->get_job(id)->state)) {
+                service.restart();
+                service.wait_running(id);
+            } else {
+                service.wait_end(id);
+            }
+        }
+        if (durable) {
+            uint64_t bytes = 0;
+            for (const auto& item : std::filesystem::recursive_directory_iterator(service.directory.file("store")))
+                if (item.is_regular_file()) bytes += item.file_size();
+            EXPECT_LT(bytes, uint64_t(64) << 20) << "payloads of a job that has ended are gone";
+        }
+        return service.wait_end(id).image_digest;
+    };
+    EXPECT_EQ(render(true), render(false));
+}
+
+}  // namespace
+}  // namespace lightloom
