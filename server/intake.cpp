@@ -24,7 +24,8 @@ Result<PartialExpectation> Intake::expected_partial(const UnitReference& referen
     const OpenBook book(office_);
     const JobPtr file = book->find(reference.job_id);
     if (!file || file->job.state() != JobState::kRunning) return not_running(reference.job_id);
-    const UnitTable* const units = file->job.open_units(reference.key);
+    UnitTable* const units = file->job.open_units(reference.key);
+    if (units) units->open_for(reference.key);
     const auto unit = units ? units->find(reference.key) : std::nullopt;
     if (!unit) return invalid_argument("job " + reference.job_id + " has leased no such unit");
     return PartialExpectation{file->job.spec().frame, unit->render.tile, unit->render.samples_per_pixel(),

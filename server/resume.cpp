@@ -11,10 +11,10 @@
 namespace lightloom {
 namespace {
 
-/// A revision that nobody has seen: an earlier coordinator began earlier, and made fewer than 65536 a second.
+/// A revision that nobody has seen: an earlier coordinator began earlier, and made fewer than 65536 in a millisecond.
 uint64_t first_revision() {
     const auto now = std::chrono::system_clock::now().time_since_epoch();
-    return uint64_t(std::chrono::duration_cast<std::chrono::seconds>(now).count()) << 16;
+    return uint64_t(std::chrono::duration_cast<std::chrono::milliseconds>(now).count()) << 16;
 }
 
 /// The job as far as its submission says what it is; `archived` says how far it was.

@@ -79,6 +79,7 @@ Status UnitTable::restore(uint32_t merged_groups, std::span<const Known> known) 
     if (const auto missing = std::find(merged.begin(), merged.end(), false); missing != merged.end())
         return data_loss("the saved results of the merged group " +
                          std::to_string(size_t(missing - merged.begin()) / tile_count()) + " are not complete");
+    restored_ = true;
     merged_groups_ = merged_groups;
     done_count_ = merged.size();
     while (opened_groups() < opened) open_next();
@@ -178,6 +179,10 @@ std::vector<UnitTable::Expired> UnitTable::expire(TimePoint now) {
               [&](const Expired& a, const Expired& b) { return entry(a.unit)->ticket < entry(b.unit)->ticket; });
     for (const Expired& lease : expired) make_pending(*entry(lease.unit));
     return expired;
+}
+
+void UnitTable::open_for(const UnitKey& key) {
+    while (restored_ && opened_groups() <= key.group && open_group()) continue;
 }
 
 bool UnitTable::is_done(const UnitKey& key) const {

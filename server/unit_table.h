@@ -76,6 +76,9 @@ class UnitTable {
     /// a result is not of this table.
     Status restore(uint32_t merged_groups, std::span<const Known> known);
 
+    /// In a table that was restored, opens the unit's group, as far as the window allows: who held a lease when the coordinator ended
+    /// may deliver after all.
+    void open_for(const UnitKey& key);
     /// The unit of an opened group.
     std::optional<WorkUnit> find(const UnitKey& key) const;
     /// Groups below `count` are merged: the window moves on, and of their units only worker and digest are kept.
@@ -149,6 +152,7 @@ class UnitTable {
     uint32_t merged_groups_ = 0;
     uint32_t group_limit_ = UINT32_MAX;
     bool closed_ = false;
+    bool restored_ = false;
 };
 
 }  // namespace lightloom

@@ -28,9 +28,6 @@ struct DurableService : FakeService {
         }
         return done;
     }
-    JobInfo wait_running(const std::string& id) {
-        return wait(id, [](const JobInfo& job) { return job.state != JobState::kPreparing; });
-    }
     Digest finish(const std::string& id) {
         const std::string worker = add_worker();
         for (int i = 0; i < 1000 && !is_terminal(coordinator->get_job(id)->state); ++i) {
@@ -120,7 +117,7 @@ TEST(Durable, CancelledAndFailedJobsStayWhatTheyAre) {
     const std::string worker = service.add_worker();
     const auto leases = service.lease(worker);
     ASSERT_EQ(leases.size(), 1u);
-    service.coordinator->release_unit(worker, leases[0].reference(), invalid_argument("it is wrong"));
+    ASSERT_TRUE(service.coordinator->release_unit(worker, leases[0].reference(), invalid_argument("it is wrong")).ok());
     const std::string message = service.wait_end(failed).message;
     service.restart();
     EXPECT_EQ(service.coordinator->get_job(cancelled)->state, JobState::kCancelled);

@@ -139,6 +139,9 @@ struct FakeService {
         ADD_FAILURE() << "job " << id << " stays " << to_string(info.state);
         return info;
     }
+    JobInfo wait_running(const std::string& id) {
+        return wait(id, [](const JobInfo& job) { return job.state != JobState::kPreparing; });
+    }
     JobInfo wait_end(const std::string& id) {
         return wait(id, [](const JobInfo& j) { return is_terminal(j.state); });
     }
