@@ -9,6 +9,8 @@ namespace {
 
 /// How often the disk is looked at, by a coordinator that keeps jobs; and how often where it is full.
 constexpr double kRoomSeconds = 5, kPausedSeconds = 1;
+/// How often the ticker says that it turns.
+constexpr double kBeatSeconds = 1;
 
 }  // namespace
 
@@ -47,6 +49,10 @@ void Coordinator::keep_time(std::stop_token stop) {
         const TimePoint now = office_.now();
         double seconds = office_.options.longest_sleep_seconds;
         if (office_.archive.keeps()) seconds = std::min(seconds, book->paused.empty() ? kRoomSeconds : kPausedSeconds);
+        if (office_.options.beat) {
+            office_.options.beat();
+            seconds = std::min(seconds, kBeatSeconds);
+        }
         // A lease has run out a moment after its end, not at it.
         if (const auto next = book->agenda.next()) seconds = std::min(seconds, seconds_between(now, *next) + 1e-3);
         if (seconds > 0) book.wait_until(book->agenda_changed, seconds_after(std::chrono::steady_clock::now(), seconds));
@@ -56,6 +62,16 @@ void Coordinator::keep_time(std::stop_token stop) {
             seconds_between(room_checked_, now) >= (book->paused.empty() ? kRoomSeconds : kPausedSeconds))
             look_for_room(book);
     }
+}
+
+std::set<Digest> Coordinator::pinned_tables() const {
+    const OpenBook book(office_);
+    return book->ledger.pinned_files();
+}
+
+Status Coordinator::room() const {
+    const OpenBook book(office_);
+    return book->paused.empty() ? Status() : Status(StatusCode::kResourceExhausted, "no units are given out: " + book->paused);
 }
 
 void Coordinator::look_for_room(OpenBook& book) {

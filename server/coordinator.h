@@ -22,6 +22,10 @@ class Coordinator {
     /// Whether the jobs of the store could be read.
     const Status& restored() const { return restored_; }
 
+    /// The files of tables that jobs need.
+    std::set<Digest> pinned_tables() const;
+    /// Whether there is room on the disk; while there is not, nobody gets units.
+    Status room() const;
     AssetStore& assets() { return office_.assets; }
 
     // Jobs; see admission.h.
@@ -83,7 +87,7 @@ class Coordinator {
     /// Stops giving out units where the disk is full, and goes on where it is not any more.
     void look_for_room(OpenBook& book);
 
-    Office office_;
+    mutable Office office_;
     Status restored_;
     Admission admission_;
     Dispatch dispatch_;

@@ -22,6 +22,8 @@ struct CoordinatorOptions {
     std::optional<uint64_t> shuffle_seed;  ///< Lease units in a random order (tests).
     /// Called by any thread at any time.
     std::function<TimePoint()> clock = [] { return std::chrono::steady_clock::now(); };
+    /// Called by the ticker with each of its turns, once in two seconds at least.
+    std::function<void()> beat;
     /// Memory of the host, into which a frame's sums must fit. 0: as the system reports it.
     int64_t memory_bytes = 0;
     uint64_t waiting_bytes = uint64_t(512) << 20;  ///< Most memory for the sums of groups that wait for earlier ones.

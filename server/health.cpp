@@ -8,7 +8,6 @@
 namespace lightloom {
 namespace {
 
-constexpr auto kPulse = std::chrono::milliseconds(500);
 constexpr auto kLook = std::chrono::seconds(1);
 
 void sleep_or_stop(std::chrono::milliseconds time, const std::stop_token& stop) {
@@ -21,15 +20,6 @@ void sleep_or_stop(std::chrono::milliseconds time, const std::stop_token& stop) 
 std::string seconds_text(double seconds) { return std::to_string(int64_t(seconds)) + " s"; }
 
 }  // namespace
-
-Pulse::Pulse(Heartbeat& heart, std::function<void()> ask)
-    : thread_([&heart, ask = std::move(ask)](std::stop_token stop) {
-          while (!stop.stop_requested()) {
-              ask();
-              heart.beat();
-              sleep_or_stop(kPulse, stop);
-          }
-      }) {}
 
 HealthChecks make_health_checks(const Heartbeat& heart, std::filesystem::path directory, const HealthLimits& limits) {
     const auto live = [&heart, limits]() -> Status {

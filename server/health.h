@@ -29,16 +29,6 @@ class Heartbeat {
     std::atomic<Clock::time_point> last_{Clock::now()};
 };
 
-/// Beats whenever `ask` has returned, twice a second: for what answers, but does not beat by itself.
-class Pulse {
-  public:
-    /// `heart` outlives the object. `ask` may block; the destructor waits for it.
-    Pulse(Heartbeat& heart, std::function<void()> ask);
-
-  private:
-    std::jthread thread_;
-};
-
 /// What probes ask. Each returns OK, or one line that says what is wrong; it never blocks, and any thread may call it. Without a
 /// function the answer is OK.
 struct HealthChecks {

@@ -156,12 +156,15 @@ int main(int argc, char** argv) {
     if (!lock.ok()) return report_failure(lock.status());
     auto store = JobStore::open({.directory = std::filesystem::path(data) / "store"});
     if (!store.ok()) return report_failure(store.status());
+    Heartbeat heart;
+    options.beat = [&heart] { heart.beat(); };
     Coordinator coordinator(std::move(options), *std::move(store));
     if (!coordinator.restored().ok()) return report_failure(coordinator.restored(), data + ": ");
-    Heartbeat heart;
-    // Looking for a job takes the lock under which everything happens: while that answers, the coordinator turns.
-    const Pulse pulse(heart, [&coordinator] { (void)coordinator.get_job({}); });
-    const HealthChecks health = make_health_checks(heart, data);
+    HealthChecks health = make_health_checks(heart, data);
+    health.ready = [&coordinator, disk = health.ready]() -> Status {
+        LL_RETURN_IF_ERROR(disk());
+        return coordinator.room();
+    };
     auto server = GrpcServer::start(coordinator, listen, {.reflection = reflection, .ready = health.ready});
     if (!server.ok()) return report_failure(server.status());
     std::unique_ptr<StatusHttp> http;
@@ -180,8 +183,8 @@ int main(int argc, char** argv) {
             if (is_terminal(job.state)) continue;
             used.jobs.insert(job.job_id);
             scenes.insert(job.spec.scene_root);
-            used.assets.insert(job.tables.asset.digest);
         }
+        used.assets.merge(coordinator.pinned_tables());
         used.assets.merge(files_of_scenes(coordinator.assets(), scenes));
         return used;
     };

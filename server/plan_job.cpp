@@ -6,20 +6,11 @@
 
 #include "common/core/crash_point.h"
 #include "server/finish_job.h"
+#include "server/memory_need.h"
 #include "server/resume.h"
 
 namespace lightloom {
 namespace {
-
-constexpr uint64_t kMaxWindow = 256;
-
-/// How many groups of a job may be open at a time: the one that is completed next, and those later ones whose sums fit into
-/// `waiting_bytes`.
-uint32_t open_groups(const JobSpec& spec, uint64_t waiting_bytes) {
-    const uint64_t area = uint64_t(spec.frame.crop.area());
-    const bool splats = spec.algorithm.light_paths_per_iteration(spec.frame.crop.area()) > 0;
-    return uint32_t(std::min(1 + waiting_bytes / (Reducer::open_group_bytes(splats) * area), kMaxWindow));
-}
 
 /// Puts down what the job renders, before anything of it is leased.
 Status keep_plan(Office& office, const JobPtr& file, const Job::RenderPlan& plan) {
@@ -39,7 +30,7 @@ Status plan_units(Office& office, const JobPtr& file, JobSpec spec, SceneFacts f
     const Plan plan(frame, spec.algorithm);
     // A noise target alone may be out of reach.
     const uint64_t iterations = only_noise_bounds(spec) ? JobSpec::kMaxSamplesPerPixel : spec.samples_per_pixel;
-    UnitTable units(plan, iterations, open_groups(spec, office.options.waiting_bytes), office.options.shuffle_seed);
+    UnitTable units(plan, iterations, most_open_groups(spec, office.options.waiting_bytes), office.options.shuffle_seed);
     auto reducer = std::make_shared<Reducer>(frame, plan.tile_count(), facts.response, spec.noise_target);
     Job::RenderPlan render{
         std::move(spec), std::move(facts.layers), std::move(units), std::move(reducer), std::move(tables), {}, 0, {}};

@@ -6,6 +6,7 @@
 
 #include "common/core/crash_point.h"
 #include "common/transport/parameters.h"
+#include "server/memory_need.h"
 #include "server/plan_job.h"
 #include "server/resume.h"
 #include "server/training_budget.h"
@@ -13,14 +14,22 @@
 namespace lightloom {
 namespace {
 
-/// This is checked before hours of rendering, because the system may hand out memory that it does not have and kill the process
-/// that uses it.
-Status check_memory(const Rect& crop, int64_t memory_bytes) {
-    const int64_t memory = memory_bytes > 0 ? memory_bytes : int64_t(::sysconf(_SC_PHYS_PAGES)) * ::sysconf(_SC_PAGESIZE);
-    if (memory <= 0 || crop.area() <= memory / kFrameBytesPerPixel) return {};
-    return {StatusCode::kResourceExhausted, "the frame has " + pixels_and_memory(crop.area()) + "; the coordinator's host has " +
-                                                std::to_string(memory / 1000000000) +
-                                                " GB, so lower the resolution or give a crop window"};
+MemoryNeed memory_need_of(const Office& office, const JobSpec& spec) {
+    return memory_need(spec, office.options.waiting_bytes, office.options.training_bytes);
+}
+
+/// Whether the host has the memory for the job beside those that render now; jobs that wait hold no sums.
+Status admit(Office& office, const JobSpec& spec) {
+    const int64_t given = office.options.memory_bytes;
+    const int64_t host = given > 0 ? given : int64_t(::sysconf(_SC_PHYS_PAGES)) * ::sysconf(_SC_PAGESIZE);
+    uint64_t others = 0;
+    {
+        const OpenBook book(office);
+        for (const auto& [number, file] : book->open_jobs())
+            if (const UnitTable* const units = file->job.open_units(); units && file->job.state() == JobState::kRunning)
+                if (units->done_count() > 0) others += memory_need_of(office, file->job.spec()).peak();
+    }
+    return check_memory(spec, memory_need_of(office, spec), uint64_t(std::max<int64_t>(0, host)), others);
 }
 
 /// Looks the tables up; otherwise the job waits for them or begins to make them.
@@ -104,7 +113,6 @@ Status prepare(Office& office, const JobPtr& file) {
     const Rect& crop = facts->frame.crop;
     if (crop.empty() || crop.area() > kMaxPartialPixels)
         return invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) + " pixels");
-    LL_RETURN_IF_ERROR(check_memory(crop, office.options.memory_bytes));
     if (archived && archived->planned) {
         const auto resumed = resume_rendering(office, file, *archived, *facts);
         if (!resumed.ok()) return resumed.status();
@@ -112,6 +120,7 @@ Status prepare(Office& office, const JobPtr& file) {
     }
     spec.frame = facts->frame;
     if (spec.max_depth < 0) spec.max_depth = facts->max_depth;
+    LL_RETURN_IF_ERROR(admit(office, spec));
     if (spec.algorithm.learning()) return prepare_tables(office, file, std::move(spec), *std::move(facts), true);
     return plan_units(office, file, std::move(spec), *std::move(facts), {});
 }

@@ -74,6 +74,12 @@ bool TableLedger::unpin(JobNumber job, const Digest& file) {
     return true;
 }
 
+std::set<Digest> TableLedger::pinned_files() const {
+    std::set<Digest> files;
+    for (const auto& [file, jobs] : pins_) files.insert(file);
+    return files;
+}
+
 std::vector<Digest> TableLedger::forget(JobNumber job) {
     stop_making(job);
     stop_waiting(job);

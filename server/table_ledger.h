@@ -38,6 +38,7 @@ class TableLedger {
     /// `job` does not need it any more. True if nobody does.
     bool unpin(JobNumber job, const Digest& file);
     bool pinned(const Digest& file) const { return pins_.contains(file); }
+    std::set<Digest> pinned_files() const;
     /// `job` has ended: it makes nothing, waits for nothing and needs nothing. Returns the files that nobody needs any more.
     std::vector<Digest> forget(JobNumber job);
 

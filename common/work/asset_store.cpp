@@ -288,11 +288,13 @@ Status AssetStore::Upload::finish() {
         return data_loss("the bytes have digest " + digest->hex() + ", but the declared one is " + digest_.hex());
     }
     const fs::path to = store_->path_of(digest_);
-    fs::create_directories(to.parent_path(), error);
+    const bool made = fs::create_directories(to.parent_path(), error);
     crash_point("asset.before-commit");
     if (::rename(from.c_str(), to.c_str()) != 0) return io_error(to, errno);
     crash_point("asset.committed");
-    return {};
+    // Whoever is told that the file is here must find it after a power failure.
+    LL_RETURN_IF_ERROR(flush_folder(to.parent_path().string()));
+    return made ? flush_folder(store_->directory_.string()) : Status();
 }
 
 Status AssetStore::materialise(const AssetManifest& manifest, const fs::path& directory) const {

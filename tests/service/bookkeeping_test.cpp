@@ -301,10 +301,10 @@ TEST(Coordinator, OpensOnlyGroupsThatTheRoomForWaitingGroupsHolds) {
 }
 
 TEST(Coordinator, AFrameThatTheMemoryCannotHoldIsRefusedWithWhatItTakes) {
-    FakeService service(whole(8000, 1000), std::nullopt, [](CoordinatorOptions& o) { o.memory_bytes = 1'000'000'000; });
+    FakeService service(whole(8000, 1000), std::nullopt, [](CoordinatorOptions& o) { o.memory_bytes = 900'000'000; });
     const JobInfo job = service.wait_end(service.submit(service.spec(1)));
     EXPECT_EQ(job.state, JobState::kFailed);
-    for (const char* part : {"8000000 pixels", "take 2 GB", "host has 1 GB"})
+    for (const char* part : {"8000000 pixels", "need about 1.0 GB", "host has 0.9 GB"})
         EXPECT_NE(job.message.find(part), std::string::npos) << job.message;
 }
 

@@ -59,23 +59,6 @@ TEST(Health, IsThatOfTheHeart) {
     EXPECT_TRUE(checks.live().ok()) << "it goes on";
 }
 
-TEST(Health, APulseStopsWithWhatItAsks) {
-    Heartbeat heart;
-    std::promise<void> gate;
-    std::atomic<int> asked{0};
-    {
-        const Pulse pulse(heart, [&, open = gate.get_future().share()] {
-            if (++asked == 2) open.wait();
-        });
-        ASSERT_TRUE(wait_until(60, [&] { return asked == 2; }));
-        const double before = heart.silent_seconds();
-        std::this_thread::sleep_for(std::chrono::milliseconds(700));
-        EXPECT_GE(heart.silent_seconds(), before + 0.7);
-        gate.set_value();
-        EXPECT_TRUE(wait_until(60, [&] { return asked >= 3; }));
-    }
-}
-
 TEST(Health, ADiskWithoutRoomIsNotReady) {
     const TempDirectory directory;
     const Heartbeat heart;
