@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs, checks that sources are formatted, builds, and runs the whole test suite, then each fuzz target for a minute
-# (LIGHTLOOM_FUZZ_SECONDS), and the quick tests under sanitizers.
+# Installs, checks that sources are formatted, builds, checks the coordinator's locks (thread_safety.sh), and runs the whole test
+# suite, then each fuzz target for a minute (LIGHTLOOM_FUZZ_SECONDS), and the quick tests under sanitizers.
 # Arguments go to ctest and leave the rest out. With CI=true, warnings are errors.
 #
 #   deploy/test.sh                     everything
@@ -20,6 +20,7 @@ werror=OFF
 if [ "${CI:-}" = true ]; then werror=ON; fi
 cmake --preset release -DLIGHTLOOM_WERROR=$werror >/dev/null
 cmake --build --preset release
+"$root/deploy/thread_safety.sh"
 cd build/release
 if [ $# -gt 0 ]; then
     exec ctest --output-on-failure "$@"
