@@ -36,7 +36,7 @@ for preset in "${presets[@]}"; do
     if [ "$preset" = tsan ]; then
         names=(coordinator bookkeeping learn_tables worker scene_cache work)
         controls=(race_control)
-        if [ -z "$quick" ]; then names+=(client job_port training broadcast guided shapes process transport); fi
+        if [ -z "$quick" ]; then names+=(client job_port training broadcast guided shapes process transport durable store mutation); fi
     elif [ -n "$quick" ]; then
         # The service runs under ThreadSanitizer, which also sees freed memory: transport need not be built once more
         # here.

@@ -103,7 +103,7 @@ Result<JobInfo> Admission::submit(const std::string& request_id, const JobSpec& 
                                .scene = *std::move(scene),
                                .created_at = utc_now(),
                                .directory = office_.options.directory / "jobs" / id};
-    LL_RETURN_IF_ERROR(office_.archive.accept(submission));
+    LL_RETURN_IF_ERROR(office_.archive.accept(submission, office_.options.identity));
     crash_point("server.job-kept");
 
     OpenBook book(office_);

@@ -11,8 +11,8 @@ namespace lightloom {
 namespace {
 
 // Kinds of events.
-constexpr const char* kPlanned = "planned";  ///< v1::Job, and in kPlannedBy the build.
-constexpr const char* kPlannedBy = "planned-by";
+constexpr const char* kBuild = "build";      ///< Text. What came before it is of no use.
+constexpr const char* kPlanned = "planned";  ///< v1::Job
 constexpr const char* kSettled = "settled";  ///< v1::JobSpec
 constexpr const char* kSpent = "spent";      ///< Two numbers as text: seconds of learning and of rendering.
 
@@ -42,21 +42,26 @@ std::string name_of(const BuildIdentity& identity) {
     return identity.build_id + " " + identity.math_profile + " " + identity.golden_digest.hex();
 }
 
-Status Archive::accept(const Job::Submission& submission) {
+Status Archive::accept(const Job::Submission& submission, const BuildIdentity& by) {
     if (!store_) return {};
-    return store_
-        ->put_job({.id = submission.id,
-                   .request_id = submission.request_id,
-                   .created_at = submission.created_at,
-                   .submitted = to_bytes<v1::JobSpec>(submission.submitted),
-                   .label = to_bytes<v1::JobLabel>(submission.label),
-                   .scene = submission.scene})
-        .get();
+    auto accepted = store_->put_job({.id = submission.id,
+                                     .request_id = submission.request_id,
+                                     .created_at = submission.created_at,
+                                     .submitted = to_bytes<v1::JobSpec>(submission.submitted),
+                                     .label = to_bytes<v1::JobLabel>(submission.label),
+                                     .scene = submission.scene});
+    LL_RETURN_IF_ERROR(store_->append_event(submission.id, kBuild, name_of(by)).get());
+    return accepted.get();
 }
 
-Status Archive::plan(const JobInfo& info, const BuildIdentity& by) {
+Status Archive::begin_anew(const std::string& job_id, const BuildIdentity& by) {
     if (!store_) return {};
-    (void)store_->append_event(info.job_id, kPlannedBy, name_of(by));
+    (void)store_->drop_results(job_id);
+    return store_->append_event(job_id, kBuild, name_of(by)).get();
+}
+
+Status Archive::plan(const JobInfo& info) {
+    if (!store_) return {};
     LL_RETURN_IF_ERROR(store_->append_event(info.job_id, kPlanned, to_bytes<v1::Job>(info)).get());
     return store_->update_job(info.job_id, {.state = JobState::kRunning, .message = {}, .scene = {}, .spec = {}}).get();
 }
@@ -143,7 +148,10 @@ Result<ArchivedJob> Archive::read(const StoredJob& stored, const std::filesystem
         return out;
     }
     for (const StoredEvent& event : stored.events) {
-        if (event.kind == kPlannedBy) out.planned_by = event.bytes;
+        if (event.kind == kBuild) {
+            out.build = event.bytes;
+            out.planned.reset();
+        }
         if (event.kind == kSpent) (void)std::sscanf(event.bytes.c_str(), "%lg %lg", &out.learning_seconds, &out.rendering_seconds);
         if (event.kind == kPlanned) {
             auto planned = from_bytes<v1::Job>(event.bytes);

@@ -26,11 +26,10 @@ namespace lightloom {
 /// What an earlier coordinator of the same directory knew of a job.
 struct ArchivedJob {
     Job::Submission submission;
-    double age_seconds = 0;       ///< Since the submission.
-    std::optional<JobInfo> last;  ///< Of a job that has ended: what is told of it.
-    /// Of a job that rendered: its complete spec and its tables, and which build it was.
-    std::optional<JobInfo> planned;
-    std::string planned_by;
+    double age_seconds = 0;                              ///< Since the submission.
+    std::optional<JobInfo> last;                         ///< Of a job that has ended: what is told of it.
+    std::string build;                                   ///< The one of the results, as name_of() says it.
+    std::optional<JobInfo> planned;                      ///< Of a job that rendered: its complete spec and its tables.
     std::optional<JobSpec> settled;                      ///< The spec with the size of training set that a time limit had room for.
     double learning_seconds = 0, rendering_seconds = 0;  ///< Time that was taken of the time limit.
     std::vector<StoredResult> results;
@@ -44,10 +43,12 @@ class Archive {
 
     bool keeps() const { return store_ != nullptr; }
 
-    // Each returns when it is on disk.
-    Status accept(const Job::Submission& submission);
-    /// `info` has the complete spec and the tables. `by` names the build.
-    Status plan(const JobInfo& info, const BuildIdentity& by);
+    // Each returns when it is on disk. `by` names the build whose results are kept from then on.
+    Status accept(const Job::Submission& submission, const BuildIdentity& by);
+    /// The results of the job are of no use; those of this build will be kept.
+    Status begin_anew(const std::string& job_id, const BuildIdentity& by);
+    /// `info` has the complete spec and the tables.
+    Status plan(const JobInfo& info);
     Status settle(const std::string& job_id, const JobSpec& spec);
     /// kAlreadyExists if the unit has a result with other bytes.
     Status keep_partial(const std::string& job_id, const UnitKey& unit, const WorkerRecord& worker, double seconds,

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kLongestLeaseWait = 5;
 /// A waiting call looks by itself that often whether its caller is still there, and whether a worker that rested may go on.
-constexpr double kLookSeconds = 0.5;
+constexpr double kLookSeconds = 1;
 
 std::string describe(const BuildIdentity& identity) {
     return "build " + identity.build_id + ", math profile \"" + identity.math_profile + "\", golden unit " +
@@ -217,7 +217,11 @@ void Dispatch::tick(OpenBook& book) {
         const JobPtr file = book->find(number);
         UnitTable* const units = file ? file->job.open_units() : nullptr;
         if (!units) continue;
-        if (const auto expired = units->expire(now); !expired.empty()) leases_expired(book, file, *units, expired, now);
+        if (const auto expired = units->expire(now); !expired.empty()) {
+            // An answer may have been lost on its way, and an idle worker tells nothing of what it has not.
+            for (const UnitTable::Expired& lease : expired) book->workers.at(lease.worker).held.erase({file->job.id(), lease.unit});
+            leases_expired(book, file, *units, expired, now);
+        }
         file->job.stop_idle_clock(now);
         if (file->job.time_is_up(now)) {
             file->job.close();

@@ -13,7 +13,7 @@ class Dispatch {
 
     Result<WorkerGrant> register_worker(const WorkerHello& hello);
     Result<std::vector<UnitLease>> lease(const std::string& worker_id, double wait_seconds, const std::function<bool()>& cancelled);
-    /// Makes calls of lease() look at `cancelled` now; they do so by themselves twice a second.
+    /// Makes calls of lease() look at `cancelled` now; they do so by themselves once a second.
     void wake();
     Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running);
     Status release(const std::string& worker_id, const UnitReference& unit, const Status& why);

@@ -122,14 +122,13 @@ void Intake::checkpoint_if_due(OpenBook& book, const JobPtr& file, uint64_t byte
     file->kept_bytes = 0;
     book.start(file, "to write a checkpoint of this job", [&office = office_, file, reducer = file->job.reducer()] {
         const auto saved = reducer->serialize();
-        Status status = saved.ok() ? office.archive.checkpoint(file->job.id(), *saved) : saved.status();
+        const Status status = saved.ok() ? office.archive.checkpoint(file->job.id(), *saved) : saved.status();
         crash_point("server.checkpoint-kept");
-        const OpenBook end(office);
+        OpenBook end(office);
         file->in_checkpoint = false;
-        // Without room or for a job that ended there is none; its results are all kept.
-        const StatusCode code = status.code();
-        if (code == StatusCode::kResourceExhausted || code == StatusCode::kNotFound || file->job.ended()) status = {};
-        return status;
+        // Its results are all kept, and another checkpoint will be tried.
+        if (!status.ok() && !file->job.ended()) end.note().warn(file->job.id() + ": no checkpoint: " + status.message());
+        return Status();
     });
 }
 

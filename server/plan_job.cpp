@@ -20,7 +20,7 @@ Status keep_plan(Office& office, const JobPtr& file, const Job::RenderPlan& plan
     info.spec = plan.spec;
     info.algorithm = plan.spec.algorithm.name();
     info.tables = plan.tables;
-    return with_room(office, file, [&] { return office.archive.plan(info, office.options.identity); });
+    return with_room(office, file, [&] { return office.archive.plan(info); });
 }
 
 }  // namespace
@@ -55,6 +55,7 @@ Status plan_units(Office& office, const JobPtr& file, JobSpec spec, SceneFacts f
     book.release_crowd(file);
     book.unpin(file, guide);
     crash_point("server.units-planned");
+    if (job.state() == JobState::kRunning && job.spec().time_limit_seconds > 0 && job.seconds_left(office.now()) <= 0) job.close();
     finish_if_complete(office, book, file);  // an earlier coordinator may have had all results
     return {};
 }

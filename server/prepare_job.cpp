@@ -67,36 +67,38 @@ Status prepare_tables(Office& office, const JobPtr& file, JobSpec spec, SceneFac
     return {};
 }
 
-/// Goes on with a job that an earlier coordinator began to render. False if its results are of no use: then it begins anew.
-Result<bool> resume_rendering(Office& office, const JobPtr& file, const ArchivedJob& archived, const SceneFacts& facts) {
-    const JobInfo& planned = *archived.planned;
-    std::string why;
-    if (archived.planned_by != name_of(office.options.identity)) {
-        why = "another build rendered it";
-    } else if (planned.spec.frame != facts.frame) {
-        why = "its frame is another one now";
-    } else if (planned.tables.asset.size_bytes == 0) {
+/// What an earlier coordinator left of the job is of no use: it begins anew.
+Status begin_anew(Office& office, const JobPtr& file, const std::string& why) {
+    {
+        OpenBook book(office);
+        book.note().warn(file->job.id() + ": what was done for it before the restart is of no use, because " + why);
+        file->archived.reset();
+        book.unpin(file, file->job.preparation().tables_file);
+    }
+    return with_room(office, file, [&] { return office.archive.begin_anew(file->job.id(), office.options.identity); });
+}
+
+/// Goes on with a job that an earlier coordinator began to render. False if it cannot: then it begins anew.
+Result<bool> resume_rendering(Office& office, const JobPtr& file, const JobInfo& planned, const SceneFacts& facts) {
+    if (planned.spec.frame != facts.frame) {
+        LL_RETURN_IF_ERROR(begin_anew(office, file, "its frame is another one now"));
+        return false;
+    }
+    if (planned.tables.asset.size_bytes == 0) {
         LL_RETURN_IF_ERROR(plan_units(office, file, planned.spec, facts, planned.tables));
         return true;
-    } else {
-        auto bytes = office.assets.read(planned.tables.asset.digest);
-        if (!bytes.ok()) {
-            auto entry = office.table_cache.find(planned.tables.cache_key, planned.spec.algorithm.learning()->parts);
-            if (entry && entry->info.asset.digest == planned.tables.asset.digest) bytes = std::move(entry->bytes);
-        }
-        if (bytes.ok()) {
-            LL_RETURN_IF_ERROR(adopt_tables(office, file, planned.spec, facts, *bytes, planned.tables));
-            return true;
-        }
-        why = "its tables are gone: " + bytes.status().message();
     }
-    OpenBook book(office);
-    book.note().warn(file->job.id() + ": what was rendered before the restart is of no use, because " + why);
-    file->archived.reset();
-    book.unpin(file, file->job.preparation().tables_file);
-    book.close();
-    office.archive.drop_all_soon(file->job.id());
-    return false;
+    auto bytes = office.assets.read(planned.tables.asset.digest);
+    if (!bytes.ok()) {
+        auto entry = office.table_cache.find(planned.tables.cache_key, planned.spec.algorithm.learning()->parts);
+        if (entry && entry->info.asset.digest == planned.tables.asset.digest) bytes = std::move(entry->bytes);
+    }
+    if (!bytes.ok()) {
+        LL_RETURN_IF_ERROR(begin_anew(office, file, "its tables are gone: " + bytes.status().message()));
+        return false;
+    }
+    LL_RETURN_IF_ERROR(adopt_tables(office, file, planned.spec, facts, *bytes, planned.tables));
+    return true;
 }
 
 Status prepare(Office& office, const JobPtr& file) {
@@ -107,6 +109,10 @@ Status prepare(Office& office, const JobPtr& file) {
         spec = file->job.spec();
         archived = file->archived;
     }
+    if (archived && archived->build != name_of(office.options.identity)) {
+        LL_RETURN_IF_ERROR(begin_anew(office, file, "another build did it"));
+        archived.reset();
+    }
     auto facts = office.options.read_scene(office.assets, spec, file->stop.get_token());
     if (!facts.ok()) return facts.status();
     crash_point("server.scene-read");
@@ -114,7 +120,7 @@ Status prepare(Office& office, const JobPtr& file) {
     if (crop.empty() || crop.area() > kMaxPartialPixels)
         return invalid_argument("the crop window must hold between 1 and " + std::to_string(kMaxPartialPixels) + " pixels");
     if (archived && archived->planned) {
-        const auto resumed = resume_rendering(office, file, *archived, *facts);
+        const auto resumed = resume_rendering(office, file, *archived->planned, *facts);
         if (!resumed.ok()) return resumed.status();
         if (*resumed) return {};
     }

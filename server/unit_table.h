@@ -76,8 +76,8 @@ class UnitTable {
     /// a result is not of this table.
     Status restore(uint32_t merged_groups, std::span<const Known> known);
 
-    /// In a table that was restored, opens the unit's group, as far as the window allows: who held a lease when the coordinator ended
-    /// may deliver after all.
+    /// In a table that was restored, opens the unit's group, as far as the window allows: who held a lease when the coordinator
+    /// ended may deliver after all.
     void open_for(const UnitKey& key);
     /// The unit of an opened group.
     std::optional<WorkUnit> find(const UnitKey& key) const;

@@ -27,7 +27,7 @@ class Backoff {
     std::minstd_rand engine_{std::random_device{}()};
 };
 
-constexpr double kLeaseWaitSeconds = 1;
+constexpr double kLeaseWaitSeconds = 5;
 /// Between looks at whether a worker that waits for a connection is to stop.
 constexpr double kConnectSeconds = 0.2;
 constexpr int kSubmitAttempts = 40;
@@ -147,11 +147,20 @@ Status Worker::run(std::stop_token stop) {
     return refusal_;
 }
 
+Result<std::vector<UnitLease>> Worker::ask(const std::string& worker_id, std::stop_token stop) {
+    const std::lock_guard one_asks(ask_mutex_);
+    if (stop.stop_requested()) return std::vector<UnitLease>();
+    asking_ = true;
+    auto leases = port_.lease_units(worker_id, kLeaseWaitSeconds, std::move(stop));
+    asking_ = false;
+    return leases;
+}
+
 void Worker::lane(std::stop_token stop) {
     Backoff backoff;
     while (!stop.stop_requested()) {
         const std::string worker_id = id();
-        const auto leases = port_.lease_units(worker_id, kLeaseWaitSeconds, stop);
+        const auto leases = ask(worker_id, stop);
         if (leases.ok()) {
             // A worker that cannot render (its disk is full, say) must not use up the units of the whole farm.
             for (const UnitLease& lease : *leases) {
@@ -316,6 +325,11 @@ void Worker::send_heartbeat() {
     }
 }
 
+bool Worker::idles() {
+    const std::lock_guard lock(mutex_);
+    return running_.empty() && asking_;
+}
+
 void Worker::heartbeats(std::stop_token stop) {
     while (!stop.stop_requested()) {
         double interval = 1;
@@ -323,7 +337,7 @@ void Worker::heartbeats(std::stop_token stop) {
             const std::lock_guard lock(mutex_);
             interval = grant_.heartbeat_seconds;
         }
-        send_heartbeat();
+        if (!idles()) send_heartbeat();
         wait(interval, stop);
     }
 }

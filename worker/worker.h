@@ -2,6 +2,7 @@
 // Worker: leases units from a coordinator, renders them one at a time on all of its threads, and submits the partials.
 // gRPC is hidden behind the port; sources of renderers and tracers hide how scenes and tables are fetched and kept.
 
+#include <atomic>
 #include <condition_variable>
 #include <functional>
 #include <map>
@@ -51,6 +52,10 @@ class Worker {
     Status sign_in(std::stop_token stop, const std::string& stale_id);
     std::string id();
     void lane(std::stop_token stop);
+    /// Asks for a unit, one lane at a time: the other one would only wait beside it.
+    Result<std::vector<UnitLease>> ask(const std::string& worker_id, std::stop_token stop);
+    /// Whether the worker has nothing and asks for a unit, which is a sign of life in itself.
+    bool idles();
     /// False when the unit could not be rendered here.
     bool run_unit(const UnitLease& lease, std::stop_token stop);
     /// Makes the unit and submits it; an error gives it back.
@@ -77,8 +82,10 @@ class Worker {
     tbb::task_arena arena_;
     std::mutex render_mutex_;  ///< One unit renders at a time, on all threads.
     std::mutex sign_in_mutex_;
-    std::mutex beat_mutex_;  ///< Heartbeats and units given back reach the coordinator in order. Before mutex_.
-    std::mutex mutex_;       ///< Guards what follows.
+    std::mutex ask_mutex_;             ///< Held while a lane asks for a unit.
+    std::atomic<bool> asking_{false};  ///< Whether one does.
+    std::mutex beat_mutex_;            ///< Heartbeats and units given back reach the coordinator in order. Before mutex_.
+    std::mutex mutex_;                 ///< Guards what follows.
     std::condition_variable_any wake_;
     WorkerGrant grant_;
     std::map<UnitReference, Running> running_;

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "common/core/atomic_file.h"
-#include "tests/service/fake.h"
+#include "tests/service/table_service.h"
 
 namespace lightloom {
 namespace {
@@ -210,6 +210,34 @@ TEST(Durable, ACheckpointTakesThePlaceOfResults) {
         return service.wait_end(id).image_digest;
     };
     EXPECT_EQ(render(true), render(false));
+}
+
+/// Of three training units two came before the restart: one is traced, and the tables are those of a single machine.
+TEST(Durable, TrainingDataCountAsResults) {
+    testing::TableService service;
+    service.durable = true;
+    service.restart();
+    const std::string id = service.submit_training(service.table_spec());
+    const auto held = testing::lease_all(service);
+    ASSERT_EQ(held.size(), 3u);
+    for (size_t i = 0; i < 2; ++i)
+        EXPECT_EQ(service.give(held[i].first, held[i].second, testing::traced(held[i].second)).outcome, SubmitOutcome::kAccepted);
+    service.restart();
+    service.wait(id, [](const JobInfo& job) { return job.phase == PreparePhase::kTracing && job.phase_done > 0; });
+    for (int i = 0; i < 1000 && service.coordinator->get_job(id)->phase_done < 2 * testing::kSamples / 3; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    const auto rest = testing::lease_all(service);
+    ASSERT_EQ(rest.size(), 1u) << "what was acknowledged is not asked for again";
+    EXPECT_EQ(rest[0].second.unit.key, held[2].second.unit.key);
+    service.give(rest[0].first, rest[0].second, testing::traced(rest[0].second));
+    const JobInfo info = service.wait_running(id);
+    EXPECT_EQ(info.state, JobState::kRunning) << info.message;
+    EXPECT_EQ(info.tables.asset.digest, testing::tables_alone(info.spec));
+    service.restart();
+    EXPECT_EQ(service.wait_running(id).tables.asset.digest, info.tables.asset.digest);
+    EXPECT_TRUE(service.coordinator->assets().read(info.tables.asset.digest).ok()) << "tables of a job that goes on stay";
+    ASSERT_TRUE(service.coordinator->cancel_job(id).ok());
+    EXPECT_FALSE(service.coordinator->assets().contains(info.tables.asset.digest));
 }
 
 }  // namespace

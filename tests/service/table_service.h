@@ -36,11 +36,9 @@ inline SceneFacts golden_facts() {
 struct TableService : FakeService {
     explicit TableService(const std::function<void(CoordinatorOptions&)>& change = {},
                           std::optional<uint64_t> shuffle = std::nullopt)
-        : FakeService(kFrame, shuffle, [&](CoordinatorOptions& options) {
-              options.read_scene = [](const AssetStore&, const JobSpec&, std::stop_token) {
-                  return Result<SceneFacts>(golden_facts());
-              };
-              if (change) change(options);
+        : FakeService(kFrame, shuffle, [change](CoordinatorOptions& o) {
+              o.read_scene = [](const AssetStore&, const JobSpec&, std::stop_token) { return Result<SceneFacts>(golden_facts()); };
+              if (change) change(o);
           }) {}
     JobSpec table_spec(uint32_t spp = 2) const {
         JobSpec s = spec(spp);
