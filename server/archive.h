@@ -33,6 +33,8 @@ struct ArchivedJob {
     std::string planned_by;
     std::optional<JobSpec> settled;                      ///< The spec with the size of training set that a time limit had room for.
     double learning_seconds = 0, rendering_seconds = 0;  ///< Time that was taken of the time limit.
+    std::optional<uint32_t> finish_with;                 ///< Groups with which it was told to end.
+    bool cancelled = false;                              ///< It was cancelled, and its complete groups are to be written yet.
     std::vector<StoredResult> results;
     std::optional<StoredCheckpoint> checkpoint;
 };
@@ -49,6 +51,10 @@ class Archive {
     /// `info` has the complete spec and the tables. `by` names the build.
     Status plan(const JobInfo& info, const BuildIdentity& by);
     Status settle(const std::string& job_id, const JobSpec& spec);
+    /// The job is to end with its first `groups` groups.
+    Status finish(const std::string& job_id, uint32_t groups);
+    /// The job is cancelled, and its complete groups are kept: until end() its results stay on disk.
+    Status cancel_and_keep(const std::string& job_id);
     /// kAlreadyExists if the unit has a result with other bytes.
     Status keep_partial(const std::string& job_id, const UnitKey& unit, const WorkerRecord& worker, double seconds,
                         const PartialDescriptor& descriptor, std::string_view payload);

@@ -6,6 +6,7 @@
 
 #include "common/core/crash_point.h"
 #include "server/finish_job.h"
+#include "server/keep_groups.h"
 #include "server/resume.h"
 
 namespace lightloom {
@@ -64,6 +65,10 @@ Status plan_units(Office& office, const JobPtr& file, JobSpec spec, SceneFacts f
     book.release_crowd(file);
     book.unpin(file, guide);
     crash_point("server.units-planned");
+    if (archived && archived->cancelled) {  // and was killed before its groups were written
+        book.apply(file, job.end(JobState::kCancelled, kGroupsAreKept, office.now(), OnCancel::kKeep));
+        return {};
+    }
     finish_if_complete(office, book, file);  // an earlier coordinator may have had all results
     return {};
 }

@@ -109,6 +109,9 @@ Status prepare(Office& office, const JobPtr& file) {
         const auto resumed = resume_rendering(office, file, *archived, *facts);
         if (!resumed.ok()) return resumed.status();
         if (*resumed) return {};
+        OpenBook book(office);
+        if (archived->cancelled) book.apply(file, file->job.end(JobState::kCancelled, {}, office.now()));
+        if (file->job.ended()) return {};
     }
     spec.frame = facts->frame;
     if (spec.max_depth < 0) spec.max_depth = facts->max_depth;
