@@ -70,9 +70,4 @@ void Coordinator::look_for_room(OpenBook& book) {
     book.set_paused(room.message());
 }
 
-Status Coordinator::paused() const {
-    const OpenBook book(office_);
-    return book->paused.empty() ? Status() : Status(StatusCode::kResourceExhausted, book->paused);
-}
-
 }  // namespace lightloom

@@ -50,8 +50,6 @@ class Coordinator {
     Result<std::string> manifest(const std::string& job_id, ManifestKind kind = ManifestKind::kFinal) const {
         return gallery_.manifest(job_id, kind);
     }
-    /// Why no job gets units at the moment, if that is so: the disk is full.
-    Status paused() const;
 
     // Workers; see dispatch.h.
     Result<WorkerGrant> register_worker(const WorkerHello& hello) { return dispatch_.register_worker(hello); }
@@ -93,7 +91,7 @@ class Coordinator {
     /// Stops giving out units where the disk is full, and goes on where it is not any more.
     void look_for_room(OpenBook& book);
 
-    mutable Office office_;
+    Office office_;
     Status restored_;
     Admission admission_;
     EndEarly end_early_;

@@ -31,19 +31,18 @@ Pulse::Pulse(Heartbeat& heart, std::function<void()> ask)
           }
       }) {}
 
-HealthChecks make_health_checks(const Heartbeat& heart, std::filesystem::path directory, const HealthLimits& limits,
-                                std::function<Status()> more) {
+HealthChecks make_health_checks(const Heartbeat& heart, std::filesystem::path directory, const HealthLimits& limits) {
     const auto live = [&heart, limits]() -> Status {
         const double silent = heart.silent_seconds();
         if (silent <= limits.silent_seconds) return {};
         return internal_error("the coordinator has stood still for " + seconds_text(silent) + "; restart it");
     };
-    const auto ready = [live, directory = std::move(directory), limits, more = std::move(more)]() -> Status {
+    const auto ready = [live, directory = std::move(directory), limits]() -> Status {
         LL_RETURN_IF_ERROR(live());
         std::error_code error;
         const auto space = std::filesystem::space(directory, error);
         if (error) return internal_error(directory.string() + ": " + error.message());
-        if (space.available >= limits.free_bytes) return more ? more() : Status();
+        if (space.available >= limits.free_bytes) return {};
         return {StatusCode::kResourceExhausted, directory.string() + ": only " + std::to_string(space.available >> 20) +
                                                     " MiB of the disk are free, and " + std::to_string(limits.free_bytes >> 20) +
                                                     " are needed; make room"};

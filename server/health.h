@@ -51,10 +51,8 @@ struct HealthLimits {
     uint64_t free_bytes = uint64_t(128) << 20;  ///< Least room of the data directory.
 };
 
-/// Checks of a heart and of the disk of `directory`, and where there is a function `more` also what it says of being ready. `heart`
-/// outlives them.
-HealthChecks make_health_checks(const Heartbeat& heart, std::filesystem::path directory, const HealthLimits& limits = {},
-                                std::function<Status()> more = {});
+/// Checks of a heart and of the disk of `directory`. `heart` outlives them.
+HealthChecks make_health_checks(const Heartbeat& heart, std::filesystem::path directory, const HealthLimits& limits = {});
 
 /// Calls `set(healthy)` at once, and then with every change of `check`, for which it looks once a second; until `stop`.
 void follow_health(const std::function<Status()>& check, const std::function<void(bool healthy)>& set, std::stop_token stop);

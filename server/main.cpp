@@ -159,13 +159,9 @@ int main(int argc, char** argv) {
     Coordinator coordinator(std::move(options), *std::move(store));
     if (!coordinator.restored().ok()) return report_failure(coordinator.restored(), data + ": ");
     Heartbeat heart;
-    // Whether jobs are paused is known under the lock under which everything happens: while that answers, the coordinator turns.
-    Guarded<Status> paused;
-    const Pulse pulse(heart, [&coordinator, &paused] {
-        const Status why = coordinator.paused();
-        *Guarded<Status>::Access(paused) = why;
-    });
-    const HealthChecks health = make_health_checks(heart, data, {}, [&paused] { return *Guarded<Status>::Access(paused); });
+    // Looking for a job takes the lock under which everything happens: while that answers, the coordinator turns.
+    const Pulse pulse(heart, [&coordinator] { (void)coordinator.get_job({}); });
+    const HealthChecks health = make_health_checks(heart, data);
     auto server = GrpcServer::start(coordinator, listen, {.reflection = reflection, .ready = health.ready});
     if (!server.ok()) return report_failure(server.status());
     std::unique_ptr<StatusHttp> http;

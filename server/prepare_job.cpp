@@ -98,6 +98,7 @@ Status prepare(Office& office, const JobPtr& file) {
         spec = file->job.spec();
         archived = file->archived;
     }
+    const bool cancelled = archived && archived->cancelled;
     auto facts = office.options.read_scene(office.assets, spec, file->stop.get_token());
     if (!facts.ok()) return facts.status();
     crash_point("server.scene-read");
@@ -109,9 +110,11 @@ Status prepare(Office& office, const JobPtr& file) {
         const auto resumed = resume_rendering(office, file, *archived, *facts);
         if (!resumed.ok()) return resumed.status();
         if (*resumed) return {};
+    }
+    if (cancelled) {  // and nothing that could be kept is left
         OpenBook book(office);
-        if (archived->cancelled) book.apply(file, file->job.end(JobState::kCancelled, {}, office.now()));
-        if (file->job.ended()) return {};
+        book.apply(file, file->job.end(JobState::kCancelled, {}, office.now()));
+        return {};
     }
     spec.frame = facts->frame;
     if (spec.max_depth < 0) spec.max_depth = facts->max_depth;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "common/core/atomic_file.h"
@@ -226,6 +227,20 @@ TEST(Partial, GroupsThatCannotBeWrittenAreReportedAndTheJobEnds) {
     EXPECT_EQ(service.coordinator->get_job(id)->image_size_bytes, 0u);
     service.restart();
     EXPECT_EQ(service.coordinator->get_job(id)->state, JobState::kCancelled);
+}
+
+TEST(Pause, AFullDiskIsTheMessageOfEveryJobThatWaitsForIt) {
+    FakeService service({40, 30, {0, 0, 40, 30}}, std::nullopt,
+                        [](CoordinatorOptions& options) { options.disk_reserve_bytes = std::numeric_limits<uint64_t>::max(); });
+    service.durable = true;
+    service.restart();
+    const auto job = service.coordinator->submit_job("request", service.spec(4));
+    ASSERT_TRUE(job.ok());
+    const JobInfo info = service.wait(job->job_id, [](const JobInfo& j) { return j.message.starts_with("paused: "); });
+    EXPECT_NE(info.message.find(service.directory.path.string() + " has "), std::string::npos) << info.message;
+    EXPECT_FALSE(is_terminal(info.state));
+    EXPECT_GT(info.revision, job->revision) << "who watches the job sees it";
+    EXPECT_TRUE(service.lease(service.add_worker()).empty());
 }
 
 TEST(Partial, SamplesOfAPartialAreInItsHeader) {

@@ -86,27 +86,6 @@ TEST(Health, ADiskWithoutRoomIsNotReady) {
     EXPECT_EQ(make_health_checks(heart, directory.path / "gone").ready().code(), StatusCode::kInternal);
 }
 
-TEST(Health, ADiskThatIsFullPausesJobsWhichIsToldOfEachAndOfTheCoordinator) {
-    FakeService service({40, 30, {0, 0, 40, 30}}, std::nullopt,
-                        [](CoordinatorOptions& options) { options.disk_reserve_bytes = std::numeric_limits<uint64_t>::max(); });
-    const std::string id = service.submit(service.spec(4));
-    EXPECT_TRUE(service.coordinator->paused().ok()) << "a coordinator that keeps nothing needs no room";
-    service.durable = true;
-    service.restart();
-    const auto job = service.coordinator->submit_job("request", service.spec(4));
-    ASSERT_TRUE(job.ok());
-    const JobInfo info = service.wait(job->job_id, [](const JobInfo& j) { return j.message.starts_with("paused: "); });
-    EXPECT_NE(info.message.find("MiB"), std::string::npos) << info.message;
-    EXPECT_FALSE(is_terminal(info.state));
-    EXPECT_TRUE(service.lease(service.add_worker()).empty());
-    const Heartbeat heart;
-    const HealthChecks checks =
-        make_health_checks(heart, service.directory.path, {}, [&] { return service.coordinator->paused(); });
-    EXPECT_TRUE(checks.live().ok());
-    EXPECT_EQ(checks.ready().code(), StatusCode::kResourceExhausted);
-    EXPECT_EQ("paused: " + checks.ready().message(), info.message);
-}
-
 TEST(Health, IsToldOverHttp) {
     FakeService service;
     std::atomic<bool> live{true}, ready{true};
