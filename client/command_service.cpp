@@ -1,4 +1,4 @@
-// The commands that talk to a service: submit, watch, fetch and cancel; list, workers and preview have files of their own.
+// The commands that talk to a service: submit and watch; the others have files of their own.
 
 #include <chrono>
 #include <cstdio>
@@ -27,7 +27,14 @@ constexpr const char* kSubmitFooter = R"(Examples:
   lightloom fetch JOB --server render1:50051 -o out.exr               later
 
 The job's id is printed to standard error at once, unless --quiet: `watch`, `preview` and `cancel` take it from elsewhere.
-Files that the service has already are not sent again. Ctrl-C cancels the job.)";
+Files that the service has already are not sent again. Ctrl-C cancels the job, unless it is one that somebody else has submitted.
+A job that was rendered before, or is under way, is not rendered twice: its image is the answer. Those with --time are.)";
+
+/// What answers the submission, if that is an earlier job.
+void tell_of_reuse(const JobInfo& job) {
+    std::fprintf(stderr, "lightloom: the same job %s: %s; --again renders anew\n",
+                 job.state == JobState::kSucceeded ? "was rendered before" : "is under way", job.job_id.c_str());
+}
 
 int submit_job(const ServiceOptions& options) {
     GrpcJobPort port = connect(options);
@@ -40,17 +47,25 @@ int submit_job(const ServiceOptions& options) {
     ClientTimes times{.import_seconds = local->scene.import_seconds, .digest_seconds = local->scene.digest_seconds};
     const JobLabel label = make_label(options.name, options.job.scene);
     for (int attempt = 1;; ++attempt) {
-        const auto job = submit_scene(port, local->scene, local->spec, label, times);
+        const Reuse reuse = options.again ? Reuse::kAnew : Reuse::kAllowed;
+        const auto job = submit_scene(port, local->scene, local->spec, label, times, reuse);
         if (!job.ok()) return service_error(options, job.status());
+        if (job->reused && !options.job.quiet) tell_of_reuse(*job);
         if (options.detach) {
             std::printf("%s\n", job->job_id.c_str());
             return kSuccess;
         }
         if (!options.job.quiet) std::fprintf(stderr, "lightloom: %s\n", job->job_id.c_str());
         const auto begin = std::chrono::steady_clock::now();
-        const auto ended = watch(port, job->job_id, options.job.quiet, true);
+        const auto ended = watch(port, job->job_id, options.job.quiet, !job->reused);
         times.wait_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
         if (ended.ok()) return fetch(port, *ended, options.job, times, AfterFetch::kImageStays);
+        if (job->reused && ended.status().code() == StatusCode::kCancelled && !interrupt_token().stop_requested() &&
+            attempt < kJobAttempts) {
+            std::fprintf(stderr, "lightloom: %s by somebody else; it is submitted again\n",
+                         one_line(ended.status().message()).c_str());
+            continue;
+        }
         // A job that failed because the service lost files of the scene is worth another attempt, with these files.
         const bool failed = ended.status().code() == StatusCode::kAborted;
         if (!failed || attempt == kJobAttempts || !lacks_files(port, local->scene)) return job_error(options, ended.status());
@@ -70,34 +85,17 @@ int watch_job(const ServiceOptions& options) {
     return ended.ok() ? kSuccess : job_error(options, ended.status());
 }
 
-int fetch_job(const ServiceOptions& options) {
-    GrpcJobPort port = connect(options);
-    const auto job = port.get_job(options.job_id);
-    if (!job.ok()) return job_error(options, job.status());
-    JobOptions output = options.job;
-    if (output.output.empty()) output.output = options.job_id + ".exr";
-    if (job->state != JobState::kSucceeded) {
-        const std::string what = "job " + options.job_id + " is " + std::string(to_string(job->state)) +
-                                 (job->message.empty() ? "" : ": " + job->message);
-        if (job->state == JobState::kCancelled) return report_error({StatusCode::kCancelled, what});
-        const bool over = is_terminal(job->state);
-        return report_error(failed_precondition(over ? what : what + "; `lightloom watch " + options.job_id + "` waits for it"));
-    }
-    if (Status s = check_outputs(output, beside_image(output, AfterFetch::kImageStays), nullptr); !s.ok()) return report_error(s);
-    return fetch(port, *job, output, {}, AfterFetch::kImageStays);
-}
-
-int cancel_job(const ServiceOptions& options) {
-    GrpcJobPort port = connect(options);
-    const auto job = port.cancel_job(options.job_id);
-    if (!job.ok()) return job_error(options, job.status());
-    std::printf("%s is %s\n", job->job_id.c_str(), std::string(to_string(job->state)).c_str());
-    return kSuccess;
-}
-
 constexpr const char* kWatchFooter =
     R"(--json prints the present state first and the final one last, ten a second at most. Null stands for what is not known (yet).
 Exit codes: 0 the job succeeded, 1 it failed or the service does not know it, 130 it was cancelled.)";
+
+constexpr const char* kFetchFooter =
+    R"(--partial writes an EXR of whole groups of iterations without first-hit layers; its header says how many samples a pixel has. A
+job that has ended has a manifest, too. A failed job keeps its groups, a cancelled one with `cancel --keep`.)";
+
+constexpr const char* kFinishFooter =
+    R"(The job ends with the group of iterations that is completed next, at least one, and succeeds: `fetch` writes its image, and the
+manifest says how many samples it has. A job that still prepares has nothing to finish with, and one that has ended stays as it is.)";
 
 constexpr const char* kListFooter =
     "OWNER is USER@HOST as the submitter claimed, which nobody has checked. AGE counts from the submission.";
@@ -134,6 +132,7 @@ void add_service_commands(cli::App app, int* exit_code) {
             });
         const auto detach = command->add_flag("--detach", options->detach,
                                               "Print the job's id and return at once; `fetch --strict` tells of dropped samples");
+        command->add_flag("--again", options->again, "Render it even if the same job was rendered before");
         for (const char* later : {"--output", "--half", "--png", "--json"})  // `fetch` has its own
             detach->excludes(command->get_option(later));
     }
@@ -145,17 +144,28 @@ void add_service_commands(cli::App app, int* exit_code) {
         command->add_flag("--json", options->json, "One JSON object per change and line instead, as of /api/v1/status");
     }
     {
-        const auto [command, options] = add("fetch", "Write the image and manifest of a finished job", fetch_job);
+        const auto [command, options] =
+            add("fetch", "Write the image and manifest of a finished job, or what there is of another", fetch_job);
         add_job_argument(*command, *options);
-        command->add_option("-o,--output", options->job.output, "EXR to write (default: JOB.exr)");
+        command->footer(kFetchFooter);
+        command->add_option("-o,--output", options->job.output, "EXR to write (default: JOB.exr, or JOB-partial.exr)");
         add_image_settings(*command, options->job);
         command->add_option("--json", options->job.json, "Write statistics to this file");
         command->add_flag("-q,--quiet", options->job.quiet, "Errors only");
         command->add_flag("--strict", options->job.strict, "Exit with 3 if samples were dropped");
+        const auto partial = command->add_flag("--partial", options->partial,
+                                               "What there is of a job that runs, failed or was cancelled: its complete groups");
+        for (const char* whole : {"--half", "--json", "--strict"}) partial->excludes(command->get_option(whole));
     }
     {
         const auto [command, options] = add("cancel", "Cancel a job", cancel_job);
         add_job_argument(*command, *options);
+        command->add_flag("--keep", options->keep, "Keep its complete groups for `fetch --partial` instead of throwing them away");
+    }
+    {
+        const auto [command, options] = add("finish", "End a job well, with the samples that it has", finish_job);
+        add_job_argument(*command, *options);
+        command->footer(kFinishFooter);
     }
     {
         const auto [command, options] = add("list", "List the jobs of a service", list_jobs);

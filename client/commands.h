@@ -17,7 +17,7 @@ enum ExitCode : int {
 };
 
 void add_render_command(cli::App app, int* exit_code);    // render, embedded
-void add_service_commands(cli::App app, int* exit_code);  // submit, watch, fetch, cancel, list, workers, preview
+void add_service_commands(cli::App app, int* exit_code);  // submit, watch, fetch, cancel, finish, list, workers, preview
 void add_inspect_command(cli::App app, int* exit_code);
 void add_compare_command(cli::App app, int* exit_code);
 void add_algorithms_command(cli::App app, int* exit_code);

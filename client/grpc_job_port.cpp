@@ -152,11 +152,12 @@ std::invoke_result_t<Call> GrpcJobPort::insist(const Call& make) {
     }
 }
 
-Result<JobInfo> GrpcJobPort::submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label) {
+Result<JobInfo> GrpcJobPort::submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label, Reuse reuse) {
     v1::SubmitJobRequest request;
     request.set_request_id(request_id);
     wire::put(spec, request.mutable_spec());
     wire::put(label, request.mutable_label());
+    request.set_reuse(reuse == Reuse::kAllowed);
     return job_info(insist([&] { return call(*jobs_, &v1::JobService::Stub::SubmitJob, request, 30); }));
 }
 
@@ -180,10 +181,17 @@ Result<std::vector<WorkerStatus>> GrpcJobPort::list_workers(double gone_within_s
     return get_all<WorkerStatus>(response->workers());
 }
 
-Result<JobInfo> GrpcJobPort::cancel_job(const std::string& job_id) {
+Result<JobInfo> GrpcJobPort::cancel_job(const std::string& job_id, OnCancel what) {
     v1::CancelJobRequest request;
     request.set_job_id(job_id);
+    request.set_keep(what == OnCancel::kKeep);
     return job_info(insist([&] { return call(*jobs_, &v1::JobService::Stub::CancelJob, request, 10); }));
+}
+
+Result<JobInfo> GrpcJobPort::finish_job(const std::string& job_id) {
+    v1::FinishJobRequest request;
+    request.set_job_id(job_id);
+    return job_info(insist([&] { return call(*jobs_, &v1::JobService::Stub::FinishJob, request, 10); }));
 }
 
 Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
@@ -228,7 +236,8 @@ Status GrpcJobPort::watch_job(const std::string& job_id, const std::function<voi
 Result<std::string> GrpcJobPort::image(const std::string& job_id, ImageKind kind) {
     v1::GetImageRequest request;
     request.set_job_id(job_id);
-    request.set_kind(kind == ImageKind::kFinal ? v1::IMAGE_KIND_FINAL : v1::IMAGE_KIND_PREVIEW);
+    request.set_kind(kind == ImageKind::kPreview ? v1::IMAGE_KIND_PREVIEW : v1::IMAGE_KIND_FINAL);
+    request.set_partial(kind == ImageKind::kPartial);
     return insist([&] { return collect(*jobs_, &v1::JobService::Stub::GetImage, request, options_); });
 }
 
@@ -250,9 +259,10 @@ Result<Preview> GrpcJobPort::preview(const std::string& job_id, PreviewFormat fo
     return preview;
 }
 
-Result<std::string> GrpcJobPort::manifest(const std::string& job_id) {
+Result<std::string> GrpcJobPort::manifest(const std::string& job_id, ManifestKind kind) {
     v1::GetManifestRequest request;
     request.set_job_id(job_id);
+    request.set_partial(kind == ManifestKind::kPartial);
     return insist([&] { return collect(*jobs_, &v1::JobService::Stub::GetManifest, request, options_); });
 }
 

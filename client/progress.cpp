@@ -5,6 +5,8 @@
 
 #include <cstdio>
 
+#include "common/core/utf8.h"
+
 namespace lightloom::client {
 namespace {
 
@@ -151,6 +153,7 @@ void Progress::show(const JobInfo& job) {
     const bool preparing = job.state == JobState::kPreparing, running = job.state == JobState::kRunning;
     const bool waiting = running && job.render_seconds == 0;
     line_ = preparing ? phase_line(job) : waiting ? "waiting for a worker" : line_of(job, percent);
+    if (!job.message.empty() && !is_terminal(job.state)) line_ = one_line(job.message);  // why it stands still
     if (new_state && running && job.tables.asset.size_bytes > 0)
         std::fprintf(stderr, "%s%s\n", terminal_ ? "\r\033[K" : "", tables_line(job.tables).c_str());
     if (terminal_) {

@@ -200,11 +200,11 @@ Status upload_scene(JobPort& port, const LocalScene& scene) {
     return {};
 }
 
-Result<JobInfo> submit(JobPort& port, const JobSpec& spec, const JobLabel& label) {
+Result<JobInfo> submit(JobPort& port, const JobSpec& spec, const JobLabel& label, Reuse reuse) {
     // One id for all attempts: a submission whose answer was lost is not made twice.
     const std::string request_id = random_id();
     for (int attempt = 0;; ++attempt) {
-        auto job = port.submit_job(request_id, spec, label);
+        auto job = port.submit_job(request_id, spec, label, reuse);
         const StatusCode code = job.status().code();
         const bool lost = code == StatusCode::kUnavailable || code == StatusCode::kDeadlineExceeded;
         if (job.ok() || !lost || attempt == 3) return job;
@@ -217,13 +217,13 @@ bool lacks_files(JobPort& port, const LocalScene& scene) {
     return missing.ok() && !missing->empty();
 }
 
-Result<JobInfo> submit_scene(JobPort& port, const LocalScene& scene, const JobSpec& spec, const JobLabel& label,
-                             ClientTimes& times) {
+Result<JobInfo> submit_scene(JobPort& port, const LocalScene& scene, const JobSpec& spec, const JobLabel& label, ClientTimes& times,
+                             Reuse reuse) {
     for (int attempt = 1;; ++attempt) {
         const auto begin = Clock::now();
         LL_RETURN_IF_ERROR(upload_scene(port, scene));
         times.upload_seconds += seconds_since(begin);
-        auto job = submit(port, spec, label);
+        auto job = submit(port, spec, label, reuse);
         // A file may have turned out to be damaged in the service's store, or may have been collected meanwhile.
         const StatusCode code = job.status().code();
         const bool files = code == StatusCode::kDataLoss || code == StatusCode::kFailedPrecondition;

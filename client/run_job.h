@@ -29,10 +29,10 @@ Status upload_scene(JobPort& port, const LocalScene& scene);
 /// Whether the coordinator lacks any of them.
 bool lacks_files(JobPort& port, const LocalScene& scene);
 /// Sends what the coordinator lacks, and submits; again where it turns out to have lost files. Adds to `times`.
-Result<JobInfo> submit_scene(JobPort& port, const LocalScene& scene, const JobSpec& spec, const JobLabel& label,
-                             ClientTimes& times);
+Result<JobInfo> submit_scene(JobPort& port, const LocalScene& scene, const JobSpec& spec, const JobLabel& label, ClientTimes& times,
+                             Reuse reuse = Reuse::kAnew);
 /// Submits under a fresh request id.
-Result<JobInfo> submit(JobPort& port, const JobSpec& spec, const JobLabel& label = {});
+Result<JobInfo> submit(JobPort& port, const JobSpec& spec, const JobLabel& label = {}, Reuse reuse = Reuse::kAnew);
 /// Watches until the end, and calls `on_change` with every state that it sees, the last one included; on an interrupt, cancels the
 /// job if `cancel_on_interrupt` is set.
 Result<JobInfo> watch(JobPort& port, const std::string& job_id, bool quiet, bool cancel_on_interrupt,

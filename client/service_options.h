@@ -13,7 +13,7 @@ struct ServiceOptions {
     std::string server = "127.0.0.1:50051";
     JobOptions job;
     std::string job_id, name;
-    bool detach = false, json = false, all = false;
+    bool detach = false, json = false, all = false, again = false, partial = false, keep = false;
 };
 
 void add_server_option(cli::App command, ServiceOptions& options);
@@ -30,5 +30,8 @@ int job_error(const ServiceOptions& options, const Status& status);
 int list_jobs(const ServiceOptions& options);
 int list_workers(const ServiceOptions& options);
 int preview_job(const ServiceOptions& options);
+int fetch_job(const ServiceOptions& options);
+int cancel_job(const ServiceOptions& options);
+int finish_job(const ServiceOptions& options);
 
 }  // namespace lightloom::client

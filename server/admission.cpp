@@ -1,12 +1,13 @@
 #include "server/admission.h"
 
 #include <cmath>
-#include <new>
 #include <random>
+#include <system_error>
 
-#include "common/core/atomic_file.h"
 #include "common/core/crash_point.h"
 #include "common/path/path_view.h"
+#include "common/transport/parameters.h"
+#include "common/work/job_fields.h"
 #include "server/prepare_job.h"
 #include "server/results.h"
 
@@ -21,14 +22,6 @@ std::string new_id(const char* prefix) {
     std::snprintf(text, sizeof text, "%s-%012llx", prefix, static_cast<unsigned long long>(bits >> 16));
     return text;
 }
-
-Status no_job(const std::string& id) {
-    return not_found("no job has the id '" + id +
-                     "'; a name is only a label: `lightloom list` shows the ids of those that exist (the oldest that ended are "
-                     "forgotten)");
-}
-
-Status going_down() { return {StatusCode::kUnavailable, "the coordinator is going down"}; }
 
 }  // namespace
 
@@ -56,6 +49,14 @@ Result<JobSpec> canonical_spec(const JobSpec& spec) {
     return out;
 }
 
+std::optional<Digest> reuse_key(const JobSpec& spec) {
+    if (spec.time_limit_seconds > 0) return std::nullopt;
+    // Where the size of the training set is not chosen it depends on the number of samples, which a chosen one of that size does
+    // not.
+    const bool chosen_size = spec.algorithm.chosen(kTrainingPaths);
+    return sha256("lightloom-request 1\n" + fields_text<job_role::kRequest>(spec) + (chosen_size ? "training set chosen\n" : ""));
+}
+
 Result<std::string> Admission::check_assets(const JobSpec& spec) const {
     const AssetStore& assets = office_.assets;
     const Digest& root = spec.scene_root;
@@ -79,20 +80,51 @@ std::optional<Result<JobInfo>> Admission::repeated(JobBook& book, const std::str
     return Result<JobInfo>(Status(StatusCode::kAlreadyExists, "request " + request_id + " was used for another job; use a new id"));
 }
 
-Result<JobInfo> Admission::submit(const std::string& request_id, const JobSpec& spec, const JobLabel& label) {
+std::optional<JobInfo> Admission::same_job(const Digest& key) const {
+    JobPtr file;
+    JobInfo info;
+    {
+        OpenBook book(office_);
+        file = book->find_same(key);
+        if (!file) return std::nullopt;
+        info = book->info(*file, office_.now());
+        info.reused = true;
+        if (!file->job.ended()) {
+            book.note().info(info.job_id + ": is the answer to another submission of the same spec");
+            return info;
+        }
+    }
+    const std::filesystem::path& directory = file->job.submission().directory;
+    std::error_code error;
+    const uint64_t size = std::filesystem::file_size(directory / kImageFiles.image, error);
+    const bool sound = !error && size == info.image_size_bytes && std::filesystem::exists(directory / kImageFiles.manifest, error);
+    OpenBook book(office_);
+    if (!sound) {
+        book->withdraw(*file);
+        return std::nullopt;
+    }
+    book.note().info(info.job_id + ": its image is the answer to another submission of the same spec");
+    return info;
+}
+
+Result<JobInfo> Admission::submit(const std::string& request_id, const JobSpec& spec, const JobLabel& label, Reuse reuse) {
     if (request_id.empty() || request_id.size() > 128) return invalid_argument("a request id has 1 to 128 characters");
     LL_RETURN_IF_ERROR(check_label(label));
     const MutexLock one_at_a_time(submit_mutex_);
     {
         const OpenBook book(office_);
         if (auto answer = repeated(*book, request_id, spec)) return *answer;
-        if (book->closing) return going_down();
+        if (book->closing) return closing_status();
         if (book->open_jobs().size() >= office_.options.max_jobs)
             return Status(StatusCode::kResourceExhausted,
                           "the coordinator has no room for more jobs; submit again when some have ended");
     }
     auto canonical = canonical_spec(spec);
     if (!canonical.ok()) return canonical.status();
+    const auto key = reuse_key(spec);
+    if (reuse == Reuse::kAllowed && key) {
+        if (auto known = same_job(*key)) return *std::move(known);
+    }
     auto scene = check_assets(spec);
     if (!scene.ok()) return scene.status();
     const std::string id = new_id("job");
@@ -107,27 +139,11 @@ Result<JobInfo> Admission::submit(const std::string& request_id, const JobSpec& 
     crash_point("server.job-kept");
 
     OpenBook book(office_);
-    const JobPtr file = book->add(Job(std::move(submission), *std::move(canonical), office_.now()));
+    const JobPtr file = book->add(Job(std::move(submission), *std::move(canonical), office_.now()), key);
     book.note().info(id + ": accepted, " + std::string(spec.algorithm.name()) + " " + spec.scene_root.hex().substr(0, 12));
     crash_point("server.job-accepted");
     start_preparing(office_, book, file);
     return book->info(*file, office_.now());
-}
-
-Result<JobInfo> Admission::cancel(const std::string& job_id) {
-    OpenBook book(office_);
-    const JobPtr file = book->find(job_id);
-    if (!file) return no_job(job_id);
-    if (file->job.ended()) return book->info(*file, office_.now());
-    book.apply(file, file->job.end(JobState::kCancelled, {}, office_.now()));
-    const JobInfo info = book->info(*file, office_.now());
-    book.close();
-    // That it ended is told to the archive when the book is closed; it is said here once more, to know that it is on disk.
-    const Status kept = office_.archive.end(info);
-    if (!kept.ok())
-        return Status(StatusCode::kUnavailable, "job " + job_id + " is cancelled, but that could not be written down (" +
-                                                    kept.message() + "): after a restart it would go on; cancel it again");
-    return info;
 }
 
 Result<JobInfo> Admission::get(const std::string& job_id) const {
@@ -150,7 +166,7 @@ Result<JobInfo> Admission::wait(const std::string& job_id, uint64_t after, doubl
     if (!file) return no_job(job_id);
     while (!book->closing && file->job.revision() <= after && std::chrono::steady_clock::now() < end)
         book.wait_until(file->changed, end);
-    if (book->closing) return going_down();
+    if (book->closing) return closing_status();
     return book->info(*file, office_.now());
 }
 
@@ -161,58 +177,6 @@ Status Admission::wait_end(const std::string& job_id, double timeout_seconds) co
     if (!file) return no_job(job_id);
     while (!book->closing && !file->job.ended() && std::chrono::steady_clock::now() < end) book.wait_until(file->changed, end);
     return {};
-}
-
-Result<std::filesystem::path> Admission::finished_directory(const std::string& job_id, const char* what) const {
-    const OpenBook book(office_);
-    const JobPtr file = book->find(job_id);
-    if (!file) return no_job(job_id);
-    if (file->job.state() != JobState::kSucceeded)
-        return failed_precondition("job " + job_id + " is " + std::string(to_string(file->job.state())) + "; its " + what +
-                                   " exists once it has succeeded");
-    return file->job.submission().directory;
-}
-
-Result<std::string> Admission::image(const std::string& job_id, ImageKind kind) const {
-    if (kind == ImageKind::kPreview) {
-        auto made = preview(job_id, PreviewFormat::kPng, 0);
-        if (!made.ok()) return made.status();
-        return std::move(made->bytes);
-    }
-    const auto directory = finished_directory(job_id, "image");
-    return directory.ok() ? read_image(*directory) : directory.status();
-}
-
-Result<std::string> Admission::manifest(const std::string& job_id) const {
-    const auto directory = finished_directory(job_id, "manifest");
-    return directory.ok() ? read_file((*directory / "manifest.json").string()) : directory.status();
-}
-
-Result<Preview> Admission::preview(const std::string& job_id, PreviewFormat format, double exposure) const {
-    const MutexLock one_at_a_time(preview_mutex_);
-    std::shared_ptr<Reducer> reducer;
-    JobPtr file;
-    JobSpec spec;
-    {
-        const OpenBook book(office_);
-        file = book->find(job_id);
-        if (!file) return no_job(job_id);
-        const Job& job = file->job;
-        const std::string what = "job " + job_id + " is " + std::string(to_string(job.state()));
-        if (job.state() == JobState::kPreparing)
-            return failed_precondition(what + " (" + phase_text(book->info(*file, office_.now())) + "): there is no image yet");
-        if (!job.reducer() && job.state() != JobState::kSucceeded)
-            return failed_precondition(what + ": what was rendered of it is gone");
-        reducer = job.reducer();
-        spec = job.spec();
-    }
-    try {
-        auto made = make_preview(spec, file->job.submission().directory, reducer.get(), format, exposure);
-        if (made.ok()) return made;
-        return Status(made.status().code(), "job " + job_id + ": " + made.status().message());
-    } catch (const std::bad_alloc&) {  // it must not end the coordinator
-        return Status(StatusCode::kResourceExhausted, "the coordinator has too little memory for a preview of job " + job_id);
-    }
 }
 
 }  // namespace lightloom

@@ -1,6 +1,7 @@
 #include "server/archive.h"
 
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <utility>
 
@@ -11,10 +12,12 @@ namespace lightloom {
 namespace {
 
 // Kinds of events.
-constexpr const char* kBuild = "build";      ///< Text. What came before it is of no use.
-constexpr const char* kPlanned = "planned";  ///< v1::Job
-constexpr const char* kSettled = "settled";  ///< v1::JobSpec
-constexpr const char* kSpent = "spent";      ///< Two numbers as text: seconds of learning and of rendering.
+constexpr const char* kBuild = "build";               ///< Text. What came before it is of no use.
+constexpr const char* kPlanned = "planned";           ///< v1::Job
+constexpr const char* kSettled = "settled";           ///< v1::JobSpec
+constexpr const char* kSpent = "spent";               ///< Two numbers as text: seconds of learning and of rendering.
+constexpr const char* kFinish = "finish";             ///< A number of groups as text.
+constexpr const char* kCancelled = "cancelled-kept";  ///< Nothing.
 
 template <class Message, class Value>
 std::string to_bytes(const Value& value) {
@@ -69,6 +72,14 @@ Status Archive::plan(const JobInfo& info) {
 Status Archive::settle(const std::string& job_id, const JobSpec& spec) {
     if (!store_) return {};
     return store_->append_event(job_id, kSettled, to_bytes<v1::JobSpec>(spec)).get();
+}
+
+Status Archive::finish(const std::string& job_id, uint32_t groups) {
+    return store_ ? store_->append_event(job_id, kFinish, std::to_string(groups)).get() : Status();
+}
+
+Status Archive::cancel_and_keep(const std::string& job_id) {
+    return store_ ? store_->append_event(job_id, kCancelled, {}).get() : Status();
 }
 
 Status Archive::keep_partial(const std::string& job_id, const UnitKey& unit, const WorkerRecord& worker, double seconds,
@@ -140,6 +151,8 @@ Result<ArchivedJob> Archive::read(const StoredJob& stored, const std::filesystem
                       .created_at = job.created_at,
                       .directory = jobs_directory / job.id};
     out.age_seconds = seconds_since(job.created_at);
+    for (const StoredEvent& event : stored.events)
+        if (event.kind == kPlannedBy) out.planned_by = event.bytes;
     if (is_terminal(job.state)) {
         if (!stored.info) return data_loss("nothing says how it ended");
         auto last = from_bytes<v1::Job>(*stored.info);
@@ -152,6 +165,8 @@ Result<ArchivedJob> Archive::read(const StoredJob& stored, const std::filesystem
             out.build = event.bytes;
             out.planned.reset();
         }
+        if (event.kind == kFinish) out.finish_with = uint32_t(std::strtoul(event.bytes.c_str(), nullptr, 10));
+        if (event.kind == kCancelled) out.cancelled = true;
         if (event.kind == kSpent) (void)std::sscanf(event.bytes.c_str(), "%lg %lg", &out.learning_seconds, &out.rendering_seconds);
         if (event.kind == kPlanned) {
             auto planned = from_bytes<v1::Job>(event.bytes);

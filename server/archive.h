@@ -32,6 +32,8 @@ struct ArchivedJob {
     std::optional<JobInfo> planned;                      ///< Of a job that rendered: its complete spec and its tables.
     std::optional<JobSpec> settled;                      ///< The spec with the size of training set that a time limit had room for.
     double learning_seconds = 0, rendering_seconds = 0;  ///< Time that was taken of the time limit.
+    std::optional<uint32_t> finish_with;                 ///< Groups with which it was told to end.
+    bool cancelled = false;                              ///< It was cancelled, and its complete groups are to be written yet.
     std::vector<StoredResult> results;
     std::optional<StoredCheckpoint> checkpoint;
 };
@@ -50,6 +52,10 @@ class Archive {
     /// `info` has the complete spec and the tables.
     Status plan(const JobInfo& info);
     Status settle(const std::string& job_id, const JobSpec& spec);
+    /// The job is to end with its first `groups` groups.
+    Status finish(const std::string& job_id, uint32_t groups);
+    /// The job is cancelled, and its complete groups are kept: until end() its results stay on disk.
+    Status cancel_and_keep(const std::string& job_id);
     /// kAlreadyExists if the unit has a result with other bytes.
     Status keep_partial(const std::string& job_id, const UnitKey& unit, const WorkerRecord& worker, double seconds,
                         const PartialDescriptor& descriptor, std::string_view payload);

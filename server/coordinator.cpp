@@ -1,6 +1,7 @@
 #include "server/coordinator.h"
 
 #include "common/cli/log_line.h"
+#include "server/keep_groups.h"
 #include "server/prepare_job.h"
 #include "server/resume.h"
 
@@ -17,9 +18,12 @@ constexpr double kBeatSeconds = 1;
 Coordinator::Coordinator(CoordinatorOptions options, std::unique_ptr<JobStore> store)
     : office_(std::move(options), std::move(store)),
       admission_(office_),
+      end_early_(office_),
+      gallery_(office_),
       dispatch_(office_),
       intake_(office_) {
     office_.resume = [this](OpenBook& book, const JobPtr& file) { start_taking_over(office_, book, file); };
+    office_.keep = [this](OpenBook& book, const JobPtr& file) { keep_groups(office_, book, file); };
     restored_ = restore_jobs(office_);
     const auto needed = [this](const Digest& digest) { return OpenBook(office_)->ledger.pinned(digest); };
     if (const size_t count = office_.assets.remove_all_that_begin_with(kTablesPrefix, needed); count > 0)
@@ -79,13 +83,7 @@ void Coordinator::look_for_room(OpenBook& book) {
     book.close();
     const Status room = check_room(office_);
     book.reopen();
-    if (!room.ok() && book->paused.empty())
-        book.note().error("no units are given out, because the disk is full: " + room.message());
-    if (room.ok() && !book->paused.empty()) {
-        book.note().info("there is room on the disk again: jobs go on");
-        book->wake_all_waiters();
-    }
-    book->paused = room.message();
+    book.set_paused(room.message());
 }
 
 }  // namespace lightloom

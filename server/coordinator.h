@@ -8,6 +8,8 @@
 
 #include "server/admission.h"
 #include "server/dispatch.h"
+#include "server/end_early.h"
+#include "server/gallery.h"
 #include "server/intake.h"
 #include "server/office.h"
 
@@ -28,24 +30,30 @@ class Coordinator {
     Status room() const;
     AssetStore& assets() { return office_.assets; }
 
-    // Jobs; see admission.h.
-    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label = {}) {
-        return admission_.submit(request_id, spec, label);
+    // Jobs; see admission.h, end_early.h and gallery.h.
+    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label = {},
+                               Reuse reuse = Reuse::kAnew) {
+        return admission_.submit(request_id, spec, label, reuse);
     }
     Result<JobInfo> get_job(const std::string& job_id) const { return admission_.get(job_id); }
     std::vector<JobInfo> list_jobs() const { return admission_.list(); }
-    Result<JobInfo> cancel_job(const std::string& job_id) { return admission_.cancel(job_id); }
+    Result<JobInfo> cancel_job(const std::string& job_id, OnCancel what = OnCancel::kThrowAway) {
+        return end_early_.cancel(job_id, what);
+    }
+    Result<JobInfo> finish_job(const std::string& job_id) { return end_early_.finish(job_id); }
     Result<JobInfo> wait_job(const std::string& job_id, uint64_t after, double timeout_seconds) const {
         return admission_.wait(job_id, after, timeout_seconds);
     }
     Status wait_job_end(const std::string& job_id, double timeout_seconds) const {
         return admission_.wait_end(job_id, timeout_seconds);
     }
-    Result<std::string> image(const std::string& job_id, ImageKind kind) const { return admission_.image(job_id, kind); }
+    Result<std::string> image(const std::string& job_id, ImageKind kind) const { return gallery_.image(job_id, kind); }
     Result<Preview> preview(const std::string& job_id, PreviewFormat format, double exposure = 0) const {
-        return admission_.preview(job_id, format, exposure);
+        return gallery_.preview(job_id, format, exposure);
     }
-    Result<std::string> manifest(const std::string& job_id) const { return admission_.manifest(job_id); }
+    Result<std::string> manifest(const std::string& job_id, ManifestKind kind = ManifestKind::kFinal) const {
+        return gallery_.manifest(job_id, kind);
+    }
 
     // Workers; see dispatch.h.
     Result<WorkerGrant> register_worker(const WorkerHello& hello) { return dispatch_.register_worker(hello); }
@@ -90,6 +98,8 @@ class Coordinator {
     mutable Office office_;
     Status restored_;
     Admission admission_;
+    EndEarly end_early_;
+    Gallery gallery_;
     Dispatch dispatch_;
     Intake intake_;
     TimePoint room_checked_;  ///< For the ticker alone.

@@ -16,6 +16,7 @@ struct Effects {
     bool changed = false;  ///< Those who watch the job are to look.
     bool units = false;    ///< Units may be leased that could not be before.
     bool ended = false;    ///< The job has its last state.
+    bool keep = false;     ///< With `ended`: its complete groups are to be written before they are thrown away.
     /// Freed without the lock, because it is large.
     std::vector<std::shared_ptr<void>> discard;
     struct Line {
@@ -36,6 +37,7 @@ struct Effects {
         changed |= other.changed;
         units |= other.units;
         ended |= other.ended;
+        keep |= other.keep;
         std::move(other.discard.begin(), other.discard.end(), std::back_inserter(discard));
         std::move(other.log.begin(), other.log.end(), std::back_inserter(log));
         other = {};

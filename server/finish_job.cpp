@@ -3,19 +3,27 @@
 #include <system_error>
 
 #include "common/core/atomic_file.h"
-#include "common/core/crash_point.h"
-#include "server/results.h"
 
 namespace lightloom {
-namespace {
 
-/// The counts of the finished image, in the job and in its manifest.
-std::optional<Manifest> settle_counts(Office& office, const JobPtr& file, const Job::Image& image) {
-    const OpenBook book(office);
+Result<FinishedImage> finished_image(const Reducer& reducer, const JobSpec& spec, std::vector<ImageLayer> layers) {
+    auto developed = reducer.developed(true);
+    if (!developed.ok()) return developed.status();
+    FinishedImage out;
+    out.about.noise = reducer.final_noise();
+    out.about.rare_light = reducer.rare_light_report(mean_luminance(developed->color));
+    auto image = encode_image(spec, *std::move(developed), std::move(layers));
+    if (!image.ok()) return image.status();
+    out.bytes = *std::move(image);
+    out.about.digest = sha256(out.bytes);
+    out.about.size = out.bytes.size();
+    return out;
+}
+
+Manifest settled_manifest(Office& office, const OpenBook& book, const JobPtr& file, const Job::Image& about) {
     Job& job = file->job;
-    if (job.state() != JobState::kFinishing) return std::nullopt;  // it was cancelled meanwhile
     Manifest manifest;
-    manifest.units = job.settle(image);
+    manifest.units = job.settle(about);
     manifest.job = job.info(office.now());
     manifest.identity = office.options.identity;
     manifest.created_at = job.submission().created_at;
@@ -32,6 +40,27 @@ std::optional<Manifest> settle_counts(Office& office, const JobPtr& file, const 
     return manifest;
 }
 
+Status write_image(Office& office, const JobPtr& file, const std::string& image, Manifest manifest, const ImageFileNames& names,
+                   crash::Label image_written, WaitsUntil until) {
+    if (const auto text = office.assets.read(manifest.job.spec.scene_root); text.ok()) {
+        if (const auto list = AssetManifest::parse(*text); list.ok())
+            manifest.scene_main = list->main, manifest.without = list->without;
+    }
+    const std::filesystem::path& directory = file->job.submission().directory;
+    std::error_code error;
+    std::filesystem::create_directories(directory, error);  // if that fails, so does writing, which says why
+    const auto write = [&](const char* name, const std::string& bytes) {
+        return with_room(
+            office, file, [&] { return write_file_atomically((directory / name).string(), bytes); }, until);
+    };
+    LL_RETURN_IF_ERROR(write(names.image, image));
+    crash_point(image_written);
+    LL_RETURN_IF_ERROR(write(names.manifest, to_json(manifest)));
+    return flush_folder(directory.parent_path().string());
+}
+
+namespace {
+
 Status write_results(Office& office, const JobPtr& file) {
     std::shared_ptr<Reducer> reducer;
     JobSpec spec;
@@ -44,32 +73,17 @@ Status write_results(Office& office, const JobPtr& file) {
         spec = file->job.spec();
     }
     reducer->freeze();
-    auto developed = reducer->developed(true);
-    if (!developed.ok()) return developed.status();
-    Job::Image counts;
-    counts.noise = reducer->final_noise();
-    counts.rare_light = reducer->rare_light_report(mean_luminance(developed->color));
-    const auto image = encode_image(spec, *std::move(developed), std::move(layers));
-    if (!image.ok()) return image.status();
-    counts.digest = sha256(*image);
-    counts.size = image->size();
-    auto manifest = settle_counts(office, file, counts);
-    if (!manifest) return {};
-    if (const auto text = office.assets.read(spec.scene_root); text.ok()) {
-        if (const auto list = AssetManifest::parse(*text); list.ok())
-            manifest->scene_main = list->main, manifest->without = list->without;
+    const auto finished = finished_image(*reducer, spec, std::move(layers));
+    if (!finished.ok()) return finished.status();
+    Manifest manifest;
+    {
+        const OpenBook book(office);
+        if (file->job.state() != JobState::kFinishing) return {};  // it was cancelled meanwhile
+        manifest = settled_manifest(office, book, file, finished->about);
     }
-    const std::filesystem::path& directory = file->job.submission().directory;
-    std::error_code error;
-    std::filesystem::create_directories(directory, error);  // if that fails, so does writing, which says why
     crash_point("server.image-encoded");
-    const auto write = [&](const char* name, const std::string& bytes) {
-        return with_room(office, file, [&] { return write_file_atomically((directory / name).string(), bytes); });
-    };
-    LL_RETURN_IF_ERROR(write("image.exr", *image));
-    crash_point("server.image-written");
-    LL_RETURN_IF_ERROR(write("manifest.json", to_json(*manifest)));
-    LL_RETURN_IF_ERROR(flush_folder(directory.parent_path().string()));
+    LL_RETURN_IF_ERROR(
+        write_image(office, file, finished->bytes, std::move(manifest), kImageFiles, "server.image-written", WaitsUntil::kJobEnds));
     crash_point("server.manifest-written");
 
     OpenBook book(office);

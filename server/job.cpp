@@ -58,9 +58,10 @@ JobInfo Job::info(TimePoint now, const std::optional<WaitsFor>& waits_for) const
     info.algorithm = spec_.algorithm.name();
     info.message = message_;
     info.revision = revision_;
-    info.unit_total = only_noise_bounds(spec_) ? 0 : units_ ? units_->unit_total() : ended_units_.total;
-    info.unit_done = units_ ? units_->done_count() : ended_units_.done;
-    info.unit_leased = units_ ? units_->leased_count() : 0;
+    const UnitTable* const units = units_ && !ended() ? &*units_ : nullptr;
+    info.unit_total = only_noise_bounds(spec_) ? 0 : units ? units->unit_total() : ended_units_.total;
+    info.unit_done = units ? units->done_count() : ended_units_.done;
+    info.unit_leased = units ? units->leased_count() : 0;
     info.samples_per_pixel_done = merged_iterations_;
     info.dropped_samples = dropped_;
     info.camera_samples = counters_.camera_samples;
@@ -139,6 +140,7 @@ Effects Job::begin_rendering(RenderPlan plan, TimePoint now) {
     counters_ = plan.counters;
     dropped_ = plan.dropped;
     workers_ = std::move(plan.workers);
+    if (finish_with_) units_->limit_groups(*finish_with_);
     effects += advance();
     effects.throw_away(std::exchange(preparation_.facts, {}));
     if (preparation_.round) effects.throw_away(*std::move(preparation_.round));
@@ -197,10 +199,16 @@ Effects Job::advance() {
     return effects;
 }
 
+void Job::finish_with(uint32_t groups) {
+    finish_with_ = groups;
+    if (units_) units_->limit_groups(groups);
+}
+
 Effects Job::finish_if_complete(TimePoint now, bool* finish) {
     Effects effects;
     *finish = false;
     if (state_ != JobState::kRunning) return effects;
+    if (finish_with_ && merged_groups_ >= *finish_with_) closed_ = true;
     if (closed_ && merged_groups_ == 0) units_->limit_groups(1);  // an image needs at least one group
     const bool all = units_->group_total() > 0 && merged_groups_ == units_->group_total();
     if (!all && !(closed_ && merged_groups_ > 0)) return effects;
@@ -227,28 +235,56 @@ std::vector<UnitTable::Merged> Job::settle(const Image& image) {
     return merged;
 }
 
-Effects Job::end(JobState state, std::string message, TimePoint now) {
+Effects Job::end(JobState state, std::string message, TimePoint now, OnCancel groups) {
     Effects effects;
     if (ended()) return effects;
+    effects.keep = groups == OnCancel::kKeep && state != JobState::kSucceeded && reducer_ && merged_groups_ > 0;
+    if (state != JobState::kSucceeded) image_digest_ = {}, image_size_ = 0;
     if (state_ == JobState::kPreparing || state_ == JobState::kRunning) finishing_ = now;
     state_ = state;
     message_ = std::move(message);
     ended_ = now;
     if (units_) {
         ended_units_ = {units_->unit_total(), units_->done_count()};
-        effects.throw_away(*std::move(units_));
-        units_.reset();
+        units_->close();
     }
     effects.throw_away(std::exchange(preparation_.facts, {}));
     if (preparation_.round) effects.throw_away(*std::move(preparation_.round));
     preparation_.round.reset();
     preparation_.guide_bytes.reset();
-    if (reducer_) effects.discard.push_back(std::move(reducer_));
-    reducer_.reset();
     effects.throw_away(std::exchange(layers_, {}));
+    if (!effects.keep) effects += throw_groups_away();
     effects.info(id() + ": " + std::string(to_string(state_)) + (message_.empty() ? "" : ": ") + message_);
     effects.changed = effects.ended = effects.units = true;
     return effects;
+}
+
+Effects Job::throw_groups_away() {
+    Effects effects;
+    if (units_) effects.throw_away(*std::move(units_));
+    units_.reset();
+    if (reducer_) effects.discard.push_back(std::move(reducer_));
+    reducer_.reset();
+    return effects;
+}
+
+Effects Job::let_go(bool written) {
+    Effects effects = throw_groups_away();
+    if (!written) image_digest_ = {}, image_size_ = 0;
+    effects.changed = true;
+    return effects;
+}
+
+bool Job::has_partial() const {
+    if (state_ != JobState::kFailed && state_ != JobState::kCancelled) return false;
+    return reducer_ || (last_ ? last_->image_size_bytes : image_size_) > 0;
+}
+
+bool Job::gave_all() const {
+    if (state_ != JobState::kSucceeded) return false;
+    const auto& noise = last_ ? last_->noise : noise_;
+    const uint64_t iterations = last_ ? last_->samples_per_pixel_done : merged_iterations_;
+    return (noise && noise->reached) || iterations == spec_.samples_per_pixel;
 }
 
 }  // namespace lightloom

@@ -115,6 +115,9 @@ class Job {
     bool time_is_up(TimePoint now) const;
     /// When time_is_up() will be true; nothing for a job without a limit, or that does not render yet.
     std::optional<TimePoint> end_of_time() const;
+    /// The job ends with its first `groups` groups, although more were asked for. In kPreparing or kRunning.
+    void finish_with(uint32_t groups);
+    bool finishes_early() const { return finish_with_.has_value(); }
     /// kRunning -> kFinishing once there is nothing left to render; `*finish` tells.
     Effects finish_if_complete(TimePoint now, bool* finish);
 
@@ -126,15 +129,23 @@ class Job {
         RareLightReport rare_light;
         std::optional<NoiseReport> noise;
     };
-    /// Takes the final counts from the reducer. In kFinishing. Returns who rendered what of the image.
+    /// Takes the final counts from the reducer. In kFinishing, or while the job keeps its groups. Returns who rendered what of the
+    /// image.
     std::vector<UnitTable::Merged> settle(const Image& image);
     const std::set<uint32_t>& workers() const { return workers_; }
     uint32_t merged_groups() const { return merged_groups_; }
     uint64_t merged_iterations() const { return merged_iterations_; }
 
-    /// Any state -> an end; nothing in a state that is one.
-    Effects end(JobState state, std::string message, TimePoint now);
-    Effects fail(const Status& why, TimePoint now) { return end(JobState::kFailed, why.message(), now); }
+    /// Any state -> an end; nothing in a state that is one. With OnCancel::kKeep a job that has complete groups keeps reducer and
+    /// units, and asks for their being written (Effects::keep): let_go() ends that.
+    Effects end(JobState state, std::string message, TimePoint now, OnCancel groups = OnCancel::kThrowAway);
+    Effects fail(const Status& why, TimePoint now) { return end(JobState::kFailed, why.message(), now, OnCancel::kKeep); }
+    /// The complete groups of a job that has ended are on disk, or cannot be written.
+    Effects let_go(bool written);
+    /// Whether a job that ended without its image still has its complete groups, in memory or on disk.
+    bool has_partial() const;
+    /// Whether the image is all that was asked for: nobody and no limit of time ended the job before.
+    bool gave_all() const;
 
     /// Counts for the manifest and for watchers.
     struct Incidents {
@@ -145,6 +156,8 @@ class Job {
   private:
     void tell_rendering(TimePoint now, JobInfo* info) const;
 
+    /// Reducer and units.
+    Effects throw_groups_away();
     /// Takes over what is merged by now.
     Effects advance();
 
@@ -161,7 +174,8 @@ class Job {
     Preparation preparation_;
     TablesInfo tables_;
 
-    bool closed_ = false;             ///< Whether the time limit has passed or the noise target is reached.
+    bool closed_ = false;  ///< Whether the time limit has passed or the noise target is reached.
+    std::optional<uint32_t> finish_with_;
     std::vector<ImageLayer> layers_;  ///< First-hit layers, until the image is written.
     std::optional<UnitTable> units_;  ///< Until the job ends; after that `ended_units_` holds the counts.
     struct UnitCounts {

@@ -11,12 +11,13 @@ JobPtr find_in(const std::map<Key, JobPtr>& jobs, const Key& key) {
 
 }  // namespace
 
-JobPtr JobBook::add(Job job) {
-    auto file = std::make_shared<JobFile>(std::move(job), next_++);
+JobPtr JobBook::add(Job job, const std::optional<Digest>& reuse_key) {
+    auto file = std::make_shared<JobFile>(std::move(job), next_++, reuse_key);
     jobs_.emplace(file->number, file);
     open_.emplace(file->number, file);
     ids_.emplace(file->job.id(), file);
     requests_.emplace(file->job.submission().request_id, file);
+    if (reuse_key) same_.emplace(*reuse_key, file);  // an earlier one stays: it is further
     return file;
 }
 
@@ -24,9 +25,22 @@ JobPtr JobBook::find(const std::string& id) const { return find_in(ids_, id); }
 JobPtr JobBook::find(uint64_t number) const { return find_in(jobs_, number); }
 JobPtr JobBook::find_request(const std::string& request_id) const { return find_in(requests_, request_id); }
 
+JobPtr JobBook::find_same(const Digest& reuse_key) const { return find_in(same_, reuse_key); }
+
+void JobBook::withdraw(const JobFile& file) {
+    if (!file.reuse_key) return;
+    const auto known = same_.find(*file.reuse_key);
+    if (known != same_.end() && known->second.get() == &file) same_.erase(known);
+}
+
 void JobBook::job_ended(const JobFile& file) {
     auto node = open_.extract(file.number);
-    if (!node.empty()) ended_.insert(std::move(node));
+    if (node.empty()) return;
+    if (!file.job.gave_all())
+        withdraw(file);
+    else if (file.reuse_key)
+        same_[*file.reuse_key] = node.mapped();
+    ended_.insert(std::move(node));
 }
 
 std::vector<JobPtr> JobBook::forget_ended(size_t kept) {
@@ -41,6 +55,7 @@ std::vector<JobPtr> JobBook::forget_ended(size_t kept) {
         jobs_.erase(file->number);
         ids_.erase(file->job.id());
         requests_.erase(file->job.submission().request_id);
+        withdraw(*file);
         forgotten.push_back(file);
     }
     return forgotten;

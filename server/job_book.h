@@ -21,13 +21,14 @@ namespace lightloom {
 
 /// A job and what its tasks and watchers need. Shared, because a job may be forgotten while somebody still works for it.
 struct JobFile {
-    JobFile(Job j, uint64_t n) : job(std::move(j)), number(n) {}
+    JobFile(Job j, uint64_t n, const std::optional<Digest>& key) : job(std::move(j)), number(n), reuse_key(key) {}
 
-    Job job;                              ///< Only for who holds the lock of the book.
-    const uint64_t number;                ///< In the order of submission.
-    std::condition_variable_any changed;  ///< With the lock of the book: the job's revision has grown, or the coordinator closes.
-    std::stop_source stop;                ///< Ends the tasks of the job.
-    int running_tasks = 0;                ///< Under the lock of the book. A job is forgotten only when none runs.
+    Job job;                                ///< Only for who holds the lock of the book.
+    const uint64_t number;                  ///< In the order of submission.
+    const std::optional<Digest> reuse_key;  ///< See JobBook::find_same().
+    std::condition_variable_any changed;    ///< With the lock of the book: the job's revision has grown, or the coordinator closes.
+    std::stop_source stop;                  ///< Ends the tasks of the job.
+    int running_tasks = 0;                  ///< Under the lock of the book. A job is forgotten only when none runs.
     /// What an earlier coordinator left of the job, until it is used up. Under the lock of the book.
     std::shared_ptr<const ArchivedJob> archived;
     uint64_t kept_bytes = 0;     ///< Of results since the last checkpoint. Under the lock of the book.
@@ -40,11 +41,17 @@ class JobBook {
   public:
     explicit JobBook(double lease_seconds) : workers(lease_seconds) {}
 
-    JobPtr add(Job job);
+    /// With a `reuse_key` later submissions with the same one may be answered from the job.
+    JobPtr add(Job job, const std::optional<Digest>& reuse_key = {});
     /// Null if there is none.
     JobPtr find(const std::string& id) const;
     JobPtr find(uint64_t number) const;
     JobPtr find_request(const std::string& request_id) const;
+    /// The job that a submission with this key may be answered from: one that has succeeded with all that was asked for (whose
+    /// image may have been removed since: see withdraw()), or that is under way. Null if there is none.
+    JobPtr find_same(const Digest& reuse_key) const;
+    /// No submission is answered from the job any more.
+    void withdraw(const JobFile& file);
     /// All jobs, oldest first; and those that have not ended.
     const std::map<uint64_t, JobPtr>& jobs() const { return jobs_; }
     const std::map<uint64_t, JobPtr>& open_jobs() const { return open_; }
@@ -80,6 +87,7 @@ class JobBook {
     uint64_t next_ = 1;
     std::map<uint64_t, JobPtr> jobs_, open_, ended_;
     std::map<std::string, JobPtr> ids_, requests_;
+    std::map<Digest, JobPtr> same_;  ///< By reuse_key.
 };
 
 }  // namespace lightloom

@@ -31,7 +31,8 @@ grpc::Status JobServiceImpl::SubmitJob(grpc::ServerContext*, const v1::SubmitJob
     const auto spec = wire::get(request->spec());
     if (!spec.ok()) return wire::to_grpc(spec.status());
     if (const Status s = check_time_limit(spec->time_limit_seconds); !s.ok()) return wire::to_grpc(s);
-    return answer(coordinator_.submit_job(request->request_id(), *spec, wire::get(request->label())), response);
+    const Reuse reuse = request->reuse() ? Reuse::kAllowed : Reuse::kAnew;
+    return answer(coordinator_.submit_job(request->request_id(), *spec, wire::get(request->label()), reuse), response);
 }
 
 grpc::Status JobServiceImpl::GetJob(grpc::ServerContext*, const v1::GetJobRequest* request, v1::Job* response) {
@@ -53,7 +54,12 @@ grpc::Status JobServiceImpl::ListWorkers(grpc::ServerContext*, const v1::ListWor
 }
 
 grpc::Status JobServiceImpl::CancelJob(grpc::ServerContext*, const v1::CancelJobRequest* request, v1::Job* response) {
-    return answer(coordinator_.cancel_job(request->job_id()), response);
+    const OnCancel what = request->keep() ? OnCancel::kKeep : OnCancel::kThrowAway;
+    return answer(coordinator_.cancel_job(request->job_id(), what), response);
+}
+
+grpc::Status JobServiceImpl::FinishJob(grpc::ServerContext*, const v1::FinishJobRequest* request, v1::Job* response) {
+    return answer(coordinator_.finish_job(request->job_id()), response);
 }
 
 grpc::Status JobServiceImpl::WatchJob(grpc::ServerContext* context, const v1::WatchJobRequest* request,
@@ -79,8 +85,10 @@ grpc::Status JobServiceImpl::WatchJob(grpc::ServerContext* context, const v1::Wa
 
 grpc::Status JobServiceImpl::GetImage(grpc::ServerContext*, const v1::GetImageRequest* request,
                                       grpc::ServerWriter<v1::Chunk>* writer) {
+    if (request->partial() && request->kind() != v1::IMAGE_KIND_FINAL) return invalid("only a FINAL image can be a partial one");
+    const ImageKind exr = request->partial() ? ImageKind::kPartial : ImageKind::kFinal;
     switch (request->kind()) {
-        case v1::IMAGE_KIND_FINAL: return send(coordinator_.image(request->job_id(), ImageKind::kFinal), writer);
+        case v1::IMAGE_KIND_FINAL: return send(coordinator_.image(request->job_id(), exr), writer);
         case v1::IMAGE_KIND_PREVIEW: return send(coordinator_.image(request->job_id(), ImageKind::kPreview), writer);
         default: return invalid("an image is FINAL or PREVIEW");
     }
@@ -103,7 +111,8 @@ grpc::Status JobServiceImpl::GetPreview(grpc::ServerContext*, const v1::GetPrevi
 
 grpc::Status JobServiceImpl::GetManifest(grpc::ServerContext*, const v1::GetManifestRequest* request,
                                          grpc::ServerWriter<v1::Chunk>* writer) {
-    return send(coordinator_.manifest(request->job_id()), writer);
+    const ManifestKind kind = request->partial() ? ManifestKind::kPartial : ManifestKind::kFinal;
+    return send(coordinator_.manifest(request->job_id(), kind), writer);
 }
 
 }  // namespace lightloom

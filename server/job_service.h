@@ -18,6 +18,7 @@ class JobServiceImpl final : public v1::JobService::Service {
     grpc::Status ListWorkers(grpc::ServerContext*, const v1::ListWorkersRequest* request,
                              v1::ListWorkersResponse* response) override;
     grpc::Status CancelJob(grpc::ServerContext*, const v1::CancelJobRequest* request, v1::Job* response) override;
+    grpc::Status FinishJob(grpc::ServerContext*, const v1::FinishJobRequest* request, v1::Job* response) override;
     grpc::Status WatchJob(grpc::ServerContext* context, const v1::WatchJobRequest* request,
                           grpc::ServerWriter<v1::Job>* writer) override;
     grpc::Status GetImage(grpc::ServerContext*, const v1::GetImageRequest* request, grpc::ServerWriter<v1::Chunk>* writer) override;

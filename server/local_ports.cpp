@@ -4,15 +4,16 @@
 
 namespace lightloom {
 
-Result<JobInfo> LocalJobPort::submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label) {
-    return coordinator_.submit_job(request_id, spec, label);
+Result<JobInfo> LocalJobPort::submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label, Reuse reuse) {
+    return coordinator_.submit_job(request_id, spec, label, reuse);
 }
 Result<JobInfo> LocalJobPort::get_job(const std::string& job_id) { return coordinator_.get_job(job_id); }
 Result<std::vector<JobInfo>> LocalJobPort::list_jobs() { return coordinator_.list_jobs(); }
 Result<std::vector<WorkerStatus>> LocalJobPort::list_workers(double gone_within_seconds) {
     return gone_within_seconds > 0 ? coordinator_.workers(gone_within_seconds) : coordinator_.workers();
 }
-Result<JobInfo> LocalJobPort::cancel_job(const std::string& job_id) { return coordinator_.cancel_job(job_id); }
+Result<JobInfo> LocalJobPort::cancel_job(const std::string& job_id, OnCancel what) { return coordinator_.cancel_job(job_id, what); }
+Result<JobInfo> LocalJobPort::finish_job(const std::string& job_id) { return coordinator_.finish_job(job_id); }
 
 Status LocalJobPort::watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
                                std::stop_token stop) {
@@ -31,7 +32,9 @@ Result<std::string> LocalJobPort::image(const std::string& job_id, ImageKind kin
 Result<Preview> LocalJobPort::preview(const std::string& job_id, PreviewFormat format, double exposure) {
     return coordinator_.preview(job_id, format, exposure);
 }
-Result<std::string> LocalJobPort::manifest(const std::string& job_id) { return coordinator_.manifest(job_id); }
+Result<std::string> LocalJobPort::manifest(const std::string& job_id, ManifestKind kind) {
+    return coordinator_.manifest(job_id, kind);
+}
 
 Result<std::vector<Digest>> LocalJobPort::find_missing(const std::vector<Digest>& digests) {
     std::vector<Digest> missing;

@@ -8,16 +8,18 @@ namespace lightloom {
 class LocalJobPort final : public JobPort {
   public:
     explicit LocalJobPort(Coordinator& coordinator) : coordinator_(coordinator) {}
-    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label) override;
+    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label,
+                               Reuse reuse = Reuse::kAnew) override;
     Result<JobInfo> get_job(const std::string& job_id) override;
     Result<std::vector<JobInfo>> list_jobs() override;
     Result<std::vector<WorkerStatus>> list_workers(double gone_within_seconds) override;
-    Result<JobInfo> cancel_job(const std::string& job_id) override;
+    Result<JobInfo> cancel_job(const std::string& job_id, OnCancel what = OnCancel::kThrowAway) override;
+    Result<JobInfo> finish_job(const std::string& job_id) override;
     Status watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
                      std::stop_token stop) override;
     Result<std::string> image(const std::string& job_id, ImageKind kind) override;
     Result<Preview> preview(const std::string& job_id, PreviewFormat format, double exposure) override;
-    Result<std::string> manifest(const std::string& job_id) override;
+    Result<std::string> manifest(const std::string& job_id, ManifestKind kind = ManifestKind::kFinal) override;
     Result<std::vector<Digest>> find_missing(const std::vector<Digest>& digests) override;
     Status upload(const Digest& digest, const std::filesystem::path& path) override;
     Status upload_bytes(const Digest& digest, std::string_view bytes) override;

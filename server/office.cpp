@@ -65,12 +65,39 @@ void OpenBook::apply(const JobPtr& file, Effects effects) {
         for (const Digest& tables : book.ledger.forget(file->number)) drop_tables(tables);
         book.job_ended(*file);
         file->archived.reset();
-        if (office_.archive.keeps()) ended_.push_back(book.info(*file, office_.now()));
+        // What is on disk of a job that keeps its groups stays until these are written.
+        if (effects.keep)
+            office_.keep(*this, file);
+        else
+            note_end(file);
         forget_old_jobs();
     }
     if (effects.changed) changed(file);
     if (effects.units) units_appeared();
     noted_ += std::move(effects);
+}
+
+void OpenBook::note_end(const JobPtr& file) {
+    if (office_.archive.keeps()) ended_.push_back((*this)->info(*file, office_.now()));
+}
+
+void OpenBook::set_paused(std::string why) {
+    JobBook& book = **this;
+    if (book.paused == why) return;
+    const bool news = book.paused.empty() != why.empty();
+    book.paused = std::move(why);
+    if (!news) return;
+    if (book.paused.empty()) {
+        noted_.info("there is room on the disk again: jobs go on");
+        book.wake_all_waiters();
+    } else {
+        noted_.error("no units are given out, because the disk is full: " + book.paused);
+        book.agenda_changed.notify_one();  // which looks at the disk more often now
+    }
+    for (const auto& [number, file] : book.open_jobs()) {
+        file->job.touch();
+        file->changed.notify_all();
+    }
 }
 
 void OpenBook::forget_old_jobs() {
@@ -82,7 +109,7 @@ void OpenBook::forget_old_jobs() {
     }
 }
 
-void OpenBook::start(const JobPtr& file, const char* purpose, std::function<Status()> task) {
+bool OpenBook::start(const JobPtr& file, const char* purpose, std::function<Status()> task) {
     Office& office = office_;
     const auto run = [&office, file, purpose, work = std::move(task)]() mutable {
         const auto no_memory = [&] {
@@ -105,30 +132,35 @@ void OpenBook::start(const JobPtr& file, const char* purpose, std::function<Stat
     ++file->running_tasks;
     try {
         office_.tasks.run(run);
+        return true;
     } catch (const std::exception& e) {  // no thread, or no memory for one
         --file->running_tasks;
         fail(file,
              {StatusCode::kResourceExhausted, std::string("the coordinator cannot start a thread ") + purpose + ": " + e.what()});
+        return false;
     }
 }
 
-void pause(Office& office, const Status& why) {
-    OpenBook book(office);
-    if (book->paused.empty()) book.note().error("no units are given out, because the disk is full: " + why.message());
-    book->paused = why.message();
-    book->agenda_changed.notify_one();
+void pause(Office& office, const Status& why) { OpenBook(office).set_paused(why.message()); }
+
+Status no_job(const std::string& id) {
+    return not_found("no job has the id '" + id +
+                     "'; a name is only a label: `lightloom list` shows the ids of those that exist (the oldest that ended are "
+                     "forgotten)");
 }
 
-Status with_room(Office& office, const JobPtr& file, const std::function<Status()>& work) {
+Status closing_status() { return {StatusCode::kUnavailable, "the coordinator is going down"}; }
+
+Status with_room(Office& office, const JobPtr& file, const std::function<Status()>& work, WaitsUntil until) {
     for (;;) {
         Status status = work();
         if (status.code() != StatusCode::kResourceExhausted) return status;
         pause(office, status);
         OpenBook book(office);
-        const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(1);
-        while (!file->job.ended() && !book->closing && std::chrono::steady_clock::now() < until)
-            book.wait_until(file->changed, until);
-        if (file->job.ended() || book->closing) return {StatusCode::kCancelled, "the job ended while the disk was full"};
+        const auto over = [&] { return book->closing || (until == WaitsUntil::kJobEnds && file->job.ended()); };
+        const auto again = std::chrono::steady_clock::now() + std::chrono::seconds(1);
+        while (!over() && std::chrono::steady_clock::now() < again) book.wait_until(file->changed, again);
+        if (over()) return {StatusCode::kCancelled, "the job ended while the disk was full"};
     }
 }
 

@@ -30,6 +30,8 @@ struct Office {
     Archive archive;  ///< Has its own lock, which is never held while the book is wanted.
     /// Lets a job go on that waited for another job's tables; see release_crowd(). Set once, before there are jobs.
     std::function<void(OpenBook&, const JobPtr&)> resume;
+    /// Begins to write the complete groups of a job that has ended without its image; see keep_groups(). Set like `resume`.
+    std::function<void(OpenBook&, const JobPtr&)> keep;
     Mutex tables_mutex;  ///< Held while files of tables are written, repaired or removed.
     Guarded<JobBook> book;
     TaskPool tasks;  ///< Last, so that tasks end before what they use.
@@ -85,7 +87,12 @@ class OpenBook {
     void forget_old_jobs();
     /// Runs a task of the job on a thread. The task's error, too little memory or a missing thread fails this job only. `purpose`
     /// completes "the coordinator has too little memory ...".
-    void start(const JobPtr& file, const char* purpose, std::function<Status()> task);
+    /// False if there is no thread.
+    bool start(const JobPtr& file, const char* purpose, std::function<Status()> task);
+    /// The archive is told that the job has ended.
+    void note_end(const JobPtr& file);
+    /// Why no job gets units any more, or an empty text if they get some again. Those who watch a job see it.
+    void set_paused(std::string why);
 
   private:
     bool noted() const {
@@ -100,9 +107,15 @@ class OpenBook {
     std::vector<std::string> forgotten_;  ///< The same.
 };
 
-/// Repeats `work` until the disk has room for it; meanwhile no job gets units. kCancelled when the job has ended or the coordinator
-/// closes.
-Status with_room(Office& office, const JobPtr& file, const std::function<Status()>& work);
+/// For whom with_room() waits: for a job until it ends, or until the coordinator closes.
+enum class WaitsUntil { kJobEnds, kClosing };
+/// Repeats `work` until the disk has room for it; meanwhile no job gets units. kCancelled when there is nothing to wait for any
+/// more.
+Status with_room(Office& office, const JobPtr& file, const std::function<Status()>& work, WaitsUntil until = WaitsUntil::kJobEnds);
+/// What a call is told that names a job which is not there.
+Status no_job(const std::string& id);
+/// What it is told while the coordinator stops.
+Status closing_status();
 /// The disk is full: no job gets units until the ticker finds room.
 void pause(Office& office, const Status& why);
 /// Whether there is room on the disk of the data directory for the coordinator to go on; else a line that says how much there is.

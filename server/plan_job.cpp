@@ -6,6 +6,7 @@
 
 #include "common/core/crash_point.h"
 #include "server/finish_job.h"
+#include "server/keep_groups.h"
 #include "server/memory_need.h"
 #include "server/resume.h"
 
@@ -55,6 +56,10 @@ Status plan_units(Office& office, const JobPtr& file, JobSpec spec, SceneFacts f
     book.release_crowd(file);
     book.unpin(file, guide);
     crash_point("server.units-planned");
+    if (archived && archived->cancelled) {  // and was killed before its groups were written
+        book.apply(file, job.end(JobState::kCancelled, kGroupsAreKept, office.now(), OnCancel::kKeep));
+        return {};
+    }
     if (job.state() == JobState::kRunning && job.spec().time_limit_seconds > 0 && job.seconds_left(office.now()) <= 0) job.close();
     finish_if_complete(office, book, file);  // an earlier coordinator may have had all results
     return {};

@@ -109,6 +109,7 @@ Status prepare(Office& office, const JobPtr& file) {
         spec = file->job.spec();
         archived = file->archived;
     }
+    const bool cancelled = archived && archived->cancelled;
     if (archived && archived->build != name_of(office.options.identity)) {
         LL_RETURN_IF_ERROR(begin_anew(office, file, "another build did it"));
         archived.reset();
@@ -123,6 +124,11 @@ Status prepare(Office& office, const JobPtr& file) {
         const auto resumed = resume_rendering(office, file, *archived->planned, *facts);
         if (!resumed.ok()) return resumed.status();
         if (*resumed) return {};
+    }
+    if (cancelled) {  // and nothing that could be kept is left
+        OpenBook book(office);
+        book.apply(file, file->job.end(JobState::kCancelled, {}, office.now()));
+        return {};
     }
     spec.frame = facts->frame;
     if (spec.max_depth < 0) spec.max_depth = facts->max_depth;

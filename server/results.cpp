@@ -152,6 +152,8 @@ std::string to_json(const Manifest& m) {
                      {"samples_per_pixel", m.iterations},
                      {"groups", m.groups},
                      {"spec_digest", spec.spec_digest().hex()}};
+    if (is_terminal(m.job.state))  // without the image that was asked for
+        json["partial"] = {{"state", to_string(m.job.state)}, {"message", m.job.message}};
     json["spec"] = spec_json(spec, m.scene_main);
     if (!m.without.empty()) json["spec"]["without"] = m.without;
     json["build"] = {{"build_id", m.identity.build_id},
@@ -223,11 +225,7 @@ Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, st
     return encode_image(spec, *std::move(developed), std::move(layers));
 }
 
-Result<std::string> read_image(const std::filesystem::path& job_directory) {
-    return read_file((job_directory / "image.exr").string());
-}
-
-Result<Preview> make_preview(const JobSpec& spec, const std::filesystem::path& job_directory, const Reducer* reducer,
+Result<Preview> make_preview(const JobSpec& spec, const std::filesystem::path& written, const Reducer* reducer,
                              PreviewFormat format, double exposure) {
     DevelopedImage developed;
     if (reducer) {
@@ -235,9 +233,9 @@ Result<Preview> make_preview(const JobSpec& spec, const std::filesystem::path& j
         if (!merged.ok()) return merged.status();
         developed = *std::move(merged);
     } else {
-        auto bytes = read_image(job_directory);
+        auto bytes = read_file(written.string());
         if (!bytes.ok()) return bytes.status();
-        auto image = decode_exr(*bytes, "the finished image");
+        auto image = decode_exr(*bytes, "the image on disk");
         if (!image.ok()) return image.status();
         developed.iterations = std::strtoull(image->attribute(exr_attribute::kSamples).c_str(), nullptr, 10);
         if (format == PreviewFormat::kExr) return Preview{*std::move(bytes), developed.iterations};

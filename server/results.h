@@ -15,6 +15,15 @@
 
 namespace lightloom {
 
+/// Names of files in a job's directory.
+struct ImageFileNames {
+    const char* image;
+    const char* manifest;
+};
+inline constexpr ImageFileNames kImageFiles{"image.exr", "manifest.json"};
+/// Of a job that ended without its image: its complete groups.
+inline constexpr ImageFileNames kPartialFiles{"partial.exr", "partial.manifest.json"};
+
 struct ManifestWorker {
     uint32_t index = 0;  ///< Refers to Manifest::units.
     std::string worker_id, host;
@@ -58,10 +67,9 @@ std::string to_json(const Manifest& manifest);
 Result<std::string> encode_image(const JobSpec& spec, DevelopedImage developed, std::vector<ImageLayer> layers);
 /// The same for the merged groups of `reducer`.
 Result<std::string> encode_image(const JobSpec& spec, const Reducer& reducer, std::vector<ImageLayer> layers);
-Result<std::string> read_image(const std::filesystem::path& job_directory);
-/// The groups merged so far, or the finished image when there is no reducer any more, as PNG brightened by `exposure` stops or as
-/// EXR without first-hit layers. Needs memory for a few copies of the frame.
-Result<Preview> make_preview(const JobSpec& spec, const std::filesystem::path& job_directory, const Reducer* reducer,
+/// The groups merged so far, or the image in the file `written` when there is no reducer any more, as PNG brightened by `exposure`
+/// stops or as EXR without first-hit layers. Needs memory for a few copies of the frame.
+Result<Preview> make_preview(const JobSpec& spec, const std::filesystem::path& written, const Reducer* reducer,
                              PreviewFormat format, double exposure);
 
 }  // namespace lightloom

@@ -17,17 +17,21 @@ uint64_t first_revision() {
     return uint64_t(std::chrono::duration_cast<std::chrono::milliseconds>(now).count()) << 16;
 }
 
-/// The job as far as its submission says what it is; `archived` says how far it was.
-Result<JobPtr> restore_job(JobBook& book, ArchivedJob archived, TimePoint now) {
+/// The job as far as its submission says what it is; `archived` says how far it was. `build` is the name of the present one.
+Result<JobPtr> restore_job(JobBook& book, ArchivedJob archived, const std::string& build, TimePoint now) {
     const Job::Past past{archived.age_seconds, archived.rendering_seconds, first_revision()};
+    auto key = reuse_key(archived.submission.submitted);
     if (archived.last) {
-        const JobPtr file = book.add(Job(std::move(archived.submission), *archived.last, now, past));
+        if (archived.planned_by != build) key.reset();  // another build may render other bytes
+        const JobPtr file = book.add(Job(std::move(archived.submission), *archived.last, now, past), key);
         book.job_ended(*file);
         return file;
     }
     auto canonical = canonical_spec(archived.submission.submitted);
     if (!canonical.ok()) return canonical.status();
-    const JobPtr file = book.add(Job(archived.submission, *std::move(canonical), now, past));
+    if (archived.finish_with || archived.cancelled) key.reset();
+    const JobPtr file = book.add(Job(archived.submission, *std::move(canonical), now, past), key);
+    if (archived.finish_with) file->job.finish_with(*archived.finish_with);
     Preparation& preparation = file->job.preparation();
     preparation.learning_seconds = archived.learning_seconds;
     if (archived.settled) {
@@ -172,10 +176,14 @@ Status restore_jobs(Office& office) {
     size_t open = 0;
     for (ArchivedJob& archived : *jobs) {
         const std::string id = archived.submission.id;
-        const auto file = restore_job(*book, std::move(archived), office.now());
+        const auto file = restore_job(*book, std::move(archived), name_of(office.options.identity), office.now());
         if (!file.ok()) {
             book.note().error(id + ": " + file.status().message() + "; the job stays on disk and is left out");
         } else if (!(*file)->job.ended()) {
+            if ((*file)->archived->cancelled && !(*file)->archived->planned) {
+                book.apply(*file, (*file)->job.end(JobState::kCancelled, {}, office.now()));
+                continue;
+            }
             ++open;
             start_preparing(office, book, *file);
         }

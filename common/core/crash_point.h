@@ -49,6 +49,7 @@ inline constexpr std::string_view kCrashLabels[] = {
     "server.image-encoded",      // the image is complete, in memory only
     "server.image-written",      // the image is on disk, its manifest is not
     "server.manifest-written",   // both are on disk, the job has not ended yet
+    "server.partial-written",    // the groups of a job that failed or was cancelled are on disk, its results are, too
     "server.job-ended",          // the job has its last state, nobody was told
     "server.segment-created",    // a file for payloads has its name, and nothing is in it
     "server.payloads-written",   // the payloads of a batch are in their segments, not flushed; the transaction is open

@@ -3,6 +3,7 @@
 // the equality of requests and the JSON of manifests are made from this list; the code for the wire and for the replay
 // command is written by hand and checked against the list by job_fields_test.
 
+#include <bit>
 #include <cstddef>
 #include <string>
 #include <string_view>
@@ -107,6 +108,10 @@ std::string fields_text(const JobSpec& spec) {
                 const Rect& crop = value.crop;
                 for (const int n : {value.width, value.height, crop.x0, crop.y0, crop.x1, crop.y1})
                     append_text(out, field.name, std::to_string(n));
+            } else if constexpr (std::is_same_v<T, Rect>) {
+                for (const int n : {value.x0, value.y0, value.x1, value.y1}) append_text(out, field.name, std::to_string(n));
+            } else if constexpr (std::is_same_v<T, double>) {
+                append_text(out, field.name, std::to_string(std::bit_cast<uint64_t>(value)));
             } else if constexpr (std::is_same_v<T, bool>) {
                 append_text(out, field.name, value ? field.yes : field.no);
             } else {

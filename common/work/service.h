@@ -147,6 +147,7 @@ struct JobInfo {
     JobLabel label;
     std::string scene;       ///< Path of the scene file in its file list.
     double age_seconds = 0;  ///< Time since the submission.
+    bool reused = false;     ///< In the answer to a submission: it is an earlier job of the same spec.
 };
 /// Share of the image that is rendered, from 0 to 1: the share of its samples, of its time limit, or of the samples with which its
 /// noise target will be reached, whichever is largest.
@@ -180,7 +181,14 @@ struct WorkerStatus {
 /// Behind the word "unit", for people.
 std::string unit_name(const UnitKey& key);
 
-enum class ImageKind { kFinal, kPreview };
+/// kPartial is the EXR of the complete groups, without first-hit layers.
+enum class ImageKind { kFinal, kPreview, kPartial };
+/// Of the manifest of an image: of a finished one, or also of one whose job ended early and kept its complete groups.
+enum class ManifestKind { kFinal, kPartial };
+/// Whether the answer to a submission may be an earlier job of the same spec.
+enum class Reuse { kAnew, kAllowed };
+/// What becomes of the complete groups of a job that is cancelled.
+enum class OnCancel { kThrowAway, kKeep };
 
 enum class PreviewFormat { kPng, kExr };
 /// The image of a job as far as it is merged.
@@ -193,12 +201,14 @@ struct Preview {
 class JobPort {
   public:
     virtual ~JobPort() = default;
-    virtual Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label) = 0;
+    virtual Result<JobInfo> submit_job(const std::string& request_id, const JobSpec& spec, const JobLabel& label,
+                                       Reuse reuse = Reuse::kAnew) = 0;
     virtual Result<JobInfo> get_job(const std::string& job_id) = 0;
     virtual Result<std::vector<JobInfo>> list_jobs() = 0;
     /// Without those that are gone, or were refused, for longer; all of them for 0.
     virtual Result<std::vector<WorkerStatus>> list_workers(double gone_within_seconds) = 0;
-    virtual Result<JobInfo> cancel_job(const std::string& job_id) = 0;
+    virtual Result<JobInfo> cancel_job(const std::string& job_id, OnCancel what = OnCancel::kThrowAway) = 0;
+    virtual Result<JobInfo> finish_job(const std::string& job_id) = 0;
     /// Calls `on_change` with the present state and then on changes until a terminal state was passed; kCancelled soon after a
     /// stop request.
     virtual Status watch_job(const std::string& job_id, const std::function<void(const JobInfo&)>& on_change,
@@ -206,7 +216,7 @@ class JobPort {
     virtual Result<std::string> image(const std::string& job_id, ImageKind kind) = 0;
     /// `exposure` in stops, of a PNG.
     virtual Result<Preview> preview(const std::string& job_id, PreviewFormat format, double exposure) = 0;
-    virtual Result<std::string> manifest(const std::string& job_id) = 0;
+    virtual Result<std::string> manifest(const std::string& job_id, ManifestKind kind = ManifestKind::kFinal) = 0;
     virtual Result<std::vector<Digest>> find_missing(const std::vector<Digest>& digests) = 0;
     /// Sends the file `path`, resuming where an earlier attempt broke off; does nothing if the asset is already
     /// complete there.

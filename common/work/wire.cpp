@@ -177,7 +177,7 @@ void put(const JobInfo& in, v1::Job* out) {
     out->set_light_path_count(in.light_paths);
     out->set_ray_count(in.rays);
     out->set_worker_count(in.worker_count);
-    if (in.state == JobState::kSucceeded) put(in.image_digest, out->mutable_image_digest());
+    if (in.state == JobState::kSucceeded || in.image_size_bytes > 0) put(in.image_digest, out->mutable_image_digest());
     out->set_image_size_bytes(in.image_size_bytes);
     out->set_duplicate_same_count(in.duplicates_same);
     out->set_duplicate_different_count(in.duplicates_different);
@@ -207,6 +207,7 @@ void put(const JobInfo& in, v1::Job* out) {
     put(in.label, out->mutable_label());
     out->set_scene(clipped_utf8(in.scene, kMaxMessageBytes));
     out->set_age_seconds(in.age_seconds);
+    out->set_reused(in.reused);
 }
 
 void put(const JobLabel& in, v1::JobLabel* out) {
@@ -274,6 +275,7 @@ Result<JobInfo> get(const v1::Job& in) {
     info.label = get(in.label());
     info.scene = in.scene();
     info.age_seconds = in.age_seconds();
+    info.reused = in.reused();
     return info;
 }
 

@@ -288,8 +288,8 @@ TEST_F(CommandLine, ChoicesHaveNamesInManifestsAndNumbersInImages) {
 /// Help of every command names what it takes, its units and its defaults.
 TEST_F(CommandLine, HelpIsThereForEveryCommand) {
     const std::string all = run({"--help"}).output;
-    for (const char* command : {"render", "submit", "watch", "fetch", "cancel", "list", "inspect", "compare", "algorithms",
-                                "replay", "bench", "report", "reference"}) {
+    for (const char* command : {"render", "submit", "watch", "fetch", "preview", "finish", "cancel", "list", "inspect", "compare",
+                                "algorithms", "replay", "bench", "report", "reference"}) {
         EXPECT_NE(all.find(std::string("\n  ").append(command)), std::string::npos) << all;
         const Run help = run({command, "--help"});
         EXPECT_EQ(help.exit_code, 0);

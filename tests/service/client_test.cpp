@@ -119,7 +119,7 @@ TEST(Outputs, NeverTakeThePlaceOfAnInput) {
 /// A service that has one finished job, and whose submissions fail as the test says.
 class PlayedPort final : public JobPort {
   public:
-    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec&, const JobLabel&) override {
+    Result<JobInfo> submit_job(const std::string& request_id, const JobSpec&, const JobLabel&, Reuse) override {
         request_ids.push_back(request_id);
         if (request_ids.size() <= refusals.size()) return refusals[request_ids.size() - 1];
         return job;
@@ -127,11 +127,12 @@ class PlayedPort final : public JobPort {
     Result<JobInfo> get_job(const std::string&) override { return job; }
     Result<std::vector<JobInfo>> list_jobs() override { return std::vector<JobInfo>{job}; }
     Result<std::vector<WorkerStatus>> list_workers(double) override { return std::vector<WorkerStatus>(); }
-    Result<JobInfo> cancel_job(const std::string&) override { return job; }
+    Result<JobInfo> cancel_job(const std::string&, OnCancel) override { return job; }
+    Result<JobInfo> finish_job(const std::string&) override { return job; }
     Status watch_job(const std::string&, const std::function<void(const JobInfo&)>&, std::stop_token) override { return {}; }
     Result<std::string> image(const std::string&, ImageKind) override { return exr; }
     Result<Preview> preview(const std::string&, PreviewFormat, double) override { return Preview{exr, 1}; }
-    Result<std::string> manifest(const std::string&) override {
+    Result<std::string> manifest(const std::string&, ManifestKind) override {
         return Json{{"image", {{"sha256", job.image_digest.hex()}, {"size_bytes", exr.size()}, {"colour", "float"}}}}.dump();
     }
     Result<std::vector<Digest>> find_missing(const std::vector<Digest>&) override { return std::vector<Digest>(); }

@@ -41,7 +41,7 @@ struct Service {
         return std::make_unique<Process>("lightloom-worker", arguments, path(name + ".log"));
     }
     std::unique_ptr<Process> submit(const std::string& name, std::vector<std::string> more) const {
-        std::vector<std::string> arguments{"submit", kScene, "--server", address(), "-o", path(name + ".exr"), "-q"};
+        std::vector<std::string> arguments{"submit", kScene, "--server", address(), "-o", path(name + ".exr"), "-q", "--again"};
         arguments.insert(arguments.end(), more.begin(), more.end());
         return std::make_unique<Process>("lightloom", arguments, path(name + ".log"));
     }

@@ -116,7 +116,7 @@ bool PhaseRun::run_round(size_t number) {
 }
 
 void PhaseRun::submit(Job& job) {
-    std::vector<std::string> arguments{"submit", kScene, "--server", farm_.address(), "--name", label(job)};
+    std::vector<std::string> arguments{"submit", kScene, "--server", farm_.address(), "--again", "--name", label(job)};
     if (job.attached) arguments.insert(arguments.end(), {"-q", "-o", farm_.path(job.name + ".exr").string()});
     if (!job.attached) arguments.push_back("--detach");
     const auto settings = job_arguments(job.kind, options_.work);
