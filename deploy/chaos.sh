@@ -7,6 +7,7 @@
 #   deploy/chaos.sh --seed 7 --phase 41 --phases 1        one phase again, as a violation prints it
 #   deploy/chaos.sh --minutes 30 --ledger ledger.json     adds to a ledger, and goes on where its last run ended
 #   deploy/chaos.sh --minutes 10 --expect-durable         a job that is lost with the coordinator is a violation
+#   deploy/chaos.sh --minutes 10 --allow-blame            a job that fails because of its workers is none
 #
 # Exit codes: 0 every promise held, 1 a violation, 2 bad command line. --help shows all options.
 set -euo pipefail

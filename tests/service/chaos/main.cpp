@@ -61,6 +61,7 @@ int main(int argc, char** argv) {
     uint64_t seed = 1, phases = 0;
     std::optional<uint64_t> first;
     std::vector<std::string> expect, kinds;
+    bool allow_blame = false;
     std::string ledger_file, level = "info";
     bool expect_durable = false;
     RunOptions options;
@@ -78,10 +79,12 @@ int main(int argc, char** argv) {
     app.add_option(
            "--expect", expect,
            "What counts as a violation although it is a known limit: durable (an accepted job is lost with the coordinator), "
-           "blame (a job fails because of its workers' deaths), healing (a damaged file of the coordinator fails a job), "
+           "blame (a job fails because of its workers; expected by itself), healing (a damaged file of the coordinator fails a "
+           "job), "
            "log (a log that nobody reads stops the farm)")
         ->type_name("LIMIT,...")
         ->delimiter(',');
+    app.add_flag("--allow-blame", allow_blame, "A job that fails because of its workers is counted, and no violation");
     app.add_flag("--expect-durable", expect_durable, "Short for --expect durable");
     app.add_option("--ledger", ledger_file, "Adds to this file after each phase, and goes on where it ended")->type_name("FILE");
     const auto work_option =
@@ -99,6 +102,7 @@ int main(int argc, char** argv) {
         return kBadCommandLine;
     }
     if (expect_durable) expect.emplace_back("durable");
+    if (!allow_blame) options.expected.insert(Limit::kBlame);
     for (const std::string& name : expect) {
         const auto* const limit = std::find(std::begin(kLimitNames), std::end(kLimitNames), name);
         if (limit == std::end(kLimitNames)) {
@@ -171,6 +175,7 @@ int main(int argc, char** argv) {
         ledger.next_phase = number + 1;
         std::string replay = program + " --seed " + std::to_string(seed) + " --phase " + std::to_string(number) + " --phases 1";
         for (const std::string& name : expect) replay += " --expect " + name;
+        if (allow_blame) replay += " --allow-blame";
         if (work_option.count() > 0) replay += " --work " + std::to_string(options.work);
         for (const std::string& what : violations)
             ledger.violations.push_back("seed " + std::to_string(seed) + " phase " + std::to_string(number) + ": " + what);
