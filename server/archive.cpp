@@ -152,7 +152,7 @@ Result<ArchivedJob> Archive::read(const StoredJob& stored, const std::filesystem
                       .directory = jobs_directory / job.id};
     out.age_seconds = seconds_since(job.created_at);
     for (const StoredEvent& event : stored.events)
-        if (event.kind == kPlannedBy) out.planned_by = event.bytes;
+        if (event.kind == kBuild) out.build = event.bytes;
     if (is_terminal(job.state)) {
         if (!stored.info) return data_loss("nothing says how it ended");
         auto last = from_bytes<v1::Job>(*stored.info);
@@ -161,10 +161,7 @@ Result<ArchivedJob> Archive::read(const StoredJob& stored, const std::filesystem
         return out;
     }
     for (const StoredEvent& event : stored.events) {
-        if (event.kind == kBuild) {
-            out.build = event.bytes;
-            out.planned.reset();
-        }
+        if (event.kind == kBuild) out.planned.reset();
         if (event.kind == kFinish) out.finish_with = uint32_t(std::strtoul(event.bytes.c_str(), nullptr, 10));
         if (event.kind == kCancelled) out.cancelled = true;
         if (event.kind == kSpent) (void)std::sscanf(event.bytes.c_str(), "%lg %lg", &out.learning_seconds, &out.rendering_seconds);

@@ -8,6 +8,7 @@
 
 #include "common/work/service.h"
 #include "server/scene_facts.h"
+#include "server/time_bounds.h"
 #include "server/time_point.h"
 
 namespace lightloom {
@@ -30,6 +31,7 @@ struct CoordinatorOptions {
     std::filesystem::path table_cache;             ///< Tables of earlier jobs; empty: none are kept.
     uint64_t table_cache_bytes = uint64_t(4) << 30;
     uint64_t training_bytes = uint64_t(8) << 30;  ///< Most training data of one job: 7e6 samples of a hard interior.
+    TimeBounds unit_time;                         ///< After which a unit is taken away from its worker.
     size_t max_jobs = 10000;                      ///< Most jobs that have not ended.
     size_t kept_jobs = 1000;                      ///< Ended jobs that are remembered; the oldest are forgotten, their files stay.
     /// Below this much free space on the disk of `directory` no units are given out.

@@ -5,6 +5,7 @@
 #include "server/finish_job.h"
 #include "server/learn_job.h"
 #include "server/plan_job.h"
+#include "server/straggler.h"
 
 namespace lightloom {
 namespace {
@@ -58,7 +59,6 @@ Dispatch::Turn Dispatch::next_unit(OpenBook& book, WorkerRecord& worker, std::op
     const TimePoint now = office_.now();
     WorkerRegistry& workers = book->workers;
     if (!worker.has_room() || workers.rests(worker, now)) return Turn::kNotForThisOne;
-    const auto anyone_else = [&](const std::set<uint32_t>& but) { return workers.anyone_else(but, now); };
     // A worker gets a second unit only if enough are left for the workers that have none: a unit must not wait behind
     // another one while a worker idles.
     const size_t idle = worker.held.empty() ? 0 : workers.idle();
@@ -68,30 +68,89 @@ Dispatch::Turn Dispatch::next_unit(OpenBook& book, WorkerRecord& worker, std::op
         Job& job = file->job;
         if (file != in_line && job.state() != JobState::kPreparing) continue;
         UnitTable* const units = job.open_units();
-        if (!units || !units->has_more_than(0)) continue;
+        if (!units) continue;
+        const bool suspect = units->has_suspect();
+        if (!suspect && (units->suspicion().holds_back_others() || !units->has_more_than(0))) continue;
         passed_over = true;
-        if (!worker.held.empty() && !units->has_more_than(idle)) continue;
-        const auto unit = units->lease(worker.index, office_.lease_end(), anyone_else);
+        if (WorkerRegistry::rests_from(worker, job.id(), now)) continue;
+        // For the unit's job, a worker whose host lacks something is not there.
+        const auto anyone_else = [&](const UnitTable::FailedWorkers& but) {
+            return workers.anyone_else([&](const WorkerRecord& w) { return but.contains(w.index) || w.lacks.contains(job.id()); },
+                                       now);
+        };
+        std::optional<WorkUnit> unit;
+        if (suspect) {
+            // As long as a suspect waits, nobody gets a second unit: somebody will soon hold nothing, and take it.
+            if (!worker.held.empty()) return Turn::kNotForThisOne;
+            unit = units->lease_suspect(worker.index, now, office_.lease_end(), anyone_else);
+            if (unit) worker.alone = UnitReference{job.id(), unit->key};
+        }
+        if (!unit && units->suspicion().holds_back_others()) continue;
+        if (!unit && !worker.held.empty() && !units->has_more_than(idle)) continue;
+        if (!unit) unit = units->lease(worker.index, now, office_.lease_end(), anyone_else);
         if (!unit) continue;
-        book.look_again(file, office_.lease_end());
-        const bool render = unit->key.kind == UnitKind::kRender;
-        worker.held.insert({job.id(), unit->key});
-        crash_point("server.unit-leased");
-        if (render) {
-            *lease = UnitLease{job.id(), job.spec(), *unit, job.tables().asset};
-            return Turn::kLeased;
-        }
-        Preparation& preparation = job.preparation();
-        if (preparation.round_begin == TimePoint()) preparation.round_begin = now;
-        if (preparation.learning_seconds > 0) preparation.start_clock(now);  // it goes on
-        *lease = UnitLease{job.id(), job.spec(), *unit, preparation.guide};
-        if (preparation.training_begin == TimePoint()) {
-            preparation.training_begin = preparation.round_begin;
-            start_learning(office_, book, file);
-        }
+        make_lease(book, file, worker, *unit, lease);
         return Turn::kLeased;
     }
+    if (lease_copy(book, worker, lease)) return Turn::kLeased;
     return passed_over ? Turn::kNotForThisOne : Turn::kNothingLeft;
+}
+
+void Dispatch::make_lease(OpenBook& book, const JobPtr& file, WorkerRecord& worker, const WorkUnit& unit,
+                          std::optional<UnitLease>* lease) {
+    const TimePoint now = office_.now();
+    Job& job = file->job;
+    book.look_again(file, office_.lease_end());
+    worker.held.insert({job.id(), unit.key});
+    crash_point("server.unit-leased");
+    if (unit.key.kind == UnitKind::kRender) {
+        *lease = UnitLease{job.id(), job.spec(), unit, job.tables().asset};
+        return;
+    }
+    Preparation& preparation = job.preparation();
+    if (preparation.round_begin == TimePoint()) preparation.round_begin = now;
+    if (preparation.learning_seconds > 0) preparation.start_clock(now);  // it goes on
+    *lease = UnitLease{job.id(), job.spec(), unit, preparation.guide};
+    if (preparation.training_begin == TimePoint()) {
+        preparation.training_begin = preparation.round_begin;
+        start_learning(office_, book, file);
+    }
+}
+
+bool Dispatch::lease_copy(OpenBook& book, WorkerRecord& worker, std::optional<UnitLease>* lease) {
+    if (!worker.held.empty()) return false;
+    const TimePoint now = office_.now();
+    for (const auto& [number, file] : book->open_jobs()) {
+        const Job& job = file->job;
+        const double pace = worker.samples_per_second(job.id());
+        if (pace <= 0 || job.state() != JobState::kRunning || WorkerRegistry::rests_from(worker, job.id(), now)) continue;
+        UnitTable& units = *file->job.open_units();
+        if (!may_copy(units)) continue;
+        for (const UnitKey& key : worth_copying(units, job.id(), book->workers, pace, now)) {
+            const auto unit = units.copy(key, worker.index, now, office_.lease_end());
+            if (!unit) continue;
+            book.note().info(job.id() + ": unit " + unit_name(key) + " is rendered by " + worker.id +
+                             ", too, which has nothing else");
+            make_lease(book, file, worker, *unit, lease);
+            return true;
+        }
+    }
+    return false;
+}
+
+bool Dispatch::took_too_long(OpenBook& book, const JobPtr& file, UnitTable& units, const UnitKey& key, WorkerRecord& worker) {
+    const TimePoint now = office_.now();
+    const auto begun = units.rendering(key, worker.index, now);
+    if (!begun) return false;
+    const double taken = seconds_between(*begun, now);
+    const std::string& job_id = file->job.id();
+    const double longest = longest_seconds(*units.find(key), worker.samples_per_second(job_id), office_.options.unit_time);
+    if (taken <= longest) return false;
+    const Status why{StatusCode::kDeadlineExceeded, worker.id + " has rendered it for " + std::to_string(int64_t(taken)) +
+                                                        " s, at most " + std::to_string(int64_t(longest)) + " s are allowed"};
+    book->workers.unit_failed(worker, why.message(), now);
+    unit_failed(book, file, key, units.fail(key, worker.index, worker.successes), why, now);
+    return true;
 }
 
 Result<std::vector<UnitLease>> Dispatch::lease(const std::string& worker_id, double wait_seconds,
@@ -145,7 +204,8 @@ Result<std::vector<UnitReference>> Dispatch::heartbeat(const std::string& worker
     for (const RunningUnit& item : running) {
         const JobPtr file = book->find(item.unit.job_id);
         UnitTable* const units = file ? file->job.open_units(item.unit.key) : nullptr;
-        if (!units || !units->renew(item.unit.key, worker->index, office_.lease_end())) {
+        if (!units || !units->renew(item.unit.key, worker->index, office_.lease_end()) ||
+            (item.rendering && took_too_long(book, file, *units, item.unit.key, *worker))) {
             revoked.push_back(item.unit);
             continue;
         }
@@ -181,10 +241,14 @@ Status Dispatch::release(const std::string& worker_id, const UnitReference& unit
     if (why.ok() || blameless) {
         units->release(unit.key, worker->index);
         book.units_appeared();
+    } else if (why.code() == StatusCode::kResourceExhausted) {
+        host_failed(book, file, *units, unit.key, *worker, why, office_.now());
     } else {
-        if (why.code() != StatusCode::kInvalidArgument) book->workers.unit_failed(*worker, office_.now());  // else it is the job
-        const UnitTable::Failures failures = units->fail(unit.key, worker->index);
-        unit_failed(book, file, unit.key, failures, {why.code(), worker->id + ": " + why.message()});
+        const TimePoint now = office_.now();
+        if (why.code() != StatusCode::kInvalidArgument)
+            book->workers.unit_failed(*worker, why.message(), now);  // else it is the job
+        const UnitTable::Failures failures = units->fail(unit.key, worker->index, worker->successes);
+        unit_failed(book, file, unit.key, failures, {why.code(), worker->id + ": " + why.message()}, now);
     }
     file->job.stop_idle_clock(office_.now());
     return {};

@@ -53,8 +53,8 @@ Result<SubmitAck> Intake::submit_payload(const std::string& worker_id, const Uni
 SubmitAck Intake::reject_result(OpenBook& book, const JobPtr& file, UnitTable& units, const UnitKey& key, WorkerRecord& worker,
                                 const Status& why) {
     ++file->job.incidents.rejected;
-    book->workers.unit_failed(worker, office_.now());
-    unit_failed(book, file, key, units.fail(key, worker.index), why);
+    book->workers.unit_failed(worker, why.message(), office_.now());
+    unit_failed(book, file, key, units.fail(key, worker.index, worker.successes), why, office_.now());
     return {SubmitOutcome::kRejected, why.message()};
 }
 
@@ -175,7 +175,7 @@ Result<SubmitAck> Intake::take_partial(const std::string& worker_id, const UnitR
     if (const std::optional<Status>& why = *refused) {
         ++job.incidents.rejected;
         office_.archive.drop_soon(job.id(), unit.key);
-        unit_failed(book, file, unit.key, job.open_units()->reopen(unit.key), *why);
+        unit_failed(book, file, unit.key, job.open_units()->reopen(unit.key), *why, office_.now());
         return SubmitAck{SubmitOutcome::kRejected, why->message()};
     }
     WorkerRecord& worker = book->workers.at(index);
@@ -183,7 +183,7 @@ Result<SubmitAck> Intake::take_partial(const std::string& worker_id, const UnitR
     worker.delivered(job.id(), double(counters.camera_samples > 0 ? counters.camera_samples : counters.light_paths),
                      render_seconds);
     ++worker.merged;
-    book->workers.unit_succeeded(worker);
+    book->workers.unit_succeeded(worker, job.id());
     book.apply(file, job.count(work));
     checkpoint_if_due(book, file, kept.payload.size());
     note_time(file);
@@ -246,7 +246,7 @@ Result<SubmitAck> Intake::submit_training(const std::string& worker_id, const Un
     UnitTable* const units = file->job.open_units(reference.key);
     if (!units) return SubmitAck{SubmitOutcome::kStale, "job " + reference.job_id + " has its training data already"};
     if (auto answer = repeated_result(book, file, *units, reference.key, *worker, digest)) return *std::move(answer);
-    book->workers.unit_succeeded(*worker);
+    book->workers.unit_succeeded(*worker, reference.job_id);
     Preparation& preparation = file->job.preparation();
     preparation.start_clock(seconds_after(now, -trace_seconds));  // a short unit may be over before a heartbeat tells of it
     TrainingRound& round = *preparation.round;

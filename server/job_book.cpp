@@ -73,7 +73,12 @@ JobInfo JobBook::info(const JobFile& file, TimePoint now) const {
         waits_for = {maker->job.id(), info(*maker, now).eta_seconds};
     }
     JobInfo out = file.job.info(now, waits_for);
-    if (!paused.empty() && !is_terminal(out.state)) out.message = "paused: " + paused;
+    if (is_terminal(out.state)) return out;
+    if (!paused.empty()) {
+        out.message = "paused: " + paused;
+    } else if (const std::string why = workers.why_nobody_can(out.job_id, now); !why.empty() && file.job.open_units()) {
+        out.message = "waits for its workers: " + why;
+    }
     return out;
 }
 

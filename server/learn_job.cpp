@@ -65,7 +65,7 @@ class Tracing final : public TracingPort {
                 ++job_.incidents.rejected;
                 TrainingRound& open = *preparation().round;
                 const UnitTable::Failures failures = open.refuse(unit);
-                unit_failed(book, file_, open.key(unit), failures, why);
+                unit_failed(book, file_, open.key(unit), failures, why, office_.now());
                 if (!alive()) return over();  // the unit has failed too often
             }
         }

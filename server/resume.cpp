@@ -22,7 +22,7 @@ Result<JobPtr> restore_job(JobBook& book, ArchivedJob archived, const std::strin
     const Job::Past past{archived.age_seconds, archived.rendering_seconds, first_revision()};
     auto key = reuse_key(archived.submission.submitted);
     if (archived.last) {
-        if (archived.planned_by != build) key.reset();  // another build may render other bytes
+        if (archived.build != build) key.reset();  // another build may render other bytes
         const JobPtr file = book.add(Job(std::move(archived.submission), *archived.last, now, past), key);
         book.job_ended(*file);
         return file;

@@ -90,7 +90,7 @@ Status UnitTable::restore(uint32_t merged_groups, std::span<const Known> known) 
 
 void UnitTable::advance(uint32_t count) {
     for (; merged_groups_ < count && !open_.empty(); ++merged_groups_) {
-        for (const Entry& e : open_.front()) done_.push_back({prefix(e.digest), e.worker});
+        for (const Entry& e : open_.front()) done_.push_back({prefix(e.digest), e.lease.worker});
         open_.pop_front();
     }
 }
@@ -103,7 +103,7 @@ bool UnitTable::has_more_than(size_t n) {
     return true;
 }
 
-std::optional<WorkUnit> UnitTable::lease(uint32_t worker, TimePoint expiry, const AnyoneElse& anyone_else) {
+std::optional<WorkUnit> UnitTable::lease(uint32_t worker, TimePoint now, TimePoint expiry, const AnyoneElse& anyone_else) {
     if (closed_) return std::nullopt;
     // A shuffled table first opens several groups, so that whole groups change their order, too.
     (void)has_more_than(shuffle_ ? 8 : 0);
@@ -125,44 +125,96 @@ std::optional<WorkUnit> UnitTable::lease(uint32_t worker, TimePoint expiry, cons
         }
     }
     Entry& e = *entry(*chosen);
-    pending_.erase(chosen);
-    leased_.insert(e.unit.key);
-    e.state = State::kLeased;
-    e.worker = worker;
-    e.expiry = expiry;
-    e.ticket = ++tickets_;
-    ++leased_count_;
+    give(e, {.worker = worker, .leased = now, .expiry = expiry, .begun = {}});
     return e.unit;
+}
+
+bool UnitTable::has_suspect() {
+    if (closed_ || pending_suspects_.empty()) return false;
+    // An empty list of pending units may only mean that no group was opened yet.
+    const bool others = pending_.size() + leased_.size() > 0 || has_more_than(0);
+    return std::any_of(pending_suspects_.begin(), pending_suspects_.lower_bound({group_limit_, 0}),
+                       [&](const UnitKey& key) { return suspicion_.may_run(key, done_count_, others); });
+}
+
+std::optional<WorkUnit> UnitTable::lease_suspect(uint32_t worker, TimePoint now, TimePoint expiry, const AnyoneElse& anyone_else) {
+    if (!has_suspect()) return std::nullopt;
+    const bool others = pending_.size() + leased_.size() > 0;
+    for (const UnitKey& key : pending_suspects_) {
+        if (key.group >= group_limit_ || !suspicion_.may_run(key, done_count_, others)) continue;
+        Entry& e = *entry(key);
+        if (e.failed_on.contains(worker) && anyone_else && anyone_else(e.failed_on)) continue;
+        give(e, {.worker = worker, .leased = now, .expiry = expiry, .begun = {}, .alone = true});
+        return e.unit;
+    }
+    return std::nullopt;
+}
+
+void UnitTable::give(Entry& e, const Lease& lease) {
+    const UnitKey& key = e.unit.key;
+    if (e.state == State::kPending) {
+        pending_.erase(key);
+        pending_suspects_.erase(key);
+        e.state = State::kLeased;
+        leased_.insert(key);
+        ++leased_count_;
+    }
+    e.lease = lease;
+    e.lease.ticket = ++tickets_;
+    if (!e.done_before) e.done_before = done_count_;
+}
+
+bool UnitTable::has_copy(const UnitKey& key, uint32_t worker) const {
+    const auto copy = copies_.find(key);
+    return copy != copies_.end() && copy->second.worker == worker;
 }
 
 bool UnitTable::renew(const UnitKey& key, uint32_t worker, TimePoint expiry) {
     Entry* e = entry(key);
     if (!e || e->state == State::kDone) return false;
-    if (e->state == State::kPending) {  // its lease had expired, but the worker is still alive
-        pending_.erase(key);
-        leased_.insert(key);
-        e->state = State::kLeased;
-        e->worker = worker;
-        e->ticket = ++tickets_;
-        ++leased_count_;
+    if (has_copy(key, worker)) {
+        copies_.at(key).expiry = expiry;
+        return true;
     }
-    e->lost_with.erase(worker);
-    if (e->worker == worker) e->expiry = expiry;
+    const bool holds = e->state == State::kLeased && e->lease.worker == worker;
+    if (!holds && e->failed_on.contains(worker)) return false;  // it was taken from the worker
+    suspicion_.returned(key, worker);
+    if (e->state == State::kPending) {  // its lease had expired, but the worker is still alive
+        Lease again = e->lease;
+        if (again.worker != worker) again = {.worker = worker, .leased = again.leased, .begun = {}};
+        give(*e, again);
+    }
+    if (e->lease.worker == worker) e->lease.expiry = expiry;
     return true;
 }
 
 void UnitTable::make_pending(Entry& e) {
+    const UnitKey& key = e.unit.key;
     if (e.state == State::kLeased) {
-        leased_.erase(e.unit.key);
+        leased_.erase(key);
         --leased_count_;
     }
     e.state = State::kPending;
-    pending_.insert(e.unit.key);
+    (suspicion_.suspects(key) ? pending_suspects_ : pending_).insert(key);
+}
+
+void UnitTable::end_lease(Entry& e) {
+    const auto copy = copies_.extract(e.unit.key);
+    if (copy.empty()) {
+        make_pending(e);
+    } else {
+        give(e, copy.mapped());
+    }
 }
 
 void UnitTable::release(const UnitKey& key, uint32_t worker) {
     Entry* e = entry(key);
-    if (e && e->state == State::kLeased && e->worker == worker) make_pending(*e);
+    if (!e || e->state != State::kLeased) return;
+    if (has_copy(key, worker)) {
+        copies_.erase(key);
+    } else if (e->lease.worker == worker) {
+        end_lease(*e);
+    }
 }
 
 void UnitTable::release_all(uint32_t worker) {
@@ -171,13 +223,15 @@ void UnitTable::release_all(uint32_t worker) {
 }
 
 std::vector<UnitTable::Expired> UnitTable::expire(TimePoint now) {
-    std::vector<Expired> expired;
+    std::erase_if(copies_, [&](const auto& copy) { return copy.second.expiry < now; });
+    std::vector<const Entry*> ended;
     for (const UnitKey& key : leased_) {
-        if (const Entry& e = *entry(key); e.expiry < now) expired.push_back({key, e.worker});
+        if (const Entry& e = *entry(key); e.lease.expiry < now) ended.push_back(&e);
     }
-    std::sort(expired.begin(), expired.end(),
-              [&](const Expired& a, const Expired& b) { return entry(a.unit)->ticket < entry(b.unit)->ticket; });
-    for (const Expired& lease : expired) make_pending(*entry(lease.unit));
+    std::sort(ended.begin(), ended.end(), [](const Entry* a, const Entry* b) { return a->lease.ticket < b->lease.ticket; });
+    std::vector<Expired> expired;
+    for (const Entry* e : ended) expired.push_back({e->unit.key, e->lease.worker, e->lease.leased, e->lease.alone});
+    for (const Expired& lease : expired) end_lease(*entry(lease.unit));
     return expired;
 }
 
@@ -193,18 +247,54 @@ bool UnitTable::is_done(const UnitKey& key) const {
 
 std::optional<TimePoint> UnitTable::next_expiry() const {
     std::optional<TimePoint> next;
-    for (const UnitKey& key : leased_) {
-        const TimePoint expiry = entry(key)->expiry;
+    const auto at_most = [&](TimePoint expiry) {
         if (!next || expiry < *next) next = expiry;
-    }
+    };
+    for (const UnitKey& key : leased_) at_most(entry(key)->lease.expiry);
+    for (const auto& [key, copy] : copies_) at_most(copy.expiry);
     return next;
 }
 
-std::set<uint32_t> UnitTable::lose(const UnitKey& key, uint32_t worker) {
-    Entry* e = entry(key);
-    if (!e || e->state == State::kDone) return {};
-    e->lost_with.insert(worker);
-    return e->lost_with;
+Suspicion::Verdict UnitTable::lose(const Expired& lease, const Suspicion::OthersFellSilent& others) {
+    Entry* const e = entry(lease.unit);
+    if (!e || e->state == State::kDone) return Suspicion::Verdict::kNothing;
+    const bool are_others = pending_.size() + pending_suspects_.size() + leased_.size() > 1 || has_more_than(1);
+    const bool contrast = done_count_ > e->done_before.value_or(0) || !are_others;
+    const auto verdict =
+        suspicion_.fell_silent(lease.unit, {lease.worker, lease.leased, lease.alone, contrast, done_count_}, others);
+    if (e->state == State::kPending && suspicion_.suspects(lease.unit)) {
+        pending_.erase(lease.unit);
+        pending_suspects_.insert(lease.unit);
+    }
+    return verdict;
+}
+
+std::optional<TimePoint> UnitTable::rendering(const UnitKey& key, uint32_t worker, TimePoint now) {
+    Entry* const e = entry(key);
+    if (!e || e->state != State::kLeased) return std::nullopt;
+    Lease* const lease = has_copy(key, worker) ? &copies_.at(key) : e->lease.worker == worker ? &e->lease : nullptr;
+    if (!lease) return std::nullopt;
+    if (!lease->begun) lease->begun = now;
+    return lease->begun;
+}
+
+std::vector<UnitTable::InWork> UnitTable::in_work() const {
+    std::vector<InWork> out;
+    for (const UnitKey& key : leased_) {
+        const Entry& e = *entry(key);
+        out.push_back({e.unit, e.lease.worker, e.lease.leased, e.lease.begun, copies_.contains(key)});
+    }
+    return out;
+}
+
+std::optional<WorkUnit> UnitTable::copy(const UnitKey& key, uint32_t worker, TimePoint now, TimePoint expiry) {
+    Entry* const e = entry(key);
+    if (closed_ || key.group >= group_limit_ || !e || e->state != State::kLeased || e->lease.worker == worker || e->lease.alone ||
+        suspicion_.suspects(key) || copies_.contains(key) || e->failed_on.contains(worker))
+        return std::nullopt;
+    copies_[key] = {.worker = worker, .leased = now, .expiry = expiry, .begun = {}};
+    ++copies_made_;
+    return e->unit;
 }
 
 UnitTable::Completion UnitTable::complete(const UnitKey& key, uint32_t worker, const Digest& digest) {
@@ -220,8 +310,11 @@ UnitTable::Completion UnitTable::complete(const UnitKey& key, uint32_t worker, c
         --leased_count_;
     }
     pending_.erase(key);
+    pending_suspects_.erase(key);
+    copies_.erase(key);
+    suspicion_.acquit(key);
     e->state = State::kDone;
-    e->worker = worker;
+    e->lease.worker = worker;
     e->digest = digest;
     ++done_count_;
     return Completion::kFirst;
@@ -232,16 +325,23 @@ UnitTable::Failures UnitTable::reopen(const UnitKey& key) {
     if (!e || e->state != State::kDone) return {};
     --done_count_;
     make_pending(*e);
-    e->failed_on.insert(e->worker);
-    return {++e->failures, int(e->failed_on.size())};
+    // Its result counted as a success.
+    FailedOn& by = e->failed_on[e->lease.worker];
+    by.before = ++by.times;
+    ++e->failures;
+    return failures_of(*e);
 }
 
-UnitTable::Failures UnitTable::fail(const UnitKey& key, uint32_t worker) {
+UnitTable::Failures UnitTable::fail(const UnitKey& key, uint32_t worker, uint64_t successes) {
     Entry* e = entry(key);
     if (!e || e->state == State::kDone) return {};
     release(key, worker);
-    e->failed_on.insert(worker);
-    return {++e->failures, int(e->failed_on.size())};
+    FailedOn& by = e->failed_on[worker];
+    if (successes > by.successes) by.before = by.times;
+    ++by.times;
+    by.successes = successes;
+    ++e->failures;
+    return failures_of(*e);
 }
 
 std::vector<UnitTable::Merged> UnitTable::merged() const {

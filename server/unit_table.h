@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <optional>
 #include <set>
 #include <span>
@@ -14,6 +15,7 @@
 
 #include "common/core/digest.h"
 #include "common/work/job.h"
+#include "server/suspicion.h"
 #include "server/time_point.h"
 
 namespace lightloom {
@@ -25,29 +27,60 @@ class UnitTable {
     /// order (tests).
     UnitTable(Plan plan, uint64_t iterations, uint32_t window, std::optional<uint64_t> shuffle_seed);
 
+    /// How a worker failed on a unit; `successes` are those that the worker had at the latest failure.
+    struct FailedOn {
+        int times = 0;
+        int before = 0;  ///< Those of `times` after which the worker succeeded with another unit, as known at the latest one.
+        uint64_t successes = 0;
+    };
+    using FailedWorkers = std::map<uint32_t, FailedOn>;
     /// Whether a worker other than these could render a unit.
-    using AnyoneElse = std::function<bool(const std::set<uint32_t>& workers)>;
+    using AnyoneElse = std::function<bool(const FailedWorkers& workers)>;
     /// Leases the next unit to `worker` (an index of the caller's choice), or nothing for now. A unit that failed on
-    /// the worker comes back to it only if no other worker could render it.
-    std::optional<WorkUnit> lease(uint32_t worker, TimePoint expiry, const AnyoneElse& anyone_else = {});
-    /// Whether more than `n` units could be leased now.
+    /// the worker comes back to it only if no other worker could render it. Suspects are left out.
+    std::optional<WorkUnit> lease(uint32_t worker, TimePoint now, TimePoint expiry, const AnyoneElse& anyone_else = {});
+    /// Whether more than `n` units could be leased now by lease().
     bool has_more_than(size_t n);
-    /// True if the unit is not merged yet; then `worker` holds it until `expiry` (unless another worker already does).
+    /// The same for units that may only run alone, by a worker that holds nothing else.
+    std::optional<WorkUnit> lease_suspect(uint32_t worker, TimePoint now, TimePoint expiry, const AnyoneElse& anyone_else = {});
+    bool has_suspect();
+    /// True if the unit is not merged yet, and was not taken from the worker; then `worker` holds it until `expiry` (unless another
+    /// worker already does).
     bool renew(const UnitKey& key, uint32_t worker, TimePoint expiry);
-    /// Gives the unit back if `worker` holds it.
+    /// Gives the unit back if `worker` holds it. If another worker has a copy, that one holds it then.
     void release(const UnitKey& key, uint32_t worker);
     void release_all(uint32_t worker);
     struct Expired {
         UnitKey unit;
         uint32_t worker = 0;
+        TimePoint leased;    ///< When the worker got the unit.
+        bool alone = false;  ///< Whether it was leased as a suspect.
     };
-    /// Puts units back whose lease ended before `now`, and returns them in the order in which they were leased.
+    /// Puts units back whose lease ended before `now`, and returns them in the order in which they were leased. Copies are
+    /// forgotten without a word.
     std::vector<Expired> expire(TimePoint now);
     /// When the lease that ends first does; nothing if no unit is leased.
     std::optional<TimePoint> next_expiry() const;
-    /// Notes that `worker` went silent while it held the unit. Returns all workers that did, except those that have
-    /// renewed the unit since.
-    std::set<uint32_t> lose(const UnitKey& key, uint32_t worker);
+    /// Holds the silence of a worker against the unit that it rendered; see Suspicion.
+    Suspicion::Verdict lose(const Expired& lease, const Suspicion::OthersFellSilent& others);
+    const Suspicion& suspicion() const { return suspicion_; }
+
+    /// `worker` says that it renders the unit. Returns since when, or nothing if it does not hold it.
+    std::optional<TimePoint> rendering(const UnitKey& key, uint32_t worker, TimePoint now);
+    /// A unit that is leased.
+    struct InWork {
+        WorkUnit unit;
+        uint32_t worker = 0;
+        TimePoint leased;
+        std::optional<TimePoint> begun;  ///< When its worker first said that it renders it.
+        bool copied = false;             ///< Whether a second worker has it, too.
+    };
+    std::vector<InWork> in_work() const;
+    /// Leases a unit to a second worker; the first result counts. Nothing if the unit is not leased, is suspect or has a copy.
+    std::optional<WorkUnit> copy(const UnitKey& key, uint32_t worker, TimePoint now, TimePoint expiry);
+    /// How many copies there are, and were made so far.
+    size_t copies() const { return copies_.size(); }
+    uint64_t copies_made() const { return copies_made_; }
 
     enum class Completion { kFirst, kDuplicateSame, kDuplicateDifferent, kUnknown };
     /// Enters a result that arrived. kFirst: the caller merges it; nobody else gets this answer, unless the caller
@@ -56,11 +89,12 @@ class UnitTable {
     /// How often a unit failed, and on how many different workers.
     struct Failures {
         int total = 0, workers = 0;
+        FailedWorkers by = {};
     };
     /// The result could not be merged after all: makes the unit pending again.
     Failures reopen(const UnitKey& key);
-    /// The same for a unit that a worker could not render; see lease().
-    Failures fail(const UnitKey& key, uint32_t worker);
+    /// The same for a unit that a worker could not render; see lease(). The worker has succeeded with `successes` units so far.
+    Failures fail(const UnitKey& key, uint32_t worker, uint64_t successes = 0);
 
     /// Whether a result of the unit has been entered.
     bool is_done(const UnitKey& key) const;
@@ -105,14 +139,20 @@ class UnitTable {
 
   private:
     enum class State : uint8_t { kPending, kLeased, kDone };
+    struct Lease {
+        uint32_t worker = 0;
+        uint64_t ticket = 0;  ///< Later leases have larger ones.
+        TimePoint leased, expiry;
+        std::optional<TimePoint> begun;
+        bool alone = false;
+    };
     struct Entry {
         WorkUnit unit;
         State state = State::kPending;
-        uint32_t worker = 0;
+        Lease lease;
         int failures = 0;
-        std::set<uint32_t> failed_on, lost_with;
-        uint64_t ticket = 0;  ///< Number of the lease; later leases have larger ones.
-        TimePoint expiry;
+        FailedWorkers failed_on;
+        std::optional<uint64_t> done_before;  ///< Results of the table when the unit was leased first.
         Digest digest;
     };
     /// The record of a merged unit: who rendered it, and enough of the digest to tell a repeated result from a
@@ -135,6 +175,11 @@ class UnitTable {
     /// The same, whatever may be leased.
     void open_next();
     void make_pending(Entry& e);
+    /// Takes the lease away; a copy takes its place, otherwise the unit is pending.
+    void end_lease(Entry& e);
+    void give(Entry& e, const Lease& lease);
+    bool has_copy(const UnitKey& key, uint32_t worker) const;
+    static Failures failures_of(const Entry& e) { return {e.failures, int(e.failed_on.size()), e.failed_on}; }
 
     /// A restored group lies at most so many after the merged ones: what is further on was not leased by any coordinator.
     static constexpr uint32_t kMostOpenGroups = 1u << 20;
@@ -146,6 +191,10 @@ class UnitTable {
     std::deque<std::vector<Entry>> open_;  // group merged_groups_ and those after it
     std::vector<Done> done_;               // merged groups, tile by tile
     std::set<UnitKey> pending_, leased_;
+    std::set<UnitKey> pending_suspects_;  // not in pending_
+    Suspicion suspicion_;
+    std::map<UnitKey, Lease> copies_;  // of leased units
+    uint64_t copies_made_ = 0;
     uint64_t unit_total_ = 0;
     uint32_t group_total_ = 0;
     uint64_t done_count_ = 0, leased_count_ = 0, tickets_ = 0;

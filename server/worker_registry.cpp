@@ -9,6 +9,13 @@ namespace {
 constexpr size_t kMaxRefused = 32;
 /// What is left of the weight of a unit in a worker's pace with every later one.
 constexpr double kPaceDecay = 0.8;
+/// What a worker lacked for a job is forgotten so many seconds after its rest.
+constexpr double kLackForgotten = 600;
+/// Most hosts that a message names.
+constexpr size_t kNamedHosts = 3;
+
+/// 1, 2, 4, ... and at most 60 s.
+double rest_seconds(int times) { return std::min(60.0, std::ldexp(1.0, std::min(times - 1, 6))); }
 
 }  // namespace
 
@@ -68,19 +75,68 @@ WorkerRegistry::Crew WorkerRegistry::crew(TimePoint now) const {
     return crew;
 }
 
-bool WorkerRegistry::anyone_else(const std::set<uint32_t>& workers, TimePoint now) const {
-    return std::any_of(workers_.begin(), workers_.end(), [&](const auto& w) {
-        return !lost(*w.second, now) && now >= w.second->rests_until && !workers.contains(w.first);
-    });
+bool WorkerRegistry::anyone_there(const std::function<bool(const WorkerRecord&)>& but, TimePoint now) const {
+    return std::any_of(workers_.begin(), workers_.end(), [&](const auto& w) { return !lost(*w.second, now) && !but(*w.second); });
 }
 
-void WorkerRegistry::unit_failed(WorkerRecord& worker, TimePoint now) {
+bool WorkerRegistry::anyone_else(const std::function<bool(const WorkerRecord&)>& but, TimePoint now) const {
+    return anyone_there([&](const WorkerRecord& w) { return now < w.rests_until || but(w); }, now);
+}
+
+void WorkerRegistry::unit_failed(WorkerRecord& worker, const std::string& why, TimePoint now) {
     const int repeated = worker.failures_in_a_row++;
-    if (repeated > 0) worker.rests_until = seconds_after(now, std::min(60.0, std::ldexp(1.0, std::min(repeated - 1, 6))));
+    if (repeated > 0) worker.rests_until = seconds_after(now, rest_seconds(repeated));
+    worker.trouble = why;
+}
+
+void WorkerRegistry::lacks(WorkerRecord& worker, const std::string& job_id, const std::string& what, TimePoint now) {
+    // Those of jobs that have ended meanwhile.
+    std::erase_if(worker.lacks, [&](const auto& lack) { return seconds_between(lack.second.until, now) > kLackForgotten; });
+    WorkerRecord::Lack& lack = worker.lacks[job_id];
+    lack.what = what;
+    lack.until = seconds_after(now, rest_seconds(++lack.times));
+}
+
+void WorkerRegistry::unit_succeeded(WorkerRecord& worker, const std::string& job_id) {
+    ++worker.successes;
+    worker.failures_in_a_row = 0;
+    worker.doubted = false;
+    worker.lacks.erase(job_id);
 }
 
 bool WorkerRegistry::rests(const WorkerRecord& worker, TimePoint now) const {
-    return now < worker.rests_until && anyone_else({worker.index}, now);
+    return now < worker.rests_until &&
+           (worker.doubted || anyone_else([&](const WorkerRecord& w) { return w.index == worker.index; }, now));
+}
+
+bool WorkerRegistry::rests_from(const WorkerRecord& worker, const std::string& job_id, TimePoint now) {
+    const auto lack = worker.lacks.find(job_id);
+    return lack != worker.lacks.end() && now < lack->second.until;
+}
+
+std::string WorkerRegistry::why_nobody_can(const std::string& job_id, TimePoint now) const {
+    size_t there = 0;
+    std::string why;
+    for (const auto& [index, worker] : workers_) {
+        if (lost(*worker, now)) continue;
+        const auto lack = worker->lacks.find(job_id);
+        const bool lacks = lack != worker->lacks.end();
+        if (!lacks && !worker->doubted) return {};
+        if (++there > kNamedHosts) continue;
+        why += (there > 1 ? "; " : "") + worker->hello.host + " (" + worker->id +
+               "): " + (lacks ? lack->second.what : worker->trouble);
+    }
+    if (there > kNamedHosts) why += "; and " + std::to_string(there - kNamedHosts) + " more";
+    return why;
+}
+
+bool WorkerRegistry::others_fell_silent(const std::set<uint32_t>& but, TimePoint since, TimePoint now) const {
+    return std::any_of(workers_.begin(), workers_.end(), [&](const auto& w) {
+        // A worker is last heard of up to a heartbeat, a quarter of a lease at most, before it dies.
+        return !w.second->left && !but.contains(w.first) &&
+               seconds_between(since, w.second->last_heard) >= -0.25 * lease_seconds_ &&
+               seconds_between(w.second->last_heard, now) >= 0.5 * lease_seconds_;
+    });
 }
 
 bool WorkerRegistry::fell_silent(uint32_t index, TimePoint now) {
@@ -94,7 +150,8 @@ bool WorkerRegistry::fell_silent(uint32_t index, TimePoint now) {
 WorkerState WorkerRegistry::state(const WorkerRecord& worker, TimePoint now) const {
     if (lost(worker, now)) return WorkerState::kGone;
     if (!worker.held.empty()) return WorkerState::kBusy;
-    return rests(worker, now) ? WorkerState::kResting : WorkerState::kIdle;
+    const bool lacks = std::any_of(worker.lacks.begin(), worker.lacks.end(), [&](const auto& l) { return now < l.second.until; });
+    return lacks || rests(worker, now) ? WorkerState::kResting : WorkerState::kIdle;
 }
 
 std::vector<WorkerStatus> WorkerRegistry::statuses(TimePoint now, double gone_within_seconds) const {
@@ -118,8 +175,11 @@ std::vector<WorkerStatus> WorkerRegistry::statuses(TimePoint now, double gone_wi
         } else if (w->in_work && w->held.contains(*w->in_work)) {
             status.in_work = w->in_work;
         }
-        if (status.state == WorkerState::kResting)
-            status.note = "failed " + std::to_string(w->failures_in_a_row) + " units in a row";
+        if (status.state == WorkerState::kResting) {
+            const auto lack = std::find_if(w->lacks.begin(), w->lacks.end(), [&](const auto& l) { return now < l.second.until; });
+            status.note =
+                lack != w->lacks.end() ? lack->second.what : "failed " + std::to_string(w->failures_in_a_row) + " units in a row";
+        }
         out.push_back(std::move(status));
     }
     for (const Refused& r : refused_) {

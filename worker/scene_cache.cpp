@@ -38,6 +38,11 @@ Status named(const std::string& what, const Status& status) {
             what + " is lost or damaged in the coordinator's store (" + status.message() + "); submit the scene again"};
 }
 
+/// A file of the cache that cannot be read or written is a fault of this host and not of the unit, which is what the code says.
+Status of_host(const Status& status) {
+    return status.code() == StatusCode::kInternal ? Status(StatusCode::kResourceExhausted, status.message()) : status;
+}
+
 }  // namespace
 
 // "tables" is taken: the client keeps the table cache of its own coordinator there, by default below the same
@@ -91,7 +96,7 @@ Result<AssetManifest> SceneFetcher::file_list(const Digest& root, std::stop_toke
         std::string text;
         const Status got = port_.read_asset(root, 0, [&](std::string_view bytes) -> Status {
             if (text.size() + bytes.size() > kMaxManifestBytes)
-                return {StatusCode::kResourceExhausted, "the scene's file list is too long"};
+                return {StatusCode::kInvalidArgument, "the scene's file list is too long"};
             text += bytes;
             return {};
         });
@@ -138,7 +143,7 @@ Result<AssetManifest> SceneFetcher::lay_out(const Digest& root, const std::files
             keep_within_limit(root, *manifest);
             return manifest;
         }
-        if (status.code() != StatusCode::kDataLoss) return status;
+        if (status.code() != StatusCode::kDataLoss) return of_host(status);
         log_warn("files of scene {} are fetched again: {}", root.hex().substr(0, 12), status.message());
     }
     return status;
@@ -179,7 +184,7 @@ Result<std::string> SceneFetcher::tables(const AssetReference& tables, std::stop
             // attempt is wrong.
             status = data_loss("the tables have the wrong size: " + status.message());
         } else if (status.code() != StatusCode::kDataLoss) {
-            return status;
+            return of_host(status);
         }
         log_warn("tables {} are fetched again: {}", tables.digest.hex().substr(0, 12), status.message());
     }

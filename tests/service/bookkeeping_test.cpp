@@ -28,14 +28,14 @@ TEST(UnitTable, MergedGroupsStillAnswerForTheirUnits) {
     std::vector<WorkUnit> leased;
     for (uint32_t group = 0; group < table.group_total(); ++group) {
         for (uint32_t tile = 0; tile < plan.tile_count(); ++tile) {
-            const auto unit = table.lease(tile, kNever);
+            const auto unit = table.lease(tile, TimePoint(), kNever);
             ASSERT_TRUE(unit);
             leased.push_back(*unit);
             EXPECT_EQ(table.complete(unit->key, tile, digest_of(unit->key)), UnitTable::Completion::kFirst);
         }
         table.advance(group + 1);
     }
-    EXPECT_FALSE(table.lease(0, kNever));
+    EXPECT_FALSE(table.lease(0, TimePoint(), kNever));
     EXPECT_EQ(table.done_count(), table.unit_total());
     EXPECT_EQ(leased.size(), table.unit_total());
     const auto merged = table.merged();
@@ -63,7 +63,7 @@ TEST(UnitTable, MergedGroupsStillAnswerForTheirUnits) {
 /// its merged result, and the table with an entry of nothing.
 TEST(UnitTable, KeysOfOtherKindsAndRoundsAreNobodys) {
     UnitTable table(Plan(whole(100, 60), PlanOptions{}), 3, 8, std::nullopt);
-    const auto unit = table.lease(0, TimePoint());
+    const auto unit = table.lease(0, TimePoint(), TimePoint());
     ASSERT_TRUE(unit);
     for (UnitKey key :
          {UnitKey{0, 0, UnitKind::kRender, 1}, UnitKey{0, 0, UnitKind::kTraining, 0}, UnitKey{0, 0, UnitKind::kProbe, 0}}) {
@@ -83,7 +83,7 @@ TEST(UnitTable, AMillionIterationsNeedNoRoomBeforeTheyAreLeased) {
     const auto begin = std::chrono::steady_clock::now();
     UnitTable table(Plan(whole(4000, 4000), {.light_paths_per_iteration = 4000 * 4000}), 1u << 24, 4, std::nullopt);
     EXPECT_GT(table.group_total(), 1u << 20);
-    EXPECT_TRUE(table.lease(0, kNever));
+    EXPECT_TRUE(table.lease(0, TimePoint(), kNever));
     EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(500));
 }
 
@@ -165,7 +165,7 @@ TEST(TrainingRound, CountsWhatCameAndForgetsWhatIsRefused) {
     constexpr uint64_t kShort = 7, kEarlier = 3 * kTrainingUnitSamples, kCount = 2 * kTrainingUnitSamples + kShort;
     TrainingRound round(UnitKind::kTraining, 1, {kEarlier, kCount, kEarlier + kCount}, std::nullopt);
     EXPECT_EQ(round.samples_done(), kEarlier) << "those of the round before";
-    for (uint32_t unit = 0; unit < 3; ++unit) ASSERT_EQ(round.units().lease(0, kNever)->key.group, unit);
+    for (uint32_t unit = 0; unit < 3; ++unit) ASSERT_EQ(round.units().lease(0, TimePoint(), kNever)->key.group, unit);
     const auto finish = [&](uint32_t unit) {
         const UnitKey key = round.key(unit);
         ASSERT_EQ(key, (UnitKey{unit, 0, UnitKind::kTraining, 1}));
@@ -188,7 +188,7 @@ TEST(TrainingRound, CountsWhatCameAndForgetsWhatIsRefused) {
     EXPECT_FALSE(round.complete());
     EXPECT_EQ(round.bytes(), 202u);
     EXPECT_EQ(round.traced_seconds(), 3.0);
-    ASSERT_EQ(round.units().lease(1, kNever)->key.group, 1u);
+    ASSERT_EQ(round.units().lease(1, TimePoint(), kNever)->key.group, 1u);
     finish(1);
 
     // In the order of the units, not in that of their arrival.

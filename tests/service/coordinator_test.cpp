@@ -117,14 +117,16 @@ TEST(Coordinator, SilentWorkersLoseTheirUnitsAndLateResultsCount) {
     EXPECT_EQ(service.deliver(other, again[0]).outcome, SubmitOutcome::kStale);
 }
 
-TEST(Coordinator, AUnitOverWhichFiveWorkersFallSilentFailsItsJob) {
+TEST(Coordinator, WhoLeavesComesBackOrOnlyWaitedBehindDoesNotMakeAUnitSuspect) {
     FakeService service;
     const std::string id = service.submit(service.spec(300));
     const auto expire = [&] {
         service.now_ms += 11000;
         service.wait(id, [](const JobInfo& j) { return j.unit_leased == 0; });
     };
-    // Neither who says goodbye nor who comes back counts, however often.
+    const std::string able = service.add_worker();
+    const UnitLease first = service.lease(able).at(0);
+    ASSERT_TRUE(service.coordinator->release_unit(able, first.reference(), {}).ok());
     for (int i = 0; i < 8; ++i) {
         const std::string orderly = service.add_worker();
         EXPECT_EQ(service.lease(orderly).size(), 1u);
@@ -132,35 +134,18 @@ TEST(Coordinator, AUnitOverWhichFiveWorkersFallSilentFailsItsJob) {
         const std::string back = service.add_worker();
         const auto lease = service.lease(back);
         ASSERT_EQ(lease.size(), 1u);
+        EXPECT_EQ(lease[0].unit.key, first.unit.key);
         expire();
         EXPECT_TRUE(service.coordinator->heartbeat(back, {{lease[0].reference(), true}})->empty());
+        EXPECT_EQ(service.lease(back).size(), 1u) << "it does not run alone";
         ASSERT_TRUE(service.coordinator->goodbye(back).ok());
     }
-    // Nor does a unit that only waited behind the one in work: the first rounds do not count for the unit of the later ones.
-    std::vector<std::string> names;
-    UnitKey unit;
-    for (int i = 0; i < 9; ++i) {
-        EXPECT_EQ(service.coordinator->get_job(id)->state, JobState::kRunning);
-        if (i == 4) {
-            const std::string able = service.add_worker();
-            EXPECT_EQ(service.deliver(able, service.lease(able).at(0)).outcome, SubmitOutcome::kAccepted);
-            names.clear();
-        }
-        names.push_back(service.add_worker());
-        const auto in_work = service.lease(names.back()), behind = service.lease(names.back());
-        ASSERT_EQ(in_work.size(), 1u);
-        ASSERT_EQ(behind.size(), 1u);
-        unit = in_work[0].unit.key;
-        service.now_ms += 500;
-        const std::vector<RunningUnit> running{{behind[0].reference(), false}, {in_work[0].reference(), true}};
-        ASSERT_TRUE(service.coordinator->heartbeat(names.back(), running).ok());
-        expire();
-    }
-    const JobInfo info = service.wait_end(id);
-    EXPECT_EQ(info.state, JobState::kFailed);
-    const std::string name = std::to_string(unit.group) + "/" + std::to_string(unit.tile);
-    EXPECT_TRUE(info.message.starts_with("unit " + name + ": 5 workers")) << info.message;
-    for (const std::string& worker : names) EXPECT_NE(info.message.find(worker), std::string::npos) << info.message;
+    // The unit behind the one in work is not blamed, however often that happens.
+    const std::string dying = service.add_worker();
+    const auto in_work = service.lease(dying), behind = service.lease(dying);
+    ASSERT_EQ(in_work.size() + behind.size(), 2u);
+    expire();
+    EXPECT_EQ(service.coordinator->get_job(id)->state, JobState::kRunning);
 }
 
 TEST(Coordinator, DifferentBytesForAMergedUnitAreAnAlarm) {

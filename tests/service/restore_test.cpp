@@ -189,7 +189,7 @@ TEST(RestoredUnitTable, KnowsEveryResultAndLeasesTheOthers) {
             EXPECT_EQ(table.complete(result.unit, 9, sha256("other")), UnitTable::Completion::kDuplicateDifferent);
         }
         std::set<UnitKey> rest;
-        while (const auto unit = table.lease(1, kNever)) {
+        while (const auto unit = table.lease(1, TimePoint(), kNever)) {
             rest.insert(unit->key);
             if (unit->key.group > 6) break;
             EXPECT_EQ(table.complete(unit->key, 1, digest_of(unit->key)), UnitTable::Completion::kFirst);

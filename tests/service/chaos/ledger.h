@@ -10,7 +10,8 @@
 
 namespace lightloom::chaos {
 
-/// What a coordinator does not promise today and is to promise. Each is met and counted until the loop is told to expect better.
+/// What a coordinator did not always promise. kBlame is expected to hold; the others are met and counted until the loop is told to
+/// expect better.
 enum class Limit {
     kDurable,  ///< A coordinator that died has lost an accepted job.
     kBlame,    ///< A job failed because of workers that died or had no room, although its units are sound.

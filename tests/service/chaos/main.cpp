@@ -60,7 +60,7 @@ int main(int argc, char** argv) {
     double minutes = 0;
     uint64_t seed = 1, phases = 0;
     std::optional<uint64_t> first;
-    std::vector<std::string> allow = {"blame", "healing"}, kinds;
+    std::vector<std::string> allow = {"healing"}, kinds;
     std::string ledger_file, level = "info";
     RunOptions options;
     const auto minutes_option =
@@ -76,7 +76,8 @@ int main(int argc, char** argv) {
         ->delimiter(',');
     app.add_option(
            "--allow", allow,
-           "What is counted, but is no violation: durable (an accepted job is lost with the coordinator), blame (a job fails because "
+           "What is counted, but is no violation: durable (an accepted job is lost with the coordinator), blame (a job fails "
+           "because "
            "of its workers' deaths), healing (a damaged file of the coordinator fails a job whose client is gone), log (a log that "
            "nobody reads stops the farm), none")
         ->type_name("LIMIT,...")
