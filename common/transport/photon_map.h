@@ -1,0 +1,82 @@
+#pragma once
+// PhotonMap: the vertices of an iteration's light sub-paths, found by place. Radii differ from one camera sub-path to the next and
+// from place to place, so that it is a balanced k-d tree over the points and not a grid: a query costs as much as it has
+// neighbours, whatever its radius.
+//
+// What a query finds, and in which order, is a function of the photons alone: each split parts its photons by position and, where
+// positions are equal, by number, and a leaf has them in the order of their numbers.
+
+#include <bit>
+#include <cstdint>
+#include <vector>
+
+#include "common/transport/light_cache.h"
+
+namespace lightloom {
+
+class PhotonMap {
+  public:
+    PhotonMap() = default;
+    /// Holds every vertex but y_0 of the cache's paths that can be merged (LightVertex::smooth). The cache must outlive the map.
+    explicit PhotonMap(const LightCache& cache);
+
+    size_t size() const { return photons_.size(); }
+
+    /// Where a sub-path's first s vertices lie in the cache; the photon is the last of them.
+    struct End {
+        uint32_t first_vertex = 0;  ///< See LightCache::at().
+        uint32_t s = 0;
+    };
+
+    /// Calls visit(end, distance2) for every photon closer to `p` than the radius, whose square is `radius2`.
+    template <class Visit>
+    LL_ALWAYS_INLINE inline void for_each_near(const Vec3& p, float radius2, Visit&& visit) const {
+        if (photons_.empty()) return;
+        Range stack[kMostLevels];
+        int depth = 0;
+        Range range{0, 0, uint32_t(photons_.size())};
+        while (true) {
+            while (range.end - range.begin > kLeaf) {
+                const Node node = nodes_[range.node];
+                const float beyond = p[int(node.axis)] - node.split;
+                const uint32_t middle = range.middle();
+                const Range low{2 * range.node + 1, range.begin, middle}, high{2 * range.node + 2, middle, range.end};
+                const bool below = beyond < 0;
+                if (beyond * beyond < radius2) stack[depth++] = below ? high : low;
+                range = below ? low : high;
+            }
+            for (uint32_t i = range.begin; i < range.end; ++i) {
+                const float distance2 = length_squared(photons_[i].p - p);
+                if (distance2 < radius2) visit(ends_[i], distance2);
+            }
+            if (depth == 0) return;
+            range = stack[--depth];
+        }
+    }
+
+  private:
+    static constexpr uint32_t kLeaf = 8;
+    static constexpr int kMostLevels = 32;
+
+    struct Photon {
+        Vec3 p;
+        uint32_t number = 0;  ///< In the order of the paths.
+    };
+    struct Node {
+        float split = 0;
+        uint32_t axis = 0;
+    };
+    /// The photons of a node: its children have the halves.
+    struct Range {
+        uint32_t node, begin, end;
+        uint32_t middle() const { return begin + (end - begin) / 2; }
+    };
+
+    void build(Range range, const Bounds3& bounds);
+
+    std::vector<Photon, HugePageAllocator<Photon>> photons_;
+    std::vector<End, HugePageAllocator<End>> ends_;  ///< Of photons_.
+    std::vector<Node> nodes_;                        ///< A heap: the children of node i are 2 i + 1 and 2 i + 2.
+};
+
+}  // namespace lightloom
