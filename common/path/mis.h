@@ -176,11 +176,7 @@ double mis_weight(const PathView& view, Technique own, const OnPath& on, Heurist
         if constexpr (OnPath::kMerges) {
             if (i < 1 || i > k - 1 || view.delta[i] || own == Technique::merge(i)) return;
             const double factor = on.merge(i);
-            if (factor > 0) {
-                WideProduct merged = chain;
-                merged.multiply(view.fwd[i]);
-                ratios.add(merged.value(factor * inv_own), earlier);
-            }
+            if (factor > 0) ratios.add(chain.value(factor * view.fwd[i] * inv_own), earlier);
         }
     };
     if (own.kind == TechniqueKind::kMerge) split(base, WideProduct{}, true);

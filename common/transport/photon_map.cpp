@@ -33,13 +33,16 @@ PhotonMap::PhotonMap(const LightCache& cache) {
     uint32_t count = 0;
     for (uint32_t& n : next) n = std::exchange(count, count + n);
 
-    photons_.resize(count);
-    std::vector<End, HugePageAllocator<End>> by_number(count);
+    struct End {
+        uint32_t first_vertex, s;
+    };
+    std::vector<Point, HugePageAllocator<Point>> points(count);
+    std::vector<End, HugePageAllocator<End>> ends(count);
     in_parts([&](size_t part, const LightCache::Path& path, const LightVertex* y) {
         for_each_photon(y, path.length, [&](uint32_t s) {
             const uint32_t number = next[part]++;
-            photons_[number] = {y[s - 1].p, number};
-            by_number[number] = {path.first_vertex, s};
+            points[number] = {y[s - 1].p, number};
+            ends[number] = {path.first_vertex, s};
         });
     });
 
@@ -49,30 +52,32 @@ PhotonMap::PhotonMap(const LightCache& cache) {
         for (uint32_t largest = count; largest > kLeaf; largest = (largest + 1) / 2) nodes = 2 * nodes + 1;
         nodes_.resize(nodes / 2);
         Bounds3 bounds;
-        for (const Photon& photon : photons_) bounds.extend(photon.p);
-        build({0, 0, count}, bounds);
+        for (const Point& point : points) bounds.extend(point.p);
+        build(points.data(), {0, 0, count}, bounds);
     }
-    ends_.resize(count);
+    photons_.resize(count);
     fork_join(parts, [&](size_t first, size_t last) {
         const size_t share = (size_t(count) + parts - 1) / parts;
-        for (size_t i = first * share; i < std::min<size_t>(count, last * share); ++i) ends_[i] = by_number[photons_[i].number];
+        for (size_t i = first * share; i < std::min<size_t>(count, last * share); ++i) {
+            const End& end = ends[points[i].number];
+            photons_[i] = {points[i].p, end.first_vertex, end.s};
+        }
     });
 }
 
-void PhotonMap::build(Range range, const Bounds3& bounds) {
-    const auto begin = photons_.begin();
+void PhotonMap::build(Point* points, Range range, const Bounds3& bounds) {
     if (range.end - range.begin <= kLeaf) {
-        std::sort(begin + range.begin, begin + range.end, [](const Photon& a, const Photon& b) { return a.number < b.number; });
+        std::sort(points + range.begin, points + range.end, [](const Point& a, const Point& b) { return a.number < b.number; });
         return;
     }
     const Vec3 extent = bounds.hi - bounds.lo;
     const uint32_t axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
     const uint32_t middle = range.middle();
-    std::nth_element(begin + range.begin, begin + middle, begin + range.end, [axis](const Photon& a, const Photon& b) {
+    std::nth_element(points + range.begin, points + middle, points + range.end, [axis](const Point& a, const Point& b) {
         const float pa = a.p[int(axis)], pb = b.p[int(axis)];
         return pa < pb || (pa == pb && a.number < b.number);
     });
-    const float split = photons_[middle].p[int(axis)];
+    const float split = points[middle].p[int(axis)];
     nodes_[range.node] = {split, axis};
     Bounds3 low = bounds, high = bounds;
     if (axis == 0) low.hi.x = high.lo.x = split;
@@ -80,7 +85,7 @@ void PhotonMap::build(Range range, const Bounds3& bounds) {
     if (axis == 2) low.hi.z = high.lo.z = split;
     const Range halves[] = {{2 * range.node + 1, range.begin, middle}, {2 * range.node + 2, middle, range.end}};
     const auto both = [&](size_t first, size_t last) {
-        for (size_t half = first; half < last; ++half) build(halves[half], half == 0 ? low : high);
+        for (size_t half = first; half < last; ++half) build(points, halves[half], half == 0 ? low : high);
     };
     constexpr uint32_t kWorthATask = 8192;
     if (range.end - range.begin > kWorthATask)

@@ -22,13 +22,13 @@ class PhotonMap {
 
     size_t size() const { return photons_.size(); }
 
-    /// Where a sub-path's first s vertices lie in the cache; the photon is the last of them.
-    struct End {
-        uint32_t first_vertex = 0;  ///< See LightCache::at().
-        uint32_t s = 0;
+    struct Photon {
+        Vec3 p;
+        /// Where a sub-path's first s vertices lie in the cache, see LightCache::at(); the photon is the last of them.
+        uint32_t first_vertex = 0, s = 0;
     };
 
-    /// Calls visit(end, distance2) for every photon closer to `p` than the radius, whose square is `radius2`.
+    /// Calls visit(photon, distance2) for every photon closer to `p` than the radius, whose square is `radius2`.
     template <class Visit>
     LL_ALWAYS_INLINE inline void for_each_near(const Vec3& p, float radius2, Visit&& visit) const {
         if (photons_.empty()) return;
@@ -47,7 +47,7 @@ class PhotonMap {
             }
             for (uint32_t i = range.begin; i < range.end; ++i) {
                 const float distance2 = length_squared(photons_[i].p - p);
-                if (distance2 < radius2) visit(ends_[i], distance2);
+                if (distance2 < radius2) visit(photons_[i], distance2);
             }
             if (depth == 0) return;
             range = stack[--depth];
@@ -55,10 +55,11 @@ class PhotonMap {
     }
 
   private:
-    static constexpr uint32_t kLeaf = 8;
+    static constexpr uint32_t kLeaf = 16;
     static constexpr int kMostLevels = 32;
 
-    struct Photon {
+    /// A photon while the tree is built.
+    struct Point {
         Vec3 p;
         uint32_t number = 0;  ///< In the order of the paths.
     };
@@ -72,11 +73,10 @@ class PhotonMap {
         uint32_t middle() const { return begin + (end - begin) / 2; }
     };
 
-    void build(Range range, const Bounds3& bounds);
+    void build(Point* points, Range range, const Bounds3& bounds);
 
     std::vector<Photon, HugePageAllocator<Photon>> photons_;
-    std::vector<End, HugePageAllocator<End>> ends_;  ///< Of photons_.
-    std::vector<Node> nodes_;                        ///< A heap: the children of node i are 2 i + 1 and 2 i + 2.
+    std::vector<Node> nodes_;  ///< A heap: the children of node i are 2 i + 1 and 2 i + 2.
 };
 
 }  // namespace lightloom

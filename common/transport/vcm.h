@@ -199,11 +199,11 @@ struct VcmAlgorithm {
             }
             count = 0;
         };
-        state.photons.for_each_near(v.p, radius2, [&](const PhotonMap::End& end, float distance2) {
-            if (end.s > longest) return;
-            const LightVertex* y = state.cache.at(end.first_vertex);
-            prefetch(&y[end.s - 1]);
-            near[count++] = {y, int(end.s), distance2};
+        state.photons.for_each_near(v.p, radius2, [&](const PhotonMap::Photon& photon, float distance2) {
+            if (photon.s > longest) return;
+            const LightVertex* y = state.cache.at(photon.first_vertex);
+            for (uint32_t i = 0; i < photon.s; ++i) prefetch(&y[i]);
+            near[count++] = {y, int(photon.s), distance2};
             if (count == near.size()) merge_all();
         });
         merge_all();

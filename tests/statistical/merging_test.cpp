@@ -45,7 +45,9 @@ TEST(Merging, BiasFallsAsTheRadius) {
             const double error = std::sqrt(merged.variance + expected.variance) / expected.mean;
             EXPECT_LT(error, 0.004);
             EXPECT_GT(bias, 0) << kernel << ", radius " << radius;
-            if (last > 0) EXPECT_NEAR(bias / last, 0.5, 0.1 + 4 * error / last) << kernel << ", radius " << radius;
+            if (last > 0) {
+                EXPECT_NEAR(bias / last, 0.5, 0.1 + 4 * error / last) << kernel << ", radius " << radius;
+            }
             last = bias;
         }
         EXPECT_LT(last, 0.05) << kernel;

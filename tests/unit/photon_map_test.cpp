@@ -33,7 +33,7 @@ LightCache scattered(int count, uint64_t seed, const Vec3& size) {
 
 std::vector<Place> found(const PhotonMap& map, const LightCache& cache, const Vec3& p, float radius) {
     std::vector<Place> places;
-    map.for_each_near(p, radius * radius, [&](const PhotonMap::End& end, float distance2) {
+    map.for_each_near(p, radius * radius, [&](const PhotonMap::Photon& end, float distance2) {
         const auto path = std::find_if(cache.paths.begin(), cache.paths.end(), [&](const LightCache::Path& candidate) {
             return candidate.length > 0 && candidate.first_vertex == end.first_vertex;
         });
