@@ -50,10 +50,24 @@ constexpr ParameterInfo kPhotonPaths{
     "N1 and n: light sub-paths per pixel and iteration; all of them splat, all of their vertices are "
     "photons, and every camera sample is connected to one of them"};
 
-constexpr ParameterInfo kParameters[] = {
-    kRouletteByAlbedo, kRouletteStart,   kRouletteMin, kHeuristic,  kNextEvent, kPhotonPaths,
-    kMergeRadius,      kMergeRadiusUnit, kAlpha,       kMergeFirst, kKernel,    emission_parameter(false),
-    kEmissionTraining};
+constexpr std::string_view kCounts[] = {"off", "on", "one"};
+constexpr ParameterInfo kCorrelationAware{"correlation-aware",
+                                          1,
+                                          0,
+                                          2,
+                                          true,
+                                          "weights know that all merges of a camera sub-path share it [Grittmann et al. 2021]; "
+                                          "one: they count as one [Popov et al. 2015]",
+                                          kCounts};
+
+constexpr ParameterInfo kParameters[] = {kRouletteByAlbedo,    kRouletteStart,
+                                         kRouletteMin,         kHeuristic,
+                                         kTechniquesOfMerging, kNextEvent,
+                                         kPhotonPaths,         kMergeRadius,
+                                         kMergeRadiusUnit,     kAlpha,
+                                         kMergeFirst,          kKernel,
+                                         kCorrelationAware,    emission_parameter(false),
+                                         kEmissionTraining};
 
 MergeRadius radius_of(const AlgorithmSettings& s, const Scene& scene) {
     const double value = s.value(kMergeRadius.name), scene_radius = double(scene.emitters().scene_radius());
@@ -74,7 +88,8 @@ Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     const VcmSelection first{{double(r.light_paths_per_iteration()), next_event_of(s)},
                              radius_of(s, *r.scene),
                              MergeKernel(int(s.value(kKernel.name))),
-                             s.value(kMergeFirst.name) != 0};
+                             s.value(kMergeFirst.name) != 0,
+                             MergeCount(int(s.value(kCorrelationAware.name)))};
     return make_unit_renderer(r, [&](auto&& select) {
         return VcmAlgorithm<std::remove_cvref_t<decltype(select)>>{select, first, s.value(kAlpha.name), heuristic_of(s)};
     });

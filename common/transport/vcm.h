@@ -15,7 +15,9 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 
+#include "common/path/correlation.h"
 #include "common/transport/bdpt.h"
 #include "common/transport/photon_map.h"
 
@@ -39,22 +41,34 @@ inline float kernel(MergeKernel kind, float distance2, float radius2) {
     return kind == MergeKernel::kConstant ? constant : 2 * constant * (1 - distance2 / radius2);
 }
 
+/// How many of the n photon paths that one camera sub-path may merge with count in the weights.
+enum class MergeCount : uint8_t {
+    kAll,         ///< Georgiev et al. 2012.
+    kCorrelated,  ///< As far as they are independent [Grittmann, Georgiev and Slusallek 2021]; common/path/correlation.h.
+    kOne,         ///< A camera sub-path is one sample, whatever it merges with [as for connections: Popov et al. 2015].
+};
+
 struct VcmSelection {
     BdptSelection bdpt;
     MergeRadius radius;
     MergeKernel kernel = MergeKernel::kConstant;
     bool first_hit = false;  ///< Whether merges at x_{k-1} count.
+    MergeCount count = MergeCount::kAll;
 
     struct OnPath : BdptSelection::OnPath {
         static constexpr bool kMerges = true;
         double merges;
         int last;  ///< Last vertex that may merge.
+        std::optional<MergeCorrelation> correlation;
 
-        double merge(int i) const { return i <= last ? merges : 0; }
+        double merge(int i) const { return i > last ? 0 : correlation ? merges * (*correlation)(i) : merges; }
     };
     OnPath on(const PathView& view) const {
         const double area = kPiD * radius.squared(view.footprint_distance2) * (kernel == MergeKernel::kConstant ? 1 : 0.75);
-        return {bdpt.on(view), bdpt.light_paths_per_iteration * area, first_hit ? view.k - 1 : view.k - 2};
+        const double n = count == MergeCount::kOne ? 1 : bdpt.light_paths_per_iteration;
+        OnPath path{bdpt.on(view), n * area, first_hit ? view.k - 1 : view.k - 2, {}};
+        if (count == MergeCount::kCorrelated) path.correlation.emplace(view, n);
+        return path;
     }
     NextEventRays next_event_rays() const { return bdpt.rays; }
 };
@@ -67,10 +81,14 @@ struct VcmMethod {
     static constexpr ViewDetail kDetail = ViewDetail::kFull;
     void label_light_path(const Scene&, PathVertex*, int) const {}
     void label_camera_vertex(const Scene&, PathVertex*) const {}
-    /// Sets PathView::footprint_distance2 of a path.
-    void complete(const Scene&, const LightSubPath& y, int s, const PathVertex* z, int t, const Vec3&, PathView* view) const {
-        view->footprint_distance2 =
-            t >= 2 ? camera_distance2(z, t) : double(length_squared(y[s - 1].p - z[0].p));  // x_{k-1} is no Dirac vertex then
+    /// Sets footprint_distance2, primary_distance2 and source of a path's view.
+    void complete(const Scene& scene, const LightSubPath& y, int s, const PathVertex* z, int t, const Vec3&, PathView* view) const {
+        const EmitterSet& emitters = scene.emitters();
+        const bool hit = s == 0 && view->k == t - 1;
+        const int32_t emitter = s > 0 ? y[0].emitter : hit ? z[t - 1].emitter : emitters.environment_index();
+        view_footprint(emitters[uint32_t(emitter)], y, s, z, t, view);
+        // With t = 1, x_{k-1} is no Dirac vertex.
+        view->footprint_distance2 = t >= 2 ? camera_distance2(z, t) : view->primary_distance2;
     }
     /// The same for every path with the camera sub-path z[0 .. t-1], t >= 2: along it from the lens to its first vertex that is not
     /// a Dirac vertex.
@@ -151,20 +169,26 @@ struct VcmAlgorithm {
 
         const NextEventRays rays = state.selection.next_event_rays();
         CameraSampler sampler(context.seed, context.iteration, context.pixel);
+        // What VcmMethod::complete() sets: the same for all paths of a camera sub-path but for the kind of light.
+        const auto weigh = [&](const PathContribution& c, PathView& v) LL_ALWAYS_INLINE {
+            v.source = light_source(scene.emitters()[c.emitter]);
+            contribute(c, v);
+        };
         const auto visit = [&](int t) {
+            if (t == 2) view.primary_distance2 = double(length_squared(z[1].p - z[0].p));
             view.footprint_distance2 = method.camera_distance2(z, t);
-            contribute_hit<ViewDetail::kFull>(scene, z, t, &view, contribute);
+            contribute_hit<ViewDetail::kFull>(scene, z, t, &view, weigh);
             if (t > context.max_edges || !z[t - 1].bsdf.has_smooth_lobe()) return;
-            contribute_next_event<ViewDetail::kFull>(scene, z, t, sampler, rays(t), &view, &context.counters, contribute);
+            contribute_next_event<ViewDetail::kFull>(scene, z, t, sampler, rays(t), &view, &context.counters, weigh);
             for (int s = 2; s <= n && s + t - 1 <= context.max_edges; ++s) {
                 if (!y[s - 1].smooth) continue;
                 if (const Rgb c = connect(scene, y, s, z, t, &view, &context.counters); !c.is_black())
-                    contribute(from_light_path(c, Technique::connect(s), y, z, t), view);
+                    weigh(from_light_path(c, Technique::connect(s), y, z, t), view);
             }
-            if (t > 2 || first.first_hit) merge_near(context, state, t, &view, contribute);
+            if (t > 2 || first.first_hit) merge_near(context, state, t, &view, weigh);
         };
         const auto escape = [&](int t, const WalkRay& ray) {
-            if (t <= context.max_edges) contribute_escape<ViewDetail::kFull>(scene, z, t, ray, &view, contribute);
+            if (t <= context.max_edges) contribute_escape<ViewDetail::kFull>(scene, z, t, ray, &view, weigh);
         };
         return trace_camera_path<branches>(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z,
                                            &context.counters, visit, escape);
