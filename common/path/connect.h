@@ -1,5 +1,5 @@
 #pragma once
-// The four ways to complete a path. Each function returns the unweighted contribution, black when the technique fails,
+// The five ways to complete a path. Each function returns the unweighted contribution, black when the technique fails,
 // and fills in the PathView of the full path. Visibility is tested here; the weight is computed elsewhere (mis.h).
 //
 // Camera sub-path z[0..t-1] (z_0 on the lens), light sub-path y[0..s-1]; the full path has k = s + t - 1 edges,
@@ -215,6 +215,34 @@ inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, Vec
     const Emitter& e = scene.emitters()[uint32_t(y[0].emitter)];
     view->discrete_source = e.is_discrete();
     view->next_event = scene.emitters().pdf_next_event(e, y[1].p, y[0].p, y[0].ng, y[1].wo);
+    return contribution;
+}
+
+/// 2 <= s, 2 <= t: y_{s-1} and z_{t-1} lie next to one another and count as one vertex x_i of a path of k = s + t - 2 edges,
+/// i = s - 1, scattered by the material and with the frame that z_{t-1} has. Returns the contribution without the kernel, m^2:
+/// the flux of the light sub-path times what the camera sub-path makes of the irradiance of one watt per square metre.
+template <class Vertex>
+Rgb merge(const Scene& scene, const Vertex* y, int s, const PathVertex* z, int t, PathView* view) {
+    const Vertex& a = y[s - 1];
+    const PathVertex& b = z[t - 1];
+    const Vec3 wi = b.shading.to_local(a.wo);
+    const float arriving = abs_dot(b.ng, a.wo);
+    if (!(arriving > 0)) return {};
+    const BsdfEval e = b.bsdf.eval(b.wo_local, wi, TransportMode::kRadiance);
+    // The light sub-path's flux per area has the geometric cosine, the camera's scattering the shading one.
+    const Rgb contribution = b.alpha * e.f * a.alpha * (std::fabs(wi.z) / arriving);
+    if (contribution.is_black()) return {};
+    const int i = s - 1, k = s + t - 2;
+    view->k = k;
+    view_light_prefix(y, s, view);
+    view_camera_suffix(z, t, k, view);
+    view->delta[i] = false;
+    view->fwd[i] = a.fwd;
+    view->rev[i - 1] = double(e.pdf_fwd) * a.to_previous;
+    if (t >= 3) view->fwd[i + 1] = double(e.pdf_rev) * b.to_previous;
+    const Emitter& emitter = scene.emitters()[uint32_t(y[0].emitter)];
+    view->discrete_source = emitter.is_discrete();
+    view->next_event = scene.emitters().pdf_next_event(emitter, y[1].p, y[0].p, y[0].ng, y[1].wo);
     return contribution;
 }
 

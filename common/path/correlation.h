@@ -11,30 +11,63 @@
 
 namespace lightloom {
 
+/// The measure of a light's x_0.
+inline PathView::Source light_source(const Emitter& e) {
+    return e.is_discrete() ? PathView::Source::kDiscrete : e.is_infinite() ? PathView::Source::kDirection : PathView::Source::kArea;
+}
+
 /// Sets what correlation_factor() reads of a path that starts on `e` and was made from light prefix y[0 .. s-1] and
 /// camera suffix z[0 .. t-1].
 inline void view_footprint(const Emitter& e, const LightSubPath& y, int s, const PathVertex* z, int t, PathView* view) {
     view->primary_distance2 = double(length_squared((t >= 2 ? z[1].p : y[s - 1].p) - z[0].p));
-    view->source = e.is_discrete()   ? PathView::Source::kDiscrete
-                   : e.is_infinite() ? PathView::Source::kDirection
-                                     : PathView::Source::kArea;
+    view->source = light_source(e);
 }
+
+/// pi tan^2 of the paper's one degree: the radius is that share of the length of the camera's first edge.
+inline constexpr double kCorrelationDisc = 3.14159265358979323846 * 0.017455064928217585 * 0.017455064928217585;
 
 /// c_s in [1/n, 1]: of n connections that split the path after s light vertices, n c_s count. The factor is a function
 /// of the path and n; it reads what view_footprint() wrote.
 inline double correlation_factor(const PathView& view, int s, double n) {
-    constexpr double kDisc = 3.14159265358979323846 * 0.017455064928217585 * 0.017455064928217585;  // pi tan^2(1 degree)
-    const double area = kDisc * view.primary_distance2;
+    const double area = kCorrelationDisc * view.primary_distance2;
     // Shares of either sub-path's neighbours within the radius; a Dirac event has no neighbour but itself.
     double camera = 1, light = 1;
     for (int i = s; i < view.k; ++i)
         if (i + 1 == view.k || !view.delta[i + 1]) camera *= std::min(area * view.rev[i], 1.0);
     if (view.source == PathView::Source::kArea) light *= std::min(area * view.fwd[0], 1.0);
-    if (view.source == PathView::Source::kDirection) light *= std::min(kDisc * view.fwd[0], 1.0);
+    if (view.source == PathView::Source::kDirection) light *= std::min(kCorrelationDisc * view.fwd[0], 1.0);
     for (int i = 1; i < s; ++i)
         if (!view.delta[i - 1]) light *= std::min(area * view.fwd[i], 1.0);
     const double either = camera + light * (1 - camera);  // rounds to no less than `camera`
     return either > 0 ? std::max(camera / either, 1 / n) : 1;
 }
+
+/// The same for merges: c_i in [1/n, 1] of the n light sub-paths that may merge with one camera sub-path at x_i. Both end
+/// at x_i, so that the factors of all i are products of prefixes.
+class MergeCorrelation {
+  public:
+    /// Reads what correlation_factor() reads. `n` >= 1.
+    MergeCorrelation(const PathView& view, double n) {
+        const double area = kCorrelationDisc * view.primary_distance2;
+        double product = 1;
+        for (int i = view.k - 1; i >= 1; --i) {
+            if (i + 1 == view.k || !view.delta[i + 1]) product *= std::min(area * view.rev[i], 1.0);
+            factor_[i] = product;
+        }
+        product = view.source == PathView::Source::kDiscrete    ? 1
+                  : view.source == PathView::Source::kDirection ? std::min(kCorrelationDisc * view.fwd[0], 1.0)
+                                                                : std::min(area * view.fwd[0], 1.0);
+        for (int i = 1; i < view.k; ++i) {
+            if (!view.delta[i - 1]) product *= std::min(area * view.fwd[i], 1.0);
+            const double camera = factor_[i], either = camera + product * (1 - camera);
+            factor_[i] = either > 0 ? std::max(camera / either, 1 / n) : 1;
+        }
+    }
+    /// 1 <= i < k.
+    double operator()(int i) const { return factor_[i]; }
+
+  private:
+    double factor_[kMaxEdges + 1];
+};
 
 }  // namespace lightloom

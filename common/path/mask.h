@@ -13,6 +13,7 @@ struct TechniqueMask {
     int only_s = -1;                                            ///< Only this split remains; -1: all do.
     int min_k = 1, max_k = kMaxEdges;                           ///< Lengths of paths, in edges, that remain.
     int max_light_vertices = kMaxEdges;                         ///< Light sub-paths have at most this many.
+    bool visible_stays = false;                                 ///< Directly visible emitters remain, hits or not.
 
     static TechniqueMask without(TechniqueKind kind) {
         TechniqueMask mask;
@@ -21,8 +22,21 @@ struct TechniqueMask {
     }
     static TechniqueMask length(int k) { return {.min_k = k, .max_k = k}; }
 
+    /// What both leave; `only_s` is that of either.
+    TechniqueMask both(const TechniqueMask& other) const {
+        TechniqueMask out = *this;
+        for (int kind = 0; kind < kTechniqueKinds; ++kind) out.on[kind] &= other.on[kind];
+        out.min_k = std::max(min_k, other.min_k);
+        out.max_k = std::min(max_k, other.max_k);
+        out.max_light_vertices = std::min(max_light_vertices, other.max_light_vertices);
+        if (only_s < 0) out.only_s = other.only_s;
+        constexpr int kHit = int(TechniqueKind::kHit);
+        out.visible_stays = (on[kHit] || visible_stays) && (other.on[kHit] || other.visible_stays);
+        return out;
+    }
     bool allows(int k, Technique t) const {
-        return on[int(t.kind)] && k >= min_k && k <= max_k && t.light_vertices() <= max_light_vertices &&
+        const bool visible = k == 1 && visible_stays && t.kind == TechniqueKind::kHit;
+        return (on[int(t.kind)] || visible) && k >= min_k && k <= max_k && t.light_vertices() <= max_light_vertices &&
                (only_s < 0 || t.s == only_s);
     }
 };

@@ -65,6 +65,7 @@ namespace detail {
 /// Collects ratios rho_other / rho_own under one heuristic.
 struct RatioSum {
     Heuristic heuristic;
+    double tie = 0;  ///< For the maximum heuristic: ratios closer to 1 are ties.
     double sum = 0;
     bool beaten = false;
 
@@ -73,7 +74,7 @@ struct RatioSum {
         switch (heuristic) {
             case Heuristic::kBalance: sum += ratio; break;
             case Heuristic::kPower: sum += ratio * ratio; break;
-            case Heuristic::kMaximum: beaten |= earlier ? ratio >= 1 : ratio > 1; break;
+            case Heuristic::kMaximum: beaten |= earlier ? ratio >= 1 - tie : ratio > 1 + tie; break;
         }
     }
     double weight() const { return heuristic == Heuristic::kMaximum ? (beaten ? 0.0 : 1.0) : 1 / (1 + sum); }
@@ -157,7 +158,9 @@ double mis_weight(const PathView& view, Technique own, const OnPath& on, Heurist
     }
     if (!(own_sigma > 0)) return 0;
     const double inv_own = 1 / own_sigma;
-    detail::RatioSum ratios{heuristic};
+    // Merges at both ends of an edge between diffuse surfaces are always as likely: rounding, different in each technique's view,
+    // must not decide between them.
+    detail::RatioSum ratios{heuristic, OnPath::kMerges ? 1e-4 : 0};
     const auto add = [&](double other_sigma, const WideProduct& chain, bool earlier) LL_ALWAYS_INLINE {
         if (other_sigma > 0) ratios.add(chain.value(other_sigma * inv_own), earlier);
     };
@@ -176,11 +179,7 @@ double mis_weight(const PathView& view, Technique own, const OnPath& on, Heurist
         if constexpr (OnPath::kMerges) {
             if (i < 1 || i > k - 1 || view.delta[i] || own == Technique::merge(i)) return;
             const double factor = on.merge(i);
-            if (factor > 0) {
-                WideProduct merged = chain;
-                merged.multiply(view.fwd[i]);
-                ratios.add(merged.value(factor * inv_own), earlier);
-            }
+            if (factor > 0) ratios.add(chain.value(factor * view.fwd[i] * inv_own), earlier);
         }
     };
     if (own.kind == TechniqueKind::kMerge) split(base, WideProduct{}, true);

@@ -34,6 +34,8 @@ struct PathView {
     enum class Source : uint8_t { kArea, kDirection, kDiscrete } source = Source::kArea;  ///< * Measure of fwd[0].
     /// Density of x_0 under next event estimation from x_1, native measure, pmf included.
     double next_event = 0;
+    /// Of algorithms that merge only: squared distance that the radius of merges is in proportion to; see VcmMethod::complete().
+    double footprint_distance2 = 0;
     bool discrete_source = false;  ///< x_0 is one of countably many: fwd[0] and next_event are probabilities.
 };
 

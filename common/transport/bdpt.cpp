@@ -9,8 +9,9 @@ extern const AlgorithmInfo kBdptRow;
 
 namespace {
 
-constexpr ParameterInfo kParameters[] = {kRouletteByAlbedo,         kRouletteStart,   kRouletteMin, kHeuristic, kNextEvent,
-                                         emission_parameter(false), kEmissionTraining};
+constexpr ParameterInfo kParameters[] = {
+    kRouletteByAlbedo,         kRouletteStart,   kRouletteMin, kHeuristic, kTechniques, kNextEvent,
+    emission_parameter(false), kEmissionTraining};
 
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     return make_unit_renderer(r, [&](auto&& select) {

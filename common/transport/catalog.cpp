@@ -7,12 +7,12 @@
 namespace lightloom {
 
 // Each is defined in the algorithm's own file.
-extern const AlgorithmInfo kPathRow, kLightRow, kBdptRow, kLvcbptRow, kSpcbptRow;
+extern const AlgorithmInfo kPathRow, kLightRow, kBdptRow, kLvcbptRow, kSpcbptRow, kVcmRow;
 
 namespace {
 
 std::vector<const AlgorithmInfo*>& rows() {
-    static std::vector<const AlgorithmInfo*> rows{&kPathRow, &kLightRow, &kBdptRow, &kLvcbptRow, &kSpcbptRow};
+    static std::vector<const AlgorithmInfo*> rows{&kPathRow, &kLightRow, &kBdptRow, &kLvcbptRow, &kSpcbptRow, &kVcmRow};
     return rows;
 }
 

@@ -72,6 +72,7 @@ struct AlgorithmInfo {
     std::string_view summary;  ///< One line.
     std::string_view source;   ///< Paper or book, with equation numbers.
     std::string_view bias;     ///< "unbiased", or what is biased or missing.
+    bool merges = false;       ///< Whether its means are off by the bias of merging, which vanishes with merge-radius.
     std::span<const ParameterInfo> parameters;
     Traces traces = Traces::kBoth;
     FrameShape frame = FrameShape::kTiles;

@@ -15,6 +15,7 @@ constexpr ParameterInfo kParameters[] = {
     kRouletteStart,
     kRouletteMin,
     kHeuristic,
+    kTechniques,
     kNextEventBesideCache,
     kLightPaths,
     kCache,

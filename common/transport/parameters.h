@@ -1,7 +1,9 @@
 #pragma once
 // Parameters that several algorithms have, and how their values are read; the catalog's rows list them.
 
-#include "common/path/mis.h"
+#include <optional>
+
+#include "common/path/mask.h"
 #include "common/path/next_event.h"
 #include "common/path/random_walk.h"
 #include "common/transport/settings.h"
@@ -43,6 +45,33 @@ inline constexpr std::string_view kHeuristicNames[] = {"balance", "power", "maxi
 inline constexpr std::string_view kSwitch[] = {"off", "on"};
 inline constexpr ParameterInfo kHeuristic{
     "heuristic", 0, 0, 2, true, "balance [Veach 1997, eq. 9.8], power with exponent 2, or maximum", kHeuristicNames};
+inline constexpr std::string_view kTechniqueSets[] = {"all",     "no-hit",   "no-next-event", "no-connect",
+                                                      "no-lens", "no-merge", "merge"};
+/// Which techniques remain, in the order of kTechniqueSets; `count` of them are for the algorithm.
+constexpr ParameterInfo techniques_parameter(int count) {
+    return {
+        "techniques",
+        0,
+        0,
+        double(count - 1),
+        true,
+        "which techniques are used; the weights of those that remain sum to one, but light that only another one finds is missing",
+        std::span(kTechniqueSets).first(size_t(count))};
+}
+inline constexpr ParameterInfo kTechniques = techniques_parameter(5), kTechniquesOfMerging = techniques_parameter(7);
+/// The techniques that the settings leave; null if all.
+inline std::optional<TechniqueMask> techniques_of(const AlgorithmSettings& s) {
+    const int set = s.has(kTechniques.name) ? int(s.value(kTechniques.name)) : 0;
+    if (set == 0) return std::nullopt;
+    TechniqueMask mask{.visible_stays = true};
+    if (set <= kTechniqueKinds) {
+        mask.on[set - 1] = false;  // the sets after the first leave out one kind each, in the order of the kinds
+    } else {
+        for (const TechniqueKind kind : {TechniqueKind::kNextEvent, TechniqueKind::kConnect, TechniqueKind::kLens})
+            mask.on[int(kind)] = false;  // hits stay: what is seen directly or in a mirror cannot be merged
+    }
+    return mask;
+}
 inline constexpr int kMaxNextEventRays = 64;
 /// kNextEvent is for algorithms that cannot do without next event estimation, kNextEventBesideCache for those that also
 /// connect to points on lights from a cache.

@@ -20,7 +20,7 @@ namespace lightloom {
 
 /// The estimate is a pure function of scene and settings; all threads work on it, for a tenth of a second where there
 /// is glass and a few milliseconds where there is none. It is empty (RareLight::known() is false) for algorithms
-/// without camera sub-paths, which find nothing by chance, and after a stop request.
+/// without camera sub-paths, which find nothing by chance, for those that merge, which need no chance, and after a stop request.
 RareLight estimate_rare_light(const Scene& scene, const RenderSettings& settings, std::stop_token stop = {});
 
 }  // namespace lightloom

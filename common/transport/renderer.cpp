@@ -2,6 +2,7 @@
 
 #include "common/tables/emission_part.h"
 #include "common/tables/gain_part.h"
+#include "common/transport/parameters.h"
 
 namespace lightloom {
 
@@ -28,7 +29,9 @@ Result<std::unique_ptr<Renderer>> Renderer::create(std::shared_ptr<const Scene> 
     }
     auto gain = gain_of(tables, scene->frame().crop);
     if (!gain.ok()) return gain.status();
-    return info.make({lit_scene(std::move(scene), tables), settings, tables, mask, *std::move(gain)});
+    std::optional<TechniqueMask> techniques = techniques_of(settings.algorithm);
+    if (techniques && mask) techniques = mask->both(*techniques);
+    return info.make({lit_scene(std::move(scene), tables), settings, tables, techniques ? &*techniques : mask, *std::move(gain)});
 }
 
 }  // namespace lightloom

@@ -16,6 +16,7 @@ constexpr ParameterInfo kParameters[] = {
     kRouletteStart,
     kRouletteMin,
     kHeuristic,
+    kTechniques,
     kNextEventBesideCache,
     kLightPaths,
     kCache,

@@ -55,12 +55,13 @@ inline std::map<std::string, std::string> those_of(const std::string& algorithm,
 }
 
 /// Training and caches that suit 32 x 32 pixels, for the rows of the catalog that have them; parameters that are
-/// already set stay. Emission is learned.
+/// already set stay. Emission is learned. Merges have a radius at which their bias cannot be seen.
 inline std::map<std::string, std::string> with_small_training(const std::string& algorithm,
                                                               std::map<std::string, std::string> parameters) {
     parameters.merge(those_of(algorithm, {{"emission", "learned"},
                                           {"training-paths", "1500"},
                                           {"cache", "1500"},
+                                          {"merge-radius", "0.05"},
                                           {"light-subspaces", "40"},
                                           {"eye-subspaces", "30"}}));
     return parameters;

@@ -149,31 +149,6 @@ inline std::optional<std::vector<PathVertex>> rebuild_camera(const Scene& scene,
     return z;
 }
 
-/// The merge of y_{s-1} with z_{t-1}: the unweighted contribution divided by the kernel 1 / (pi r^2), and the path's view.
-template <class Vertex>
-Rgb merge(const Scene& scene, const Vertex* y, int s, const PathVertex* z, int t, PathView* view) {
-    const Vertex& a = y[s - 1];
-    const PathVertex& b = z[t - 1];
-    const Vec3 wi = b.shading.to_local(a.wo);
-    const BsdfEval e = b.bsdf.eval(b.wo_local, wi, TransportMode::kRadiance);
-    // The light sub-path arrived with the geometric cosine; the camera's scattering has the shading one.
-    const Rgb contribution = b.alpha * e.f * a.alpha * (std::fabs(wi.z) / abs_dot(b.ng, a.wo));
-    if (contribution.is_black()) return {};
-    const int i = s - 1, k = s + t - 2;
-    view->k = k;
-    view_light_prefix(y, s, view);
-    view_camera_suffix(z, t, k, view);
-    view->delta[i] = false;
-    view->fwd[i] = a.fwd;
-    view->rev[i] = b.fwd;
-    view->rev[i - 1] = double(e.pdf_fwd) * a.to_previous;
-    if (t >= 3) view->fwd[i + 1] = double(e.pdf_rev) * b.to_previous;
-    const Emitter& emitter = scene.emitters()[uint32_t(y[0].emitter)];
-    view->discrete_source = emitter.is_discrete();
-    view->next_event = scene.emitters().pdf_next_event(emitter, y[1].p, y[0].p, y[0].ng, y[1].wo);
-    return contribution;
-}
-
 struct Rebuilt {
     Rgb contribution;  ///< Unweighted.
     PathView view;
@@ -253,11 +228,12 @@ inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, 
         }
     }
     if (r.contribution.is_black()) return std::nullopt;
-    if (weights != nullptr && k >= 2 && technique.kind != TechniqueKind::kMerge) {
+    if (weights != nullptr && k >= 2) {
         if (y) weights->label_light_path(scene, y->data(), int(y->size()));
         for (size_t j = 1; j < z->size(); ++j)
             if ((*z)[j].bsdf.has_smooth_lobe()) weights->label_camera_vertex(scene, &(*z)[j]);
-        weights->complete(scene, y ? y->data() : nullptr, s, z->data(), int(z->size()), towards, &r.view);
+        const int light_vertices = y ? int(y->size()) : 0;
+        weights->complete(scene, y ? y->data() : nullptr, light_vertices, z->data(), int(z->size()), towards, &r.view);
     }
     return r;
 }

@@ -113,6 +113,7 @@ const AlgorithmInfo kMergingRow{
     .summary = "merging with photons of the iteration, for tests",
     .source = "Georgiev et al. 2012",
     .bias = "its kernel blurs",
+    .merges = true,
     .parameters = kMergingParameters,
     .frame = FrameShape::kWhole,
     .light_paths_per_pixel = [](const AlgorithmSettings& s) { return s.value(kPhotons.name); },

@@ -62,6 +62,7 @@ inline RenderSettings cache_settings(const std::string& algorithm, const CacheOp
                              {"connections", std::to_string(o.connections.at_first) + "," + std::to_string(o.connections.later)},
                              {"cache", std::to_string(o.paths)},
                              {"light-paths", std::to_string(o.light_paths)},
+                             {"merge-radius", "0.05"},
                              {"ris-aware", o.ris_aware ? "on" : "off"},
                              {"correlation-aware", o.correlation_aware ? "on" : "off"}}),
         0, max_depth);

@@ -57,9 +57,10 @@ TEST(Allocation, DoesNotGrowWithTheSamples) {
             const uint64_t few = allocations_of(scene, *row, 4), many = allocations_of(scene, *row, 40);
             const uint64_t more_samples = 36 * uint64_t(scene->frame().crop.area());
             // Lists of splats double a few times more in each of the chunks; a cache adds chunks of 256 light paths, whose three
-            // lists double from one on. That is all.
-            const bool cached = testing::settings_of(std::string(row->name)).algorithm.has(kCache.name);
-            EXPECT_LT(many, few + more_samples / (cached ? 6 : 50)) << row->name << ": " << few << " allocations, then " << many;
+            // lists double from one on; what is made anew for each iteration is small next to a real frame. That is all.
+            const int per_allocation = row->frame == FrameShape::kWhole ? 3 : row->shares_light_paths ? 6 : 50;
+            EXPECT_LT(many, few + more_samples / uint64_t(per_allocation))
+                << row->name << ": " << few << " allocations, then " << many;
         }
     }
 }

@@ -1,5 +1,7 @@
 lightloom_test(subspace_weights_test LINK lt_transport)
 lightloom_test(light_cache_test LINK lt_transport)
+lightloom_test(photon_map_test LINK lt_transport)
+lightloom_test(vcm_test LINK lt_transport)
 lightloom_test(draw_test LINK lt_transport)
 lightloom_test(depth_test LINK lt_transport)
 lightloom_test(paper_corrections_test LINK lt_core)
