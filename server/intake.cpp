@@ -83,13 +83,13 @@ std::optional<Result<SubmitAck>> Intake::look_up(const std::string& worker_id, c
     WorkerRecord* const known = book->workers.find(worker_id);
     if (!known) return Result<SubmitAck>(no_worker(worker_id));
     known->last_heard = office_.now();
+    known->held.erase(unit);  // if it has to deliver again, its heartbeats say so
     *worker = *known;
     *file = book->find(unit.job_id);
     UnitTable* const units = *file ? (*file)->job.open_units(unit.key) : nullptr;
     if (!units) return Result<SubmitAck>(unexpected_result(not_running(unit.job_id)));
     if (!units->find(unit.key)) return Result<SubmitAck>(SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"});
     if (!units->is_done(unit.key)) return std::nullopt;
-    known->held.erase(unit);
     return Result<SubmitAck>(*repeated_result(book, *file, *units, unit.key, *known, digest));
 }
 
@@ -150,7 +150,6 @@ Result<SubmitAck> Intake::take_partial(const std::string& worker_id, const UnitR
     {
         OpenBook book(office_);
         WorkerRecord& worker = book->workers.at(index);
-        worker.held.erase(reference);
         if (file->job.state() != JobState::kRunning) return unexpected_result(not_running(reference.job_id));
         UnitTable* const units = file->job.open_units(reference.key);
         const auto known = units ? units->find(reference.key) : std::nullopt;
@@ -229,7 +228,6 @@ Result<SubmitAck> Intake::submit_training(const std::string& worker_id, const Un
         Status problem = data.status();
         if (problem.ok()) problem = check_unit_data(*data, file->job.spec(), unit->training);
         WorkerRecord& worker = book->workers.at(sender.index);
-        worker.held.erase(reference);
         if (!problem.ok()) return reject_result(book, file, *units, reference.key, worker, problem);
         keep = reference.key.kind == UnitKind::kTraining && file->job.preparation().rounds_are_fixed;
     }

@@ -314,6 +314,7 @@ void Worker::send_heartbeat() {
         for (const auto& [unit, state] : running_) running.push_back({unit, state.rendering});
     }
     const auto revoked = port_.heartbeat(worker_id, running);
+    told_idle_ = revoked.ok() && running.empty();
     if (!revoked.ok()) {
         log_debug("heartbeat: {}", revoked.status().message());
         return;
@@ -327,7 +328,7 @@ void Worker::send_heartbeat() {
 
 bool Worker::idles() {
     const std::lock_guard lock(mutex_);
-    return running_.empty() && asking_;
+    return running_.empty() && asking_ && told_idle_;
 }
 
 void Worker::heartbeats(std::stop_token stop) {

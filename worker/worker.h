@@ -54,7 +54,7 @@ class Worker {
     void lane(std::stop_token stop);
     /// Asks for a unit, one lane at a time: the other one would only wait beside it.
     Result<std::vector<UnitLease>> ask(const std::string& worker_id, std::stop_token stop);
-    /// Whether the worker has nothing and asks for a unit, which is a sign of life in itself.
+    /// Whether the worker has nothing, has said so, and asks for a unit, which is a sign of life in itself.
     bool idles();
     /// False when the unit could not be rendered here.
     bool run_unit(const UnitLease& lease, std::stop_token stop);
@@ -82,10 +82,11 @@ class Worker {
     tbb::task_arena arena_;
     std::mutex render_mutex_;  ///< One unit renders at a time, on all threads.
     std::mutex sign_in_mutex_;
-    std::mutex ask_mutex_;             ///< Held while a lane asks for a unit.
-    std::atomic<bool> asking_{false};  ///< Whether one does.
-    std::mutex beat_mutex_;            ///< Heartbeats and units given back reach the coordinator in order. Before mutex_.
-    std::mutex mutex_;                 ///< Guards what follows.
+    std::mutex ask_mutex_;                ///< Held while a lane asks for a unit.
+    std::atomic<bool> asking_{false};     ///< Whether one does.
+    std::atomic<bool> told_idle_{false};  ///< Whether the last heartbeat named no unit.
+    std::mutex beat_mutex_;               ///< Heartbeats and units given back reach the coordinator in order. Before mutex_.
+    std::mutex mutex_;                    ///< Guards what follows.
     std::condition_variable_any wake_;
     WorkerGrant grant_;
     std::map<UnitReference, Running> running_;

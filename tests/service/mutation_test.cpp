@@ -30,7 +30,7 @@ EncodedPartial encoded(const RenderUnit& work, double scale) {
     Rng rng({uint64_t(scale * 1000), Stage::kCamera, 1, 2});
     const auto any_number = [&] {
         uint64_t bits = rng.next_u64();
-        bits = (bits & ~(uint64_t(0x7ff) << 52)) | ((uint64_t(1000) + bits % 40) << 52);
+        bits = (bits & ~(uint64_t(0x7ff) << 52)) | ((uint64_t(963) + bits % 140) << 52);
         double value = 0;
         std::memcpy(&value, &bits, sizeof value);
         return std::abs(value) * scale;
