@@ -252,7 +252,7 @@ Result<JobInfo> get(const v1::Job& in) {
                                  noise.light_missing()};
     }
     info.worker_count = in.worker_count();
-    if (info.state == JobState::kSucceeded) {
+    if (info.state == JobState::kSucceeded || in.has_image_digest()) {
         auto digest = get(in.image_digest());
         if (!digest.ok()) return digest.status();
         info.image_digest = *digest;
