@@ -150,29 +150,29 @@ TEST(JobFields, NoneIsInTheListTwice) {
 /// algorithm's parameters: all of them are written down, as they are in every accepted job.
 TEST(JobFields, TextsAreThoseOfEarlierVersions) {
     JobSpec spec = full_spec();
-    EXPECT_EQ(spec.spec_digest().hex(), "9f124f6d72a6b20251badd3c1cdc091ea3598154c0a81e2be55d5e7e61c1c017");
-    const std::string key = "bedf87462ab63ac960fa1a8980ab1279be2d0085e047072a3d7bd769e32b9f12";
+    EXPECT_EQ(spec.spec_digest().hex(), "becadc820553d169acc0c0ba4971667728815aac4d93898d0b5e96b6349dca0f");
+    const std::string key = "55cbf9e2a1a50fb2dabd90fd5018b465a1c9bf7b6871c3935f32290caf26c8ad";
     EXPECT_EQ(table_key(kIdentity, spec).hex(), key);
     EXPECT_EQ(
         manifest_spec(spec),
         R"({"algorithm":"lvcbpt","parameters":{"cache":"500","connections":"3","emission":"power","heuristic":"balance",)"
-        R"("light-paths":"0.3","next-event":"1","roulette":"albedo","rr-min":"0.25","rr-start":"4","training-paths":"20000"},"seed":18446744073709551615,"max_depth":9,)"
+        R"("light-paths":"0.3","next-event":"1","roulette":"albedo","rr-min":"0.25","rr-start":"4","techniques":"all","training-paths":"20000"},"seed":18446744073709551615,"max_depth":9,)"
         R"("requested_samples_per_pixel":7,"time_limit_seconds":1.5,"noise_target":0.25,"layers":true,"scene":"room.pbrt",)"
         R"("scene_root":"4f48f7207cebf92638debb5694e4a8677350cf88a9e98e73c6c466b6b1d43890",)"
         R"("frame":{"width":64,"height":48,"crop":[1,2,33,44]}})");
     EXPECT_EQ(
         settings_json(spec).dump(),
         R"({"algorithm":"lvcbpt","parameters":{"cache":"500","connections":"3","emission":"power","heuristic":"balance",)"
-        R"("light-paths":"0.3","next-event":"1","roulette":"albedo","rr-min":"0.25","rr-start":"4","training-paths":"20000"},"seed":18446744073709551615,"max_depth":9})");
+        R"("light-paths":"0.3","next-event":"1","roulette":"albedo","rr-min":"0.25","rr-start":"4","techniques":"all","training-paths":"20000"},"seed":18446744073709551615,"max_depth":9})");
     EXPECT_EQ(
         replay(spec),
         "lightloom replay room.pbrt --algorithm lvcbpt --set cache=500 --set connections=3 --set emission=power "
         "--set heuristic=balance --set light-paths=0.3 --set next-event=1 --set roulette=albedo --set rr-min=0.25 --set rr-start=4 "
-        "--set training-paths=20000 --seed "
+        "--set techniques=all --set training-paths=20000 --seed "
         "18446744073709551615 "
         "--max-depth 9 --resolution 64x48 --crop 1,33,2,44 --spp 7 --unit 3,1");
     spec.first_hit_layers = false;
-    EXPECT_EQ(spec.spec_digest().hex(), "1a140395ba63c5031fc1c353e08f70d6c081ff2a9bd99556bbdf7e7280c5de85");
+    EXPECT_EQ(spec.spec_digest().hex(), "b6f18ac9df21ccaf04bff507475bd377467a028aef606efb50ed1914f842d2dc");
     EXPECT_EQ(table_key(kIdentity, spec).hex(), key) << "tables know nothing of layers";
 }
 
