@@ -47,19 +47,21 @@ std::string name_of(const BuildIdentity& identity) {
 
 Status Archive::accept(const Job::Submission& submission, const BuildIdentity& by) {
     if (!store_) return {};
-    auto accepted = store_->put_job({.id = submission.id,
-                                     .request_id = submission.request_id,
-                                     .created_at = submission.created_at,
-                                     .submitted = to_bytes<v1::JobSpec>(submission.submitted),
-                                     .label = to_bytes<v1::JobLabel>(submission.label),
-                                     .scene = submission.scene});
-    LL_RETURN_IF_ERROR(store_->append_event(submission.id, kBuild, name_of(by)).get());
-    return accepted.get();
+    return store_
+        ->put_job({.id = submission.id,
+                   .request_id = submission.request_id,
+                   .created_at = submission.created_at,
+                   .submitted = to_bytes<v1::JobSpec>(submission.submitted),
+                   .label = to_bytes<v1::JobLabel>(submission.label),
+                   .scene = submission.scene},
+                  {{kBuild, name_of(by)}})
+        .get();
 }
 
 Status Archive::begin_anew(const std::string& job_id, const BuildIdentity& by) {
     if (!store_) return {};
-    (void)store_->drop_results(job_id);
+    // First the results: were they there still, they would be taken for those of the build that is put down after them.
+    LL_RETURN_IF_ERROR(store_->drop_results(job_id).get());
     return store_->append_event(job_id, kBuild, name_of(by)).get();
 }
 
@@ -161,7 +163,11 @@ Result<ArchivedJob> Archive::read(const StoredJob& stored, const std::filesystem
         return out;
     }
     for (const StoredEvent& event : stored.events) {
-        if (event.kind == kBuild) out.planned.reset();
+        if (event.kind == kBuild) {  // what another build did is of no use
+            out.planned.reset();
+            out.settled.reset();
+            out.learning_seconds = out.rendering_seconds = 0;
+        }
         if (event.kind == kFinish) out.finish_with = uint32_t(std::strtoul(event.bytes.c_str(), nullptr, 10));
         if (event.kind == kCancelled) out.cancelled = true;
         if (event.kind == kSpent) (void)std::sscanf(event.bytes.c_str(), "%lg %lg", &out.learning_seconds, &out.rendering_seconds);

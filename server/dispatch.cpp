@@ -19,15 +19,26 @@ std::string describe(const BuildIdentity& identity) {
            identity.golden_digest.hex().substr(0, 16);
 }
 
+/// Of what a worker holds, takes out what it has lost: units of jobs that have ended, and leases that ran out. A worker that idles
+/// sends no heartbeats that would say so.
+void forget_what_it_has_not(JobBook& book, WorkerRecord& worker) {
+    std::erase_if(worker.held, [&](const UnitReference& unit) {
+        const JobPtr file = book.find(unit.job_id);
+        const UnitTable* const units = file ? file->job.open_units(unit.key) : nullptr;
+        return !units || !units->is_held(unit.key, worker.index);
+    });
+}
+
 /// In the line of those that wait for as long as it lives.
 class InLine {
   public:
     explicit InLine(JobBook& book) : book_(book), place_(book.waiters.insert(book.waiters.end(), &waiter_)) {}
     ~InLine() {
-        book_.waiters.erase(place_);
-        if (waiter_.look) book_.wake_one_waiter();  // it was told to look and did not
+        const auto next = book_.waiters.erase(place_);
+        if (waiter_.look) book_.wake_one_waiter(next);  // it was told to look and did not
     }
     JobBook::Waiter& waiter() { return waiter_; }
+    std::list<JobBook::Waiter*>::iterator behind() const { return std::next(place_); }
 
   private:
     JobBook& book_;
@@ -56,6 +67,7 @@ Result<WorkerGrant> Dispatch::register_worker(const WorkerHello& hello) {
 
 Dispatch::Turn Dispatch::next_unit(OpenBook& book, WorkerRecord& worker, std::optional<UnitLease>* lease) {
     if (!book->paused.empty()) return Turn::kNothingLeft;
+    forget_what_it_has_not(*book, worker);
     const TimePoint now = office_.now();
     WorkerRegistry& workers = book->workers;
     if (!worker.has_room() || workers.rests(worker, now)) return Turn::kNotForThisOne;
@@ -70,7 +82,7 @@ Dispatch::Turn Dispatch::next_unit(OpenBook& book, WorkerRecord& worker, std::op
         UnitTable* const units = job.open_units();
         if (!units) continue;
         const bool suspect = units->has_suspect();
-        if (!suspect && (units->suspicion().holds_back_others() || !units->has_more_than(0))) continue;
+        if (!suspect && (units->holds_back_others() || !units->has_more_than(0))) continue;
         passed_over = true;
         if (WorkerRegistry::rests_from(worker, job.id(), now)) continue;
         // For the unit's job, a worker whose host lacks something is not there.
@@ -85,7 +97,7 @@ Dispatch::Turn Dispatch::next_unit(OpenBook& book, WorkerRecord& worker, std::op
             unit = units->lease_suspect(worker.index, now, office_.lease_end(), anyone_else);
             if (unit) worker.alone = UnitReference{job.id(), unit->key};
         }
-        if (!unit && units->suspicion().holds_back_others()) continue;
+        if (!unit && units->holds_back_others()) continue;
         if (!unit && !worker.held.empty() && !units->has_more_than(idle)) continue;
         if (!unit) unit = units->lease(worker.index, now, office_.lease_end(), anyone_else);
         if (!unit) continue;
@@ -170,11 +182,7 @@ Result<std::vector<UnitLease>> Dispatch::lease(const std::string& worker_id, dou
             const bool woken = std::exchange(place.waiter().look, false);
             const Turn turn = next_unit(book, *worker, &unit);
             // Where there may be more, the next in line looks, too.
-            if (turn == Turn::kLeased || (woken && turn == Turn::kNotForThisOne)) {
-                place.waiter().look = true;  // not this one again
-                book->wake_one_waiter();
-                place.waiter().look = false;
-            }
+            if (turn == Turn::kLeased || (woken && turn == Turn::kNotForThisOne)) book->wake_one_waiter(place.behind());
             if (unit) {
                 leases.push_back(*std::move(unit));
                 break;

@@ -23,7 +23,17 @@ Result<JobInfo> EndEarly::cancel(const std::string& job_id, OnCancel what) {
         LL_RETURN_IF_ERROR(written_down(job_id, office_.archive.cancel_and_keep(job_id), "be cancelled"));
         book.reopen();
     }
-    if (job.ended()) return book->info(*file, office_.now());
+    if (job.ended()) {
+        const JobInfo info = book->info(*file, office_.now());
+        const bool kept = job.has_partial();
+        book.close();
+        // The call may be repeated because the first one could not be put down.
+        if (info.state == JobState::kCancelled && !kept) LL_RETURN_IF_ERROR(put_down_end(job_id, info));
+        return info;
+    }
+    if (what == OnCancel::kKeep && file->archived && file->archived->planned)
+        return Status(StatusCode::kUnavailable,
+                      "job " + job_id + " is being read back after a restart; cancel it again in a moment");
     std::string message;
     if (job.merged_groups() > 0)
         message = what == OnCancel::kKeep
@@ -35,11 +45,15 @@ Result<JobInfo> EndEarly::cancel(const std::string& job_id, OnCancel what) {
     book.close();
     if (kept) return info;
     // That it ended is told to the archive when the book is closed; it is said here once more, to know that it is on disk.
-    const Status on_disk = office_.archive.end(info);
-    if (!on_disk.ok())
-        return Status(StatusCode::kUnavailable, "job " + job_id + " is cancelled, but that could not be written down (" +
-                                                    on_disk.message() + "): after a restart it would go on; cancel it again");
+    LL_RETURN_IF_ERROR(put_down_end(job_id, info));
     return info;
+}
+
+Status EndEarly::put_down_end(const std::string& job_id, const JobInfo& info) {
+    const Status on_disk = office_.archive.end(info);
+    if (on_disk.ok() || on_disk.code() == StatusCode::kNotFound) return {};
+    return {StatusCode::kUnavailable, "job " + job_id + " is cancelled, but that could not be written down (" + on_disk.message() +
+                                          "): after a restart it would go on; cancel it again"};
 }
 
 Result<JobInfo> EndEarly::finish(const std::string& job_id) {

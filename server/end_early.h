@@ -16,6 +16,9 @@ class EndEarly {
     /// That a decision about the job is on disk; a job that has ended meanwhile needs none.
     Status written_down(const std::string& job_id, const Status& status, const char* decision);
 
+    /// That the job is cancelled is on disk.
+    Status put_down_end(const std::string& job_id, const JobInfo& info);
+
     Office& office_;
 };
 

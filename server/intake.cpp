@@ -1,5 +1,7 @@
 #include "server/intake.h"
 
+#include <new>
+
 #include "common/core/crash_point.h"
 #include "server/blame.h"
 #include "server/finish_job.h"
@@ -121,7 +123,14 @@ void Intake::checkpoint_if_due(OpenBook& book, const JobPtr& file, uint64_t byte
     file->in_checkpoint = true;
     file->kept_bytes = 0;
     book.start(file, "to write a checkpoint of this job", [&office = office_, file, reducer = file->job.reducer()] {
-        const auto saved = reducer->serialize();
+        const auto serialized = [&]() -> Result<Reducer::Saved> {
+            try {
+                return reducer->serialize();
+            } catch (const std::bad_alloc&) {  // the job does not need it
+                return Status(StatusCode::kResourceExhausted, "there is too little memory for a copy of its sums");
+            }
+        };
+        const auto saved = serialized();
         const Status status = saved.ok() ? office.archive.checkpoint(file->job.id(), *saved) : saved.status();
         crash_point("server.checkpoint-kept");
         OpenBook end(office);

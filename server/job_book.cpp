@@ -1,5 +1,7 @@
 #include "server/job_book.h"
 
+#include <algorithm>
+
 namespace lightloom {
 namespace {
 
@@ -82,13 +84,11 @@ JobInfo JobBook::info(const JobFile& file, TimePoint now) const {
     return out;
 }
 
-void JobBook::wake_one_waiter() {
-    for (Waiter* waiter : waiters) {
-        if (waiter->look) continue;
-        waiter->look = true;
-        waiter->woken.notify_one();
-        return;
-    }
+void JobBook::wake_one_waiter(std::list<Waiter*>::iterator from) {
+    const auto next = std::find_if(from, waiters.end(), [](const Waiter* waiter) { return !waiter->look; });
+    if (next == waiters.end()) return;
+    (*next)->look = true;
+    (*next)->woken.notify_one();
 }
 
 void JobBook::wake_all_waiters() {

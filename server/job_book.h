@@ -72,7 +72,9 @@ class JobBook {
     };
     std::list<Waiter*> waiters;  ///< In the order in which they came.
     /// Wakes the first of them that was not woken already.
-    void wake_one_waiter();
+    void wake_one_waiter() { wake_one_waiter(waiters.begin()); }
+    /// The same from that place in the line on: who looked in vain passes on to those behind, so that each looks once.
+    void wake_one_waiter(std::list<Waiter*>::iterator from);
     void wake_all_waiters();
 
     WorkerRegistry workers;

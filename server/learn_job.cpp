@@ -63,6 +63,7 @@ class Tracing final : public TracingPort {
             preparation().round->put_back(std::move(parts));
             for (const auto& [unit, why] : bad) {
                 ++job_.incidents.rejected;
+                office_.archive.drop_soon(job_.id(), preparation().round->key(unit));
                 TrainingRound& open = *preparation().round;
                 const UnitTable::Failures failures = open.refuse(unit);
                 unit_failed(book, file_, open.key(unit), failures, why, office_.now());
@@ -142,7 +143,7 @@ class Tracing final : public TracingPort {
             if (!alive()) return over();
             replace_guide(book, {digest, bytes->size()}, bytes);  // before they are stored: no job that ends removes them
         }
-        LL_RETURN_IF_ERROR(store_tables(office_, digest, *bytes));
+        LL_RETURN_IF_ERROR(with_room(office_, file_, [&] { return store_tables(office_, digest, *bytes); }));
         OpenBook book(office_);
         if (!alive()) {
             if (!book->ledger.pinned(digest)) book.drop_tables(digest);

@@ -64,11 +64,13 @@ void OpenBook::apply(const JobPtr& file, Effects effects) {
         release_crowd(file);
         for (const Digest& tables : book.ledger.forget(file->number)) drop_tables(tables);
         book.job_ended(*file);
+        // What has not been read back after a restart is no loss of a job that failed meanwhile: the next start tries again.
+        const bool unread = file->job.state() == JobState::kFailed && file->archived && file->archived->planned;
         file->archived.reset();
         // What is on disk of a job that keeps its groups stays until these are written.
         if (effects.keep)
             office_.keep(*this, file);
-        else
+        else if (!unread)
             note_end(file);
         forget_old_jobs();
     }

@@ -83,7 +83,7 @@ Status adopt_tables(Office& office, const JobPtr& file, const JobSpec& spec, con
         file->job.preparation().tables_file = digest;
         book->ledger.pin(file->number, digest);
     }
-    LL_RETURN_IF_ERROR(store_tables(office, digest, bytes));
+    LL_RETURN_IF_ERROR(with_room(office, file, [&] { return store_tables(office, digest, bytes); }));
     crash_point("server.tables-stored");
     LL_RETURN_IF_ERROR(plan_units(office, file, spec, facts, std::move(tables)));
     OpenBook book(office);

@@ -56,7 +56,9 @@ Status prepare_tables(Office& office, const JobPtr& file, JobSpec spec, SceneFac
     // Another job may take far longer to make the tables than this one's limit allows: therefore this job probes first,
     // see TracingPort::settle().
     const bool probes = open_size && samples > kMinTrainingSamples;
-    if (may_wait && !probes && wait_for_maker(book, file)) return {};
+    // A job that has training data from before a restart makes its tables itself.
+    const bool traced = file->archived && !file->archived->results.empty();
+    if (may_wait && !probes && !traced && wait_for_maker(book, file)) return {};
     if (!probes) {
         open_first_round(office, book, file);
         return {};

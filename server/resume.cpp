@@ -19,6 +19,10 @@ uint64_t first_revision() {
 
 /// The job as far as its submission says what it is; `archived` says how far it was. `build` is the name of the present one.
 Result<JobPtr> restore_job(JobBook& book, ArchivedJob archived, const std::string& build, TimePoint now) {
+    if (archived.build != build) {  // what another build did is rendered anew, and takes its time again
+        archived.learning_seconds = archived.rendering_seconds = 0;
+        archived.settled.reset();
+    }
     const Job::Past past{archived.age_seconds, archived.rendering_seconds, first_revision()};
     auto key = reuse_key(archived.submission.submitted);
     if (archived.last) {

@@ -43,8 +43,10 @@ bool Suspicion::may_run(const UnitKey& unit, uint64_t results, bool are_others) 
     return !trial || trial->alone.empty() || !trial->contrast || !are_others || results > trial->results;
 }
 
-bool Suspicion::holds_back_others() const {
-    return std::any_of(units_.begin(), units_.end(), [](const auto& u) { return u.second.suspect() && !u.second.contrast; });
+bool Suspicion::holds_back_others(uint32_t group_limit) const {
+    return std::any_of(units_.begin(), units_.end(), [group_limit](const auto& u) {
+        return u.first.group < group_limit && u.second.suspect() && !u.second.contrast;
+    });
 }
 
 std::set<uint32_t> Suspicion::lost(const UnitKey& unit) const {

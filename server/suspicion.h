@@ -47,7 +47,7 @@ class Suspicion {
     /// others, so that dying farms do not look like its doing.
     bool may_run(const UnitKey& unit, uint64_t results, bool are_others) const;
     /// Whether a unit is suspect of whose table nothing went through, so that nothing else of it is to be leased.
-    bool holds_back_others() const;
+    bool holds_back_others(uint32_t group_limit = UINT32_MAX) const;
     /// The workers that a unit has taken down; those that ran it alone.
     std::set<uint32_t> lost(const UnitKey& unit) const;
     std::set<uint32_t> lost_alone(const UnitKey& unit) const;

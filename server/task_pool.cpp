@@ -28,6 +28,7 @@ std::vector<std::jthread> TaskPool::take_ended() {
     threads.reserve(ended_.size());
     for (const uint64_t number : ended_) {
         const auto known = threads_.find(number);
+        if (known == threads_.end()) continue;  // join() has it
         threads.push_back(std::move(known->second));
         threads_.erase(known);
     }

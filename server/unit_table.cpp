@@ -195,7 +195,7 @@ void UnitTable::make_pending(Entry& e) {
         --leased_count_;
     }
     e.state = State::kPending;
-    (suspicion_.suspects(key) ? pending_suspects_ : pending_).insert(key);
+    if (key.group < group_limit_) (suspicion_.suspects(key) ? pending_suspects_ : pending_).insert(key);
 }
 
 void UnitTable::end_lease(Entry& e) {
@@ -237,6 +237,16 @@ std::vector<UnitTable::Expired> UnitTable::expire(TimePoint now) {
 
 void UnitTable::open_for(const UnitKey& key) {
     while (restored_ && opened_groups() <= key.group && open_group()) continue;
+}
+
+bool UnitTable::is_held(const UnitKey& key, uint32_t worker) const {
+    const Entry* const e = entry(key);
+    return e && e->state == State::kLeased && (e->lease.worker == worker || has_copy(key, worker));
+}
+
+void UnitTable::limit_groups(uint32_t count) {
+    group_limit_ = count;
+    for (std::set<UnitKey>* const keys : {&pending_, &pending_suspects_}) keys->erase(keys->lower_bound({count, 0}), keys->end());
 }
 
 bool UnitTable::is_done(const UnitKey& key) const {

@@ -96,6 +96,8 @@ class UnitTable {
     /// The same for a unit that a worker could not render; see lease(). The worker has succeeded with `successes` units so far.
     Failures fail(const UnitKey& key, uint32_t worker, uint64_t successes = 0);
 
+    /// Whether the worker holds the unit, or a copy of it.
+    bool is_held(const UnitKey& key, uint32_t worker) const;
     /// Whether a result of the unit has been entered.
     bool is_done(const UnitKey& key) const;
     /// A result that came before this table was made.
@@ -122,7 +124,9 @@ class UnitTable {
     /// From now on nothing is leased.
     void close() { closed_ = true; }
     /// Leases units of the first `count` groups only.
-    void limit_groups(uint32_t count) { group_limit_ = count; }
+    void limit_groups(uint32_t count);
+    /// Whether the units of the job wait until a suspect has been tried.
+    bool holds_back_others() const { return suspicion_.holds_back_others(group_limit_); }
 
     uint64_t unit_total() const { return unit_total_; }  ///< 0 when unbounded.
     uint32_t group_total() const { return group_total_; }

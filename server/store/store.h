@@ -45,8 +45,8 @@ class JobStore {
     ~JobStore();
 
     using Done = std::future<Status>;
-    /// kAlreadyExists for a job that is known.
-    Done put_job(NewJob job);
+    /// kAlreadyExists for a job that is known. Its first event comes with it.
+    Done put_job(NewJob job, std::optional<StoredEvent> first = {});
     Done update_job(std::string id, JobUpdate update);
     /// The job has ended in `state`, and `info` is what is told of it from now on. Its results and its checkpoint are dropped.
     Done end_job(std::string id, JobState state, std::string message, std::string info);
@@ -101,6 +101,8 @@ class JobStore {
 
     // On the committer's thread, inside a transaction.
     Result<int64_t> number_of(const std::string& id);
+    /// The same of a job that has not ended: what comes for it later is not kept.
+    Result<int64_t> open_number_of(const std::string& id);
     Status insert_result(Batch& batch, const std::string& id, const NewResult& result);
     Status insert_checkpoint(Batch& batch, const std::string& id, const StoredCheckpoint& checkpoint);
     Status drop(Batch& batch, int64_t job);

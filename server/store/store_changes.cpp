@@ -39,14 +39,28 @@ Result<int64_t> JobStore::number_of(const std::string& id) {
     return number;
 }
 
-JobStore::Done JobStore::put_job(NewJob job) {
-    return hand_over([this, job = std::move(job)](Batch&) -> Status {
+Result<int64_t> JobStore::open_number_of(const std::string& id) {
+    auto number = number_of(id);
+    if (!number.ok()) return number;
+    bool ended = false;
+    LL_RETURN_IF_ERROR(database_.each("SELECT final IS NOT NULL FROM job WHERE number=?", {*number}, [&](const SqlRow& row) {
+        ended = row.integer(0) != 0;
+        return Status();
+    }));
+    return ended ? not_found("job " + id + " has ended") : number;
+}
+
+JobStore::Done JobStore::put_job(NewJob job, std::optional<StoredEvent> first) {
+    return hand_over([this, job = std::move(job), first = std::move(first)](Batch&) -> Status {
         const auto known = number_of(job.id);
         if (known.ok()) return {StatusCode::kAlreadyExists, "the store holds job " + job.id + " already"};
         if (known.status().code() != StatusCode::kNotFound) return known.status();
-        return database_.run(
+        LL_RETURN_IF_ERROR(database_.run(
             "INSERT INTO job(id,request_id,created_at,submitted,label,scene,state) VALUES(?,?,?,?,?,?,?)",
-            {job.id, job.request_id, job.created_at, SqlBlob{job.submitted}, SqlBlob{job.label}, job.scene, to_string(job.state)});
+            {job.id, job.request_id, job.created_at, SqlBlob{job.submitted}, SqlBlob{job.label}, job.scene, to_string(job.state)}));
+        if (!first) return {};
+        return database_.run("INSERT INTO event(job,number,kind,bytes) SELECT number, 1, ?, ? FROM job WHERE id=?",
+                             {first->kind, SqlBlob{first->bytes}, job.id});
     });
 }
 
@@ -133,7 +147,7 @@ Status JobStore::put_result(const std::string& id, const NewResult& result) {
 }
 
 Status JobStore::insert_result(Batch& batch, const std::string& id, const NewResult& result) {
-    const auto job = number_of(id);
+    const auto job = open_number_of(id);
     if (!job.ok()) return job.status();
     const UnitKey& unit = result.unit;
     bool known = false, same = false;
@@ -159,7 +173,7 @@ Status JobStore::insert_result(Batch& batch, const std::string& id, const NewRes
 }
 
 Status JobStore::insert_checkpoint(Batch& batch, const std::string& id, const StoredCheckpoint& checkpoint) {
-    const auto job = number_of(id);
+    const auto job = open_number_of(id);
     if (!job.ok()) return job.status();
     int64_t before = 0;
     std::string old_file;
