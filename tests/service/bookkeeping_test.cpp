@@ -21,6 +21,23 @@ FrameLayout whole(int width, int height) { return {width, height, {0, 0, width, 
 
 Digest digest_of(const UnitKey& key) { return sha256(std::to_string(key.group) + "/" + std::to_string(key.tile)); }
 
+TEST(UnitTable, ALimitTakesLaterUnitsOutOfTheQueue) {
+    UnitTable table(Plan(whole(40, 30), {.light_paths_per_iteration = 0}), 50, 8, std::nullopt);
+    ASSERT_TRUE(table.has_more_than(4));
+    const auto first = table.lease(0, {}, kNever), second = table.lease(0, {}, kNever);
+    ASSERT_TRUE(first && second);
+    EXPECT_TRUE(table.is_held(first->key, 0));
+    EXPECT_FALSE(table.is_held(first->key, 1));
+    table.limit_groups(1);
+    EXPECT_FALSE(table.has_more_than(0)) << "what cannot be leased must not count";
+    table.release(second->key, 0);
+    EXPECT_FALSE(table.has_more_than(0));
+    EXPECT_FALSE(table.lease(1, {}, kNever));
+    table.release(first->key, 0);
+    EXPECT_FALSE(table.is_held(first->key, 0));
+    EXPECT_EQ(table.lease(1, {}, kNever)->key, first->key);
+}
+
 TEST(UnitTable, MergedGroupsStillAnswerForTheirUnits) {
     const Plan plan(whole(1000, 600), {.light_paths_per_iteration = 300000});
     ASSERT_GT(plan.tile_count(), 1u);

@@ -240,5 +240,28 @@ TEST(Durable, TrainingDataCountAsResults) {
     EXPECT_FALSE(service.coordinator->assets().contains(info.tables.asset.digest));
 }
 
+TEST(Durable, ATrainingUnitThatTurnsOutToBeWrongIsTracedAgain) {
+    testing::TableService service;
+    service.durable = true;
+    service.restart();
+    const std::string id = service.submit_training(service.table_spec());
+    const auto held = testing::lease_all(service);
+    ASSERT_EQ(held.size(), 3u);
+    TrainingData data = *parse_training_data(testing::traced(held[0].second));
+    data.paths[0].emitter = 1000000;  // shows once the scene is built, when the data are on disk already
+    EXPECT_EQ(service.give(held[0].first, held[0].second, serialize(data)).outcome, SubmitOutcome::kAccepted);
+    for (size_t i = 1; i < 3; ++i)
+        EXPECT_EQ(service.give(held[i].first, held[i].second, testing::traced(held[i].second)).outcome, SubmitOutcome::kAccepted);
+    std::vector<UnitLease> again;
+    for (int i = 0; i < 1000 && again.empty(); ++i) {
+        again = service.lease(service.add_worker());
+        if (again.empty()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    ASSERT_EQ(again.size(), 1u);
+    EXPECT_EQ(service.give(held[1].first, again[0], testing::traced(again[0])).outcome, SubmitOutcome::kAccepted)
+        << "the store must not hold the wrong data any more";
+    EXPECT_EQ(service.wait_running(id).state, JobState::kRunning);
+}
+
 }  // namespace
 }  // namespace lightloom

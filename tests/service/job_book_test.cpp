@@ -209,6 +209,14 @@ TEST(JobBook, WakesOneWaiterAfterTheOther) {
     a.look = b.look = false;
     book.wake_all_waiters();
     EXPECT_TRUE(a.look && b.look);
+    // Who looked in vain passes on to those behind, and never back.
+    a.look = b.look = false;
+    book.wake_one_waiter(std::next(book.waiters.begin()));
+    EXPECT_FALSE(a.look);
+    EXPECT_TRUE(b.look);
+    b.look = false;
+    book.wake_one_waiter(book.waiters.end());
+    EXPECT_FALSE(a.look || b.look);
 }
 
 }  // namespace
