@@ -212,7 +212,7 @@ Status finish_tables(Office& office, const JobPtr& file, LearnedTables learned) 
     return adopt_tables(office, file, learned.spec, facts, bytes, std::move(info));
 }
 
-Status learn(Office& office, const JobPtr& file) {
+Status make_tables(Office& office, const JobPtr& file) {
     JobSpec spec;
     std::function<Result<std::shared_ptr<const Scene>>()> build_scene;
     {
@@ -240,7 +240,7 @@ Status learn(Office& office, const JobPtr& file) {
 
 void start_learning(Office& office, OpenBook& book, const JobPtr& file) {
     book.start(file, "to learn the tables of this job; choose fewer training-paths, energy-paths or subspaces",
-               [&office, file] { return learn(office, file); });
+               [&office, file] { return make_tables(office, file); });
 }
 
 }  // namespace lightloom

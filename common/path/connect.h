@@ -226,10 +226,11 @@ Rgb merge(const Scene& scene, const Vertex* y, int s, const PathVertex* z, int t
     const Vertex& a = y[s - 1];
     const PathVertex& b = z[t - 1];
     const Vec3 wi = b.shading.to_local(a.wo);
-    const float arriving = abs_dot(b.ng, a.wo);
+    const float arriving = abs_dot(a.ng, a.wo);
     if (!(arriving > 0)) return {};
     const BsdfEval e = b.bsdf.eval(b.wo_local, wi, TransportMode::kRadiance);
-    // The light sub-path's flux per area has the geometric cosine, the camera's scattering the shading one.
+    // The light sub-path's flux per area has the geometric cosine of the facet on which it arrived, the camera's scattering the
+    // shading one. That of the camera's facet would not cancel where the two differ, and could be 0 where the others are not.
     const Rgb contribution = b.alpha * e.f * a.alpha * (std::fabs(wi.z) / arriving);
     if (contribution.is_black()) return {};
     const int i = s - 1, k = s + t - 2;

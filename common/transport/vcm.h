@@ -188,6 +188,8 @@ struct VcmAlgorithm {
             if (t > 2 || first.first_hit) merge_near(context, state, t, &view, weigh);
         };
         const auto escape = [&](int t, const WalkRay& ray) {
+            // A camera path that branches may have visited a longer branch before.
+            if (t >= 2) view.footprint_distance2 = method.camera_distance2(z, t);
             if (t <= context.max_edges) contribute_escape<ViewDetail::kFull>(scene, z, t, ray, &view, weigh);
         };
         return trace_camera_path<branches>(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z,
