@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "common/cli/log.h"
 #include "common/work/identity.h"
 #include "worker/grpc_worker_port.h"
 #include "worker/worker.h"
@@ -65,6 +66,7 @@ int main(int argc, char** argv) {
     }
     const std::string server = std::string("127.0.0.1:").append(argv[1]), process = argv[2];
     const int count = argc > 3 ? std::atoi(argv[3]) : 1000, seconds = argc > 4 ? std::atoi(argv[4]) : 20;
+    set_up_logging("idle_workers", "error");
     const auto identity = build_identity();
     if (!identity.ok()) {
         std::fprintf(stderr, "idle_workers: %s\n", identity.status().message().c_str());
