@@ -33,7 +33,7 @@ TEST(MissingPaths, CausticOfAPointLight) {
             const double missing = light.frame().mean - other.frame().mean;
             EXPECT_GT(missing, 6 * std::sqrt(light.frame().variance + other.frame().variance)) << algorithm;
             ++without;
-        } else if (row->learning) {
+        } else if (row->shares_light_paths) {
             // A cache is shared by all pixels, so that means over blocks are far from normal.
             family.add(testing::welch_p_value(light.frame(), other.frame()), "light and " + algorithm);
             ++with;
