@@ -89,7 +89,7 @@ GrpcServer::~GrpcServer() {
     if (!server_) return;
     health_ = {};
     services_->closing = true;
-    // Waiting handlers check `closing` several times a second; calls that do not end by themselves are cancelled.
+    // Waiting handlers check `closing` once a second at least; calls that do not end by themselves are cancelled.
     server_->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(3));
 }
 
