@@ -74,39 +74,42 @@ TEST(Techniques, EachAloneHasTheSameMean) {
 
 /// Every subset of {hit, next event, connect, lens} that still samples every path. (Directly visible light is a hit alone and left
 /// out.)
-TEST(Techniques, AnySubsetThatSupportsEveryPathHasTheSameMean) {
+void expect_subsets_to_agree(const Place& place) {
     TestFamily family;
     int subsets = 0, tested = 0;
-    for (const Place& place : {Place{"diffuse_box", testing::diffuse_box}, {"environment_lit", testing::environment_lit}}) {
-        const auto scene = place.make();
-        const RegionMeans expected = reference(scene, 4, 16, {.min_k = 2}, 20000);
-        uint64_t seed = 21000;
-        for (const AlgorithmInfo* row : catalog()) {
-            const RowTechniques has = testing::techniques_of(*row, scene);
-            for (int bits = 1; bits < has.bits(); ++bits) {
-                if ((bits & has.bits()) != bits || !has.suffices(bits)) continue;
-                TechniqueMask mask = testing::mask_of_bits(bits);
-                mask.min_k = 2;
-                // Paths of two edges by hits alone are rare.
-                const bool rare = !(bits & 0b1010) && !(bits & 0b100 && has.connect_to_light);
-                ++subsets;
-                tested += testing::compare(
-                    expected, masked(scene, *row, mask, 4, rare ? 64 : 16, seed += 100),
-                    std::string(place.name) + ", " + std::string(row->name) + ", techniques " + std::to_string(bits), &family);
-            }
+    const auto scene = place.make();
+    const RegionMeans expected = reference(scene, 4, 16, {.min_k = 2}, 20000);
+    uint64_t seed = 21000;
+    for (const AlgorithmInfo* row : catalog()) {
+        const RowTechniques has = testing::techniques_of(*row, scene);
+        for (int bits = 1; bits < has.bits(); ++bits) {
+            if ((bits & has.bits()) != bits || !has.suffices(bits)) continue;
+            TechniqueMask mask = testing::mask_of_bits(bits);
+            mask.min_k = 2;
+            // Paths of two edges by hits alone are rare.
+            const bool rare = !(bits & 0b1010) && !(bits & 0b100 && has.connect_to_light);
+            ++subsets;
+            tested += testing::compare(
+                expected, masked(scene, *row, mask, 4, rare ? 64 : 16, seed += 100),
+                std::string(place.name) + ", " + std::string(row->name) + ", techniques " + std::to_string(bits), &family);
         }
     }
     EXPECT_GE(tested, subsets * 3 / 4) << "of " << subsets;
     family.check();
 }
 
+TEST(Techniques, AnySubsetThatSupportsEveryPathHasTheSameMean) {
+    expect_subsets_to_agree({"environment_lit", testing::environment_lit});
+}
+TEST(TechniquesNightly, AnySubsetThatSupportsEveryPathHasTheSameMean) {
+    expect_subsets_to_agree({"diffuse_box", testing::diffuse_box});
+}
+
 /// A cut light sub-path has no techniques beyond: they must leave the denominator, or the image darkens.
-TEST(Techniques, LightSubPathsMayBeCutShort) {
+void expect_cuts_to_agree(std::initializer_list<Place> places) {
     TestFamily family;
     int cuts = 0, tested = 0;
-    for (const Place& place : {Place{"diffuse_box", testing::diffuse_box},
-                               {"environment_lit", testing::environment_lit},
-                               {"glass_and_mirror", testing::glass_and_mirror}}) {
+    for (const Place& place : places) {
         const auto scene = place.make();
         const RegionMeans expected = reference(scene, 7, 32, {}, 40000);
         uint64_t seed = 41000;
@@ -129,23 +132,21 @@ TEST(Techniques, LightSubPathsMayBeCutShort) {
     family.check();
 }
 
-/// Production parameters: Russian roulette, connections by depth and every choice that a row offers change the noise, never the
-/// mean.
-TEST(Techniques, RouletteAndChoicesKeepTheMean) {
+TEST(Techniques, LightSubPathsMayBeCutShort) {
+    expect_cuts_to_agree({{"environment_lit", testing::environment_lit}, {"glass_and_mirror", testing::glass_and_mirror}});
+}
+TEST(TechniquesNightly, LightSubPathsMayBeCutShort) { expect_cuts_to_agree({{"diffuse_box", testing::diffuse_box}}); }
+
+using Variant = std::map<std::string, std::string>;
+
+/// Production parameters change the noise, never the mean. variants(row): what is compared with the defaults.
+void expect_the_same_mean(const std::function<std::vector<Variant>(const AlgorithmInfo&)>& variants_of) {
     TestFamily family;
     const auto scene = testing::glossy();
     for (const AlgorithmInfo* row : catalog()) {
         const std::string name(row->name);
-        std::vector<std::map<std::string, std::string>> variants{
-            {},
-            testing::those_of(name, {{"rr-min", "1"}, {"connections", "3"}}),
-            {{"rr-start", "2"}, {"rr-min", "0.05"}},
-            {{"rr-start", "2"}, {"rr-min", "0.3"}},
-            testing::those_of(name, {{"rr-start", "2"}, {"rr-min", "0.6"}, {"connections", "1,4"}})};
-        const AlgorithmSettings usual = testing::settings_of(name, testing::with_small_training(name, {})).algorithm;
-        for (const ParameterInfo& p : row->parameters)
-            for (size_t c = 0; c < p.choices.size(); ++c)
-                if (double(c) != usual.value(p.name)) variants.push_back({{std::string(p.name), std::string(p.choices[c])}});
+        std::vector<Variant> variants = variants_of(*row);
+        variants.insert(variants.begin(), Variant());
         std::vector<RegionMeans> estimates;
         for (const auto& parameters : variants) {
             std::string what = name;
@@ -156,6 +157,28 @@ TEST(Techniques, RouletteAndChoicesKeepTheMean) {
         }
     }
     family.check();
+}
+
+TEST(Techniques, RouletteAndConnectionsKeepTheMean) {
+    expect_the_same_mean([](const AlgorithmInfo& row) -> std::vector<Variant> {
+        const std::string name(row.name);
+        return {testing::those_of(name, {{"rr-min", "1"}, {"connections", "3"}}),
+                {{"rr-start", "2"}, {"rr-min", "0.05"}},
+                testing::those_of(name, {{"rr-start", "2"}, {"rr-min", "0.6"}, {"connections", "1,4"}})};
+    });
+}
+
+/// Every choice that a row offers beside its default.
+TEST(TechniquesNightly, ChoicesKeepTheMean) {
+    expect_the_same_mean([](const AlgorithmInfo& row) {
+        const std::string name(row.name);
+        std::vector<Variant> variants;
+        const AlgorithmSettings usual = testing::settings_of(name, testing::with_small_training(name, {})).algorithm;
+        for (const ParameterInfo& p : row.parameters)
+            for (size_t c = 0; c < p.choices.size(); ++c)
+                if (double(c) != usual.value(p.name)) variants.push_back({{std::string(p.name), std::string(p.choices[c])}});
+        return variants;
+    });
 }
 
 }  // namespace
