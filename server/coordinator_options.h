@@ -34,6 +34,7 @@ struct CoordinatorOptions {
     TimeBounds unit_time;                         ///< After which a unit is taken away from its worker.
     size_t max_jobs = 10000;                      ///< Most jobs that have not ended.
     size_t kept_jobs = 1000;                      ///< Ended jobs that are remembered; the oldest are forgotten, their files stay.
+    uint64_t checkpoint_bytes = uint64_t(64) << 20;  ///< At least so many bytes of results come between two checkpoints of a job.
     /// Below this much free space on the disk of `directory` no units are given out.
     uint64_t disk_reserve_bytes = uint64_t(64) << 20;
     /// The ticker sleeps until something is due, but no longer than this: a clock that jumps (tests) wakes nobody.

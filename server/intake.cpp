@@ -9,8 +9,8 @@
 namespace lightloom {
 namespace {
 
-/// A checkpoint is written when that many bytes of results have come since the last one, and four times as many as it takes.
-constexpr uint64_t kLeastCheckpointBytes = uint64_t(64) << 20, kStateBytesPerPixel = 120;
+/// Between two checkpoints come at least four times as many bytes of results as one takes.
+constexpr uint64_t kStateBytesPerPixel = 120;
 /// The time that a job with a limit has taken is written down that often.
 constexpr double kSpentSeconds = 5, kSpentShare = 0.01;
 
@@ -118,8 +118,8 @@ void Intake::checkpoint_if_due(OpenBook& book, const JobPtr& file, uint64_t byte
     if (!office_.archive.keeps()) return;
     file->kept_bytes += bytes;
     const uint64_t state = kStateBytesPerPixel * uint64_t(file->job.spec().frame.crop.area());
-    if (file->in_checkpoint || file->kept_bytes < std::max(kLeastCheckpointBytes, 4 * state) || file->job.merged_groups() == 0)
-        return;
+    const uint64_t between = std::max(office_.options.checkpoint_bytes, 4 * state);
+    if (file->in_checkpoint || file->kept_bytes < between || file->job.merged_groups() == 0) return;
     file->in_checkpoint = true;
     file->kept_bytes = 0;
     book.start(file, "to write a checkpoint of this job", [&office = office_, file, reducer = file->job.reducer()] {

@@ -77,7 +77,7 @@ int main(int argc, char** argv) {
     uint32_t threads = 0;
     uint64_t table_cache_mib = 4096, disk_limit_mib = 0;
     bool plaintext = false, reflection = false;
-    std::optional<uint64_t> shuffle;
+    std::optional<uint64_t> shuffle, checkpoint_mib;
     app.add_option("--listen", listen, "Where clients and workers connect; port 0 picks a free one; unix:PATH is a socket file")
         ->type_name("HOST:PORT")
         ->capture_default_str();
@@ -124,6 +124,8 @@ int main(int argc, char** argv) {
     add_completion_option(app);
     add_version_option(app, kBuildId);
     app.add_option("--shuffle-leases", shuffle, "")->group("")->check(whole_number());  // tests: lease units in a random order
+    // Tests: more checkpoints than there would be.
+    app.add_option("--checkpoint-after", checkpoint_mib, "")->group("")->check(whole_number_between(0, uint64_t(1) << 30));
     if (const auto ended = parse_and_log(app, argc, argv, level)) return *ended;
     for (const auto& [option, address] : {std::pair{"--listen", &listen}, {"--status", &status}}) {
         if ((address == &status && status == "off") || (address == &listen && listen.starts_with("unix:"))) continue;
@@ -147,6 +149,7 @@ int main(int argc, char** argv) {
     options.lease_seconds = lease;
     options.heartbeat_seconds = std::min(1.0, lease / 4);
     options.shuffle_seed = shuffle;
+    if (checkpoint_mib) options.checkpoint_bytes = *checkpoint_mib << 20;
     if (table_cache_mib > 0) options.table_cache = std::filesystem::path(data) / "tables";
     options.table_cache_bytes = table_cache_mib << 20;
     std::error_code error;

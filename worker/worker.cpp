@@ -274,6 +274,7 @@ Status Worker::submit(const UnitLease& lease, const Send& send, std::stop_token 
         const auto ack = send(worker_id);
         crash_point("worker.after-submit");
         if (ack.ok()) {
+            if (ack->outcome == SubmitOutcome::kAccepted) log_debug("result accepted: {}", name_of(lease.reference()));
             if (ack->outcome == SubmitOutcome::kDuplicateDifferent) log_error("{}: {}", name_of(lease.reference()), ack->reason);
             // The coordinator has counted the failure, but a heartbeat or our other lane may have leased the unit again
             // meanwhile.

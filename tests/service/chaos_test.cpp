@@ -20,7 +20,8 @@ using lightloom::testing::Process;
 using lightloom::testing::TempDirectory;
 
 std::string text_of(const Phase& phase) {
-    std::string text = phase.kind + " " + std::to_string(phase.workers) + (phase.shared_cache ? " shared\n" : "\n");
+    std::string text =
+        phase.kind + " " + std::to_string(phase.workers) + (phase.shared_cache ? " shared, " : ", ") + farm_name(phase) + "\n";
     for (const Round& round : phase.rounds) {
         text += to_text(round) + "\n";
         for (const Action& action : round.actions) text += to_text(action) + " " + std::to_string(action.place) + "\n";
@@ -47,14 +48,17 @@ TEST(ChaosPlan, EveryKindAndEveryCrashPointHasItsTurn) {
         for (const Round& round : phase.rounds) {
             EXPECT_FALSE(round.jobs.empty());
             EXPECT_EQ(round.jobs.size(), round.attached.size());
+            EXPECT_EQ(round.jobs.size(), round.endings.size());
+            for (size_t i = 0; i < round.jobs.size(); ++i) EXPECT_FALSE(round.attached[i] && round.endings[i] != Ending::kComplete);
             double before = -1;
             for (const Action& action : round.actions) {
                 EXPECT_GE(action.at, before);
                 before = action.at;
                 EXPECT_LT(action.worker, phase.workers);
-                if (action.crash.empty()) continue;
-                EXPECT_TRUE(arm_crash_point(action.crash).ok()) << action.crash;
-                labels.insert(action.crash.substr(0, action.crash.find(':')));
+                for (const std::string& crash : action.crashes) {
+                    EXPECT_TRUE(arm_crash_point(crash).ok()) << crash;
+                    labels.insert(crash.substr(0, crash.find(':')));
+                }
             }
         }
     }

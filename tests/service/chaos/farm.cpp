@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 #include <set>
 
 #include "common/core/atomic_file.h"
@@ -25,6 +26,8 @@ using testing::Process;
 /// Where a worker's disk is "full": lists and small scene files still fit, tables do not.
 constexpr rlim_t kFullDiskBytes = 8192;
 constexpr double kStatusSeconds = 0.5;
+/// With what follows, a worker's line about a result that counts.
+constexpr std::string_view kAcceptedLine = "result accepted: ";
 
 sockaddr_in loopback(int port) {
     sockaddr_in address{};
@@ -145,21 +148,25 @@ bool Farm::start(double patience_seconds) {
 
 void Farm::spawn(Slot& slot) {
     // The environment of this process is what the other one inherits; there is one thread here.
-    if (!slot.crash.empty()) ::setenv(kCrashVariable, slot.crash.c_str(), 1);
+    if (!slot.crashes.empty()) ::setenv(kCrashVariable, slot.crashes.front().c_str(), 1);
     const fs::path log = path(is_server(slot) ? "server.pipe" : slot.name + ".log");
     if (is_server(slot)) {
         fs::remove(path("ports"));
         server_open_ = false;
         server_spawned_ = Clock::now();
-        slot.process = std::make_unique<Process>(
-            "lightloom-server",
-            std::vector<std::string>{"--listen", address(), "--status", "127.0.0.1:" + std::to_string(status_port_), "--data",
-                                     path("data"), "--port-file", path("ports"), "--lease", "1"},
-            log);
+        std::vector<std::string> arguments{
+            "--listen", address(),    "--status",           "127.0.0.1:" + std::to_string(status_port_),
+            "--data",   path("data"), "--port-file",        path("ports"),
+            "--lease",  "1",          "--checkpoint-after", "1"};
+        if (phase_.shuffle) arguments.insert(arguments.end(), {"--shuffle-leases", std::to_string(*phase_.shuffle)});
+        slot.process = std::make_unique<Process>("lightloom-server", arguments, log);
     } else {
         const int index = int(&slot - workers_.data());
-        slot.process = std::make_unique<Process>(
-            "lightloom-worker", std::vector<std::string>{"--server", address(), "--threads", "1", "--cache", cache_of(index)}, log);
+        slot.process =
+            std::make_unique<Process>("lightloom-worker",
+                                      std::vector<std::string>{"--server", address(), "--threads", std::to_string(phase_.threads),
+                                                               "--cache", cache_of(index), "--log", "debug"},
+                                      log);
         if (slot.disk_free_at) set_disk(slot, true);
     }
     ::unsetenv(kCrashVariable);
@@ -176,7 +183,7 @@ void Farm::kill(Slot& slot, double restart_after) {
     }
     slot.restarted = true;
     slot.continue_at.reset();
-    slot.crash.clear();
+    slot.crashes.clear();
     slot.start_at = after(restart_after);
     if (is_server(slot)) server_open_ = false, recovering_since_.reset();
 }
@@ -211,7 +218,7 @@ void Farm::apply(const Action& action) {
             return stop(*worker, action.seconds);
         case Act::kCrashWorker:
             kill(*worker, 0);
-            worker->crash = action.crash;
+            worker->crashes = action.crashes;
             return;
         case Act::kFillDisk:
             ++ledger_.full_disks;
@@ -233,7 +240,7 @@ void Farm::apply(const Action& action) {
             return stop(server_, action.seconds);
         case Act::kCrashServer:
             kill(server_, 0);
-            server_.crash = action.crash;
+            server_.crashes = action.crashes;
             server_.crash_delay = action.seconds;
             return;
         case Act::kDamageServer:
@@ -266,6 +273,19 @@ fs::path Farm::tables_in_use() const {
     return {};
 }
 
+std::pair<uint64_t, uint64_t> Farm::acknowledged() const {
+    std::map<std::string, uint64_t> times;
+    for (const Slot& worker : workers_) {
+        std::ifstream log(path(worker.name + ".log"));
+        for (std::string line; std::getline(log, line);)
+            if (const size_t at = line.find(kAcceptedLine); at != std::string::npos)
+                ++times[line.substr(at + kAcceptedLine.size())];
+    }
+    uint64_t again = 0;
+    for (const auto& [unit, count] : times) again += count - 1;
+    return {times.size(), again};
+}
+
 uint64_t Farm::leftovers() const {
     std::set<fs::path> parents{path("data/scratch")};
     for (int i = 0; i < phase_.workers; ++i) parents.insert(cache_of(i));
@@ -285,14 +305,18 @@ void Farm::poll(Slot& slot) {
     if (slot.process && slot.process->ended()) {
         const int code = slot.process->wait();
         slot.process.reset();
-        const bool meant = code == 128 + SIGKILL && !slot.crash.empty();
-        if (meant) {
-            ++ledger_.crashes[slot.crash.substr(0, slot.crash.find(':'))];
+        std::vector<std::string> next;
+        if (code == 128 + SIGKILL && !slot.crashes.empty()) {
+            const std::string& crash = slot.crashes.front();
+            ++ledger_.crashes[crash.substr(0, crash.find(':'))];
+            ++(is_server(slot) ? ledger_.server_crashes : ledger_.worker_crashes);
+            next.assign(slot.crashes.begin() + 1, slot.crashes.end());
         } else {
             violations_.push_back(slot.name + " ended by itself with exit code " + std::to_string(code));
         }
         const double delay = slot.crash_delay;
         kill(slot, delay);
+        slot.crashes = std::move(next);
         if (is_server(slot)) ++server_deaths_;
     }
     if (slot.continue_at && now >= *slot.continue_at) go_on(slot);
@@ -363,7 +387,7 @@ bool Farm::stop_cleanly(double patience_seconds) {
         }
         const int code = slot.process->wait();
         slot.process.reset();
-        if (code == 0 || (code == 128 + SIGKILL && !slot.crash.empty())) return;
+        if (code == 0 || (code == 128 + SIGKILL && !slot.crashes.empty())) return;
         violations_.push_back(slot.name + " ended with exit code " + std::to_string(code) + " after SIGTERM");
         clean = false;
     };

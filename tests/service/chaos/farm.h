@@ -54,6 +54,9 @@ class Farm {
     void progress_seen();
     /// A file of the coordinator's that holds tables of a job; empty if there is none.
     std::filesystem::path tables_in_use() const;
+    /// Of the results that workers were thanked for: how many there are, and how many of them were asked for once more. What a
+    /// worker has logged last is lost when it is killed, so some are missing.
+    std::pair<uint64_t, uint64_t> acknowledged() const;
     /// Scratch directories of processes that are gone; asked when none runs.
     uint64_t leftovers() const;
     /// Removes a file of the coordinator, as an operator would whom a message tells that it is damaged.
@@ -67,8 +70,8 @@ class Farm {
         std::unique_ptr<testing::Process> process;
         Clock::time_point start_at{};  ///< While there is no process.
         std::optional<Clock::time_point> continue_at, disk_free_at;
-        std::string crash;       ///< Armed in the process that runs or that is started next.
-        double crash_delay = 0;  ///< Seconds after which a process that died of it is started again.
+        std::vector<std::string> crashes;  ///< The first is armed in the process that runs or that is started next.
+        double crash_delay = 0;            ///< Seconds after which a process that died of it is started again.
         bool restarted = false;
     };
 

@@ -32,6 +32,12 @@ void for_each_field(Ledger_& ledger, const Field& field) {
     field("server_stops", ledger.server_stops);
     field("full_disks", ledger.full_disks);
     field("damaged_files", ledger.damaged_files);
+    field("worker_crashes", ledger.worker_crashes);
+    field("server_crashes", ledger.server_crashes);
+    field("ended_early", ledger.ended_early);
+    field("acknowledged", ledger.acknowledged);
+    field("asked_again", ledger.asked_again);
+    field("farms", ledger.farms);
     field("resubmissions", ledger.resubmissions);
     field("leftovers", ledger.leftovers);
     field("next_phase", ledger.next_phase);
@@ -71,13 +77,13 @@ size_t Ledger::labels_hit(uint64_t times) const {
 
 std::string Ledger::text() const {
     std::string text = "ledger\n";
-    text += row("phases, images checked", std::to_string(phases) + ", " + std::to_string(images));
+    text += row("phases, images checked",
+                std::to_string(phases) + ", " + std::to_string(images) + "; ended early " + std::to_string(ended_early));
     text += row("worker kills, stops", std::to_string(worker_kills) + ", " + std::to_string(worker_stops));
     text += row("coordinator kills, stops", std::to_string(server_kills) + ", " + std::to_string(server_stops));
     text += row("full disks, damaged files", std::to_string(full_disks) + ", " + std::to_string(damaged_files));
-    uint64_t all = 0;
-    for (const auto& [label, times] : crashes) all += times;
-    text += row("deaths at crash points", std::to_string(all) + "; of " + std::to_string(std::size(kCrashLabels)) + " labels " +
+    text += row("deaths at crash points", std::to_string(worker_crashes) + " workers, " + std::to_string(server_crashes) +
+                                              " coordinators; of " + std::to_string(std::size(kCrashLabels)) + " labels " +
                                               std::to_string(labels_hit(1)) + " once, " + std::to_string(labels_hit(2)) +
                                               " twice or more");
     std::string missing;
@@ -91,6 +97,8 @@ std::string Ledger::text() const {
         if (found.size() == 1) what.append(" (").append(found.begin()->first, 0, 12).append(")");
         text += row("images of " + job, what);
     }
+    for (const auto& [farm, times] : farms) text += row(farm, std::to_string(times) + " images");
+    text += row("acknowledged, asked for again", std::to_string(acknowledged) + ", " + std::to_string(asked_again));
     text += row("submitted again", std::to_string(resubmissions));
     text += row("scratch directories left behind", std::to_string(leftovers));
     for (const auto& [limit, times] : limits) text += row("known limit met: " + limit, std::to_string(times));

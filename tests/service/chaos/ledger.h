@@ -24,11 +24,16 @@ inline constexpr size_t kLimits = std::size(kLimitNames);
 struct Ledger {
     uint64_t phases = 0, images = 0;
     uint64_t worker_kills = 0, worker_stops = 0, server_kills = 0, server_stops = 0, full_disks = 0, damaged_files = 0;
+    uint64_t worker_crashes = 0, server_crashes = 0;  ///< Deaths at crash points.
     uint64_t resubmissions = 0;
-    uint64_t leftovers = 0;                   ///< Scratch directories that killed processes left and nobody removed.
-    uint64_t next_phase = 0;                  ///< Where a run that goes on with this ledger begins.
+    uint64_t ended_early = 0;  ///< Of the images: those of jobs that `finish` or `cancel --keep` ended.
+    uint64_t acknowledged = 0,
+             asked_again = 0;  ///< Results that workers were thanked for, and those of them that were asked for again.
+    uint64_t leftovers = 0;    ///< Scratch directories that killed processes left and nobody removed.
+    uint64_t next_phase = 0;   ///< Where a run that goes on with this ledger begins.
     std::map<std::string, uint64_t> crashes;  ///< By label.
     std::map<std::string, uint64_t> limits;   ///< By name.
+    std::map<std::string, uint64_t> farms;    ///< Images by number of workers, their threads, and the order of units.
     std::map<std::string, std::map<std::string, uint64_t>> digests;  ///< Of images, by job.
     std::vector<double> server_starts;                               ///< Seconds from a start to its open port, after a death.
     std::vector<double> recoveries;                                  ///< From that port to the next progress of a job.

@@ -30,7 +30,7 @@ volatile sig_atomic_t interrupted = 0;
 void interrupt(int) { interrupted = 1; }
 
 /// The image that the job has without any disturbance, in a directory of its own.
-Result<std::string> render_reference(size_t job, double work, const fs::path& directory) {
+Result<std::string> render_reference(size_t job, int samples, const fs::path& directory) {
     const JobKind& kind = job_kinds()[job];
     const fs::path image = directory / (kind.name + ".exr"), log = directory / (kind.name + ".log");
     std::vector<std::string> arguments{"render", std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/cornell.pbrt",
@@ -39,7 +39,7 @@ Result<std::string> render_reference(size_t job, double work, const fs::path& di
                                        "2",      "--table-cache",
                                        "off",    "-o",
                                        image};
-    const auto settings = job_arguments(job, work);
+    const auto settings = job_arguments(job, samples);
     arguments.insert(arguments.end(), settings.begin(), settings.end());
     if (testing::Process("lightloom", arguments, log).wait() != 0)
         return internal_error("the reference of " + kind.name + " could not be rendered, see " + log.string());
@@ -71,7 +71,8 @@ int main(int argc, char** argv) {
         ->check(whole_number());
     app.add_option("--phases", phases, "At most so many")->type_name("N")->check(whole_number());
     app.add_option("--kinds", kinds,
-                   "Only phases of these kinds: kills, server-crash, worker-crash, damage, server-kills, disk, mixed, log, storm")
+                   "Only phases of these kinds: kills, server-crash, worker-crash, damage, server-kills, disk, mixed, log, storm, "
+                   "end-early")
         ->type_name("KIND,...")
         ->delimiter(',');
     app.add_option(
@@ -136,12 +137,12 @@ int main(int argc, char** argv) {
     std::string base = (fs::temp_directory_path() / "lightloom-chaos-XXXXXX").string();
     if (!::mkdtemp(base.data())) return report_failure(internal_error(base + ": no directory can be made there"));
     fs::create_directories(fs::path(base) / "references");
-    std::map<size_t, std::string> references;
+    std::map<std::pair<size_t, int>, std::string> references;
     Status no_reference;
-    const auto reference = [&](size_t job) {
-        std::string& known = references[job];
+    const auto reference = [&](size_t job, int samples) {
+        std::string& known = references[{job, samples}];
         if (known.empty()) {
-            auto made = render_reference(job, options.work, fs::path(base) / "references");
+            auto made = render_reference(job, samples, fs::path(base) / "references");
             if (made.ok()) known = *made;
             if (!made.ok()) no_reference = made.status();
         }
@@ -156,9 +157,10 @@ int main(int argc, char** argv) {
         const Phase phase = plan_phase(seed, number);
         if (!kinds.empty() && std::find(kinds.begin(), kinds.end(), phase.kind) == kinds.end()) continue;
         options.say("phase " + std::to_string(number) + " of seed " + std::to_string(seed) + ", " + phase.kind + ": " +
-                    std::to_string(phase.workers) + " workers, " + (phase.shared_cache ? "one cache" : "a cache each"));
+                    farm_name(phase) + ", " + (phase.shared_cache ? "one cache" : "a cache each"));
         for (const Round& round : phase.rounds)
-            for (const size_t job : round.jobs) reference(job);
+            for (size_t i = 0; i < round.jobs.size(); ++i)
+                if (round.endings[i] == Ending::kComplete) reference(round.jobs[i], job_samples(round.jobs[i], options.work));
         if (!no_reference.ok()) return report_failure(no_reference);
         const fs::path directory = fs::path(base) / ("phase-" + std::to_string(number));
         std::vector<std::string> violations;

@@ -17,6 +17,8 @@ const std::string kScene = std::string(LIGHTLOOM_SOURCE_DIR) + "/tests/scenes/co
 constexpr auto kPoll = std::chrono::milliseconds(10);
 constexpr double kStatusInterval = 0.05;
 constexpr int kMaxAttempts = 12;
+/// A job that is to end early is so much larger than one that is not, and is ended when it has so many units.
+constexpr int kLarger = 50, kUnitsBeforeEnd = 20;
 
 std::string last_line(std::string text) {
     while (!text.empty() && text.back() == '\n') text.pop_back();
@@ -55,6 +57,10 @@ std::vector<std::string> PhaseRun::run() {
     if (options_.stopped()) return violations_;
     farm_.stop_cleanly(options_.patience_seconds);
     ledger_.leftovers += farm_.leftovers();
+    const auto [acknowledged, again] = farm_.acknowledged();
+    ledger_.acknowledged += acknowledged;
+    ledger_.asked_again += again;
+    if (again > 0) violation(std::to_string(again) + " result(s) were asked for again that had been acknowledged");
     for (const std::string& what : farm_.take_violations()) violation(what);
     return violations_;
 }
@@ -76,6 +82,7 @@ bool PhaseRun::run_round(size_t number) {
         Job& job = jobs_.emplace_back();
         job.kind = round.jobs[i];
         job.attached = round.attached[i];
+        job.ending = round.endings[i];
         job.name = std::string("round").append(std::to_string(number)) + "-" + job_kinds()[job.kind].name;
     }
     const auto begin = Clock::now();
@@ -119,22 +126,34 @@ void PhaseRun::submit(Job& job) {
     std::vector<std::string> arguments{"submit", kScene, "--server", farm_.address(), "--again", "--name", label(job)};
     if (job.attached) arguments.insert(arguments.end(), {"-q", "-o", farm_.path(job.name + ".exr").string()});
     if (!job.attached) arguments.push_back("--detach");
-    const auto settings = job_arguments(job.kind, options_.work);
+    const auto settings = job_arguments(job.kind, samples(job));
     arguments.insert(arguments.end(), settings.begin(), settings.end());
     job.step = Step::kSubmitting;
     job.id.clear();
+    job.end_acknowledged = false;
     job.server_deaths = farm_.server_deaths();
     std::filesystem::remove(farm_.path(job.name + ".log"));
     job.client = std::make_unique<Process>("lightloom", arguments, farm_.path(job.name + ".log"));
 }
 
-void PhaseRun::fetch(Job& job) {
+int PhaseRun::samples(const Job& job) const {
+    return (job.ending == Ending::kComplete ? 1 : kLarger) * job_samples(job.kind, options_.work);
+}
+
+void PhaseRun::end_early(Job& job) {
+    job.step = Step::kEnding;
+    std::vector<std::string> arguments{job.ending == Ending::kFinish ? "finish" : "cancel", job.id, "--server", farm_.address()};
+    if (job.ending == Ending::kCancel) arguments.emplace_back("--keep");
+    job.client = std::make_unique<Process>("lightloom", arguments, farm_.path(job.name + ".log"));
+}
+
+void PhaseRun::fetch(Job& job, bool partial) {
     job.step = Step::kFetching;
     std::filesystem::remove(farm_.path(job.name + ".log"));
-    job.client = std::make_unique<Process>(
-        "lightloom",
-        std::vector<std::string>{"fetch", job.id, "--server", farm_.address(), "-q", "-o", farm_.path(job.name + ".exr").string()},
-        farm_.path(job.name + ".log"));
+    std::vector<std::string> arguments{
+        "fetch", job.id, "--server", farm_.address(), "-q", "-o", farm_.path(job.name + ".exr").string()};
+    if (partial) arguments.emplace_back("--partial");
+    job.client = std::make_unique<Process>("lightloom", arguments, farm_.path(job.name + ".log"));
 }
 
 std::string PhaseRun::client_log(const Job& job) const {
@@ -158,6 +177,12 @@ void PhaseRun::poll(Job& job) {
 
 void PhaseRun::client_ended(Job& job, int code) {
     const std::string said = client_log(job);
+    if (job.step == Step::kEnding) {  // without an answer it is asked again, unless the job has ended by then
+        job.end_acknowledged = code == 0;
+        job.step = Step::kWaiting;
+        job.status_seen = status_number_;
+        return;
+    }
     if (code != 0) return failed(job, "client's exit code " + std::to_string(code) + ": " + said);
     if (job.step == Step::kSubmitting && !job.attached) {
         job.id = said;
@@ -173,7 +198,11 @@ void PhaseRun::look_for(Job& job) {
     for (const Json& shown : (*status_)["jobs"]) {
         if (shown["job"] != job.id) continue;
         const std::string state = shown["state"];
-        if (state == "succeeded") return fetch(job);
+        if (state == "succeeded" && job.ending != Ending::kCancel) return fetch(job, false);
+        if (state == "cancelled" && job.ending == Ending::kCancel) return fetch(job, true);
+        if (job.ending != Ending::kComplete && !job.end_acknowledged && state == "running" &&
+            shown["units_done"] >= kUnitsBeforeEnd)
+            return end_early(job);
         if (is_terminal(state)) failed(job, job.id + " is " + state + ": " + shown["message"].get<std::string>());
         return;
     }
@@ -230,12 +259,19 @@ void PhaseRun::verify(Job& job) {
     ++ledger_.images;
     const auto digest = digest_file(farm_.path(job.name + ".exr"));
     if (!digest.ok()) return violation(job.name + ": " + digest.status().message());
-    const std::string hex = digest->hex(), reference = references_(job.kind);
-    ++ledger_.digests[job_name(job.kind, options_.work)][hex];
-    if (hex != reference) violation(job.name + ": the image has SHA-256 " + hex + ", that of `lightloom render` " + reference);
     const auto text = read_file(farm_.path(job.name + ".manifest.json").string());
     const Json manifest = text.ok() ? Json::parse(*text, nullptr, false) : Json();
     if (!manifest.is_object()) return violation(job.name + ": there is no manifest that can be read");
+    int rendered = samples(job);
+    if (job.ending != Ending::kComplete) {
+        ++ledger_.ended_early;
+        if (manifest["image"]["samples_per_pixel"] >= rendered) violation(job.name + ": it was to end early, and did not");
+        rendered = manifest["image"]["samples_per_pixel"];
+    }
+    ++ledger_.farms[farm_name(phase_)];
+    const std::string hex = digest->hex(), reference = references_(job.kind, rendered);
+    ++ledger_.digests[job_name(job.kind, rendered)][hex];
+    if (hex != reference) violation(job.name + ": the image has SHA-256 " + hex + ", that of `lightloom render` " + reference);
     if (manifest["image"]["sha256"] != hex) violation(job.name + ": the manifest names another image");
     verify_manifest(job, manifest);
 }

@@ -20,8 +20,8 @@ struct RunOptions {
     std::function<void(const std::string&)> say;
 };
 
-/// The SHA-256 of a job's image, as `lightloom render` makes it alone, by index into job_kinds().
-using References = std::function<std::string(size_t job)>;
+/// The SHA-256 of a job's image, as `lightloom render` makes it alone, by index into job_kinds() and samples per pixel.
+using References = std::function<std::string(size_t job, int samples)>;
 
 class PhaseRun {
   public:
@@ -31,12 +31,14 @@ class PhaseRun {
     std::vector<std::string> run();
 
   private:
-    enum class Step { kPending, kSubmitting, kWaiting, kFetching, kDone };
+    enum class Step { kPending, kSubmitting, kWaiting, kEnding, kFetching, kDone };
     /// A job and the client that waits for it.
     struct Job {
         size_t kind = 0;
         bool attached = false;
-        std::string name;  ///< Of its files; with the attempt, it is what `list` calls the job.
+        Ending ending = Ending::kComplete;
+        bool end_acknowledged = false;  ///< That it is to end early.
+        std::string name;               ///< Of its files; with the attempt, it is what `list` calls the job.
         int attempt = 0;
         Step step = Step::kPending;
         std::string id;  ///< Of a detached job that was accepted.
@@ -47,7 +49,9 @@ class PhaseRun {
 
     bool run_round(size_t number);
     void submit(Job& job);
-    void fetch(Job& job);
+    int samples(const Job& job) const;
+    void end_early(Job& job);
+    void fetch(Job& job, bool partial);
     void poll(Job& job);
     void client_ended(Job& job, int code);
     void look_for(Job& job);

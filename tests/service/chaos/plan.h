@@ -3,6 +3,7 @@
 // run again without those before it.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,10 +17,12 @@ struct JobKind {
 };
 
 const std::vector<JobKind>& job_kinds();
-/// What `lightloom render` and `lightloom submit` are told, with `work` times as many samples as the kind has.
-std::vector<std::string> job_arguments(size_t kind, double work);
+/// Samples per pixel: `work` times as many as the kind has.
+int job_samples(size_t kind, double work);
+/// What `lightloom render` and `lightloom submit` are told.
+std::vector<std::string> job_arguments(size_t kind, int samples);
 /// "path 150 spp"
-std::string job_name(size_t kind, double work);
+std::string job_name(size_t kind, int samples);
 
 enum class Act {
     kKillWorker,    ///< SIGKILL; it is started again after `seconds`.
@@ -42,15 +45,23 @@ struct Action {
     double at = 0;  ///< Seconds after the round's jobs were submitted; below 0: before they are.
     int worker = 0;
     double seconds = 0;
-    std::string crash;  ///< LABEL:N
+    std::vector<std::string> crashes;  ///< LABEL:N; when the process has died at one, it is started anew with the next.
     Damage damage = Damage::kFileList;
     uint64_t place = 0;  ///< Chooses the byte.
+};
+
+/// How the client lets a job end. What is left of one that ends early has the bytes of a job with as many samples.
+enum class Ending {
+    kComplete,
+    kFinish,  ///< `finish`, once some groups are merged; the job has far more samples than it will render.
+    kCancel,  ///< `cancel --keep`, the same, and `fetch --partial`.
 };
 
 /// Jobs that are submitted together, and what happens to them. The next round begins when all have ended and the audit is done.
 struct Round {
     std::vector<size_t> jobs;     ///< Indices into job_kinds().
     std::vector<bool> attached;   ///< Whether `submit` waits; else it is detached, and `fetch` follows.
+    std::vector<Ending> endings;  ///< A job that ends early is detached.
     std::vector<Action> actions;  ///< In the order of their times.
 };
 
@@ -58,14 +69,17 @@ struct Round {
 struct Phase {
     uint64_t seed = 0, number = 0;
     std::string kind;
-    int workers = 0;
-    bool shared_cache = false;  ///< One cache directory for all workers, or one for each.
+    int workers = 0, threads = 1;     ///< Of each worker.
+    std::optional<uint64_t> shuffle;  ///< The coordinator leases units in the random order of this seed.
+    bool shared_cache = false;        ///< One cache directory for all workers, or one for each.
     std::vector<Round> rounds;
 };
 
 /// Kinds of phases take turns, so that as many phases as there are kinds contain each; so do crash points.
 const std::vector<std::string>& phase_kinds();
 Phase plan_phase(uint64_t seed, uint64_t number);
+/// "2 workers x 1 thread, shuffled"
+std::string farm_name(const Phase& phase);
 
 /// One line.
 std::string to_text(const Action& action);
