@@ -34,14 +34,26 @@ seconds=${LIGHTLOOM_FUZZ_SECONDS:-60}
 corpus=$(mktemp -d)
 trap 'rm -rf "$corpus"' EXIT
 declare -A dictionary=([pbrt]="-dict=$root/tests/fuzz/pbrt.dict" [ply]= [pfm]=)
-for target in pbrt ply pfm; do
+declare -A running
+for target in pbrt ply pfm; do # together, each with one thread
     mkdir "$corpus/$target"
-    (cd "$corpus" && "$root/build/fuzz/bin/${target}_fuzz" -max_total_time="$seconds" -rss_limit_mb=2048 -timeout=20 \
-        -verbosity=0 -print_funcs=0 ${dictionary[$target]} -print_final_stats=1 "$corpus/$target" "$root/tests/fuzz/corpus/$target")
+    (cd "$corpus" && exec "$root/build/fuzz/bin/${target}_fuzz" -max_total_time="$seconds" -rss_limit_mb=2048 -timeout=20 \
+        -verbosity=0 -print_funcs=0 ${dictionary[$target]} -print_final_stats=1 "$corpus/$target" \
+        "$root/tests/fuzz/corpus/$target") >"$corpus/$target.log" 2>&1 &
+    running[$target]=$!
 done
+crashed=
+for target in "${!running[@]}"; do
+    wait "${running[$target]}" || crashed="$crashed $target"
+    sed "s/^/$target: /" "$corpus/$target.log"
+done
+if [ -n "$crashed" ]; then
+    echo "test: a fuzzer found a fault:$crashed" >&2
+    exit 1
+fi
 
 "$root/deploy/sanitize.sh" quick
 
-# The statistical tests run last and alone, because they use all processors themselves.
+# Longer runs last. A test renders with one thread; those that use all processors are marked to run alone.
 cd build/release
-ctest --output-on-failure -L statistical
+ctest --output-on-failure -j "$(nproc)" -L statistical
