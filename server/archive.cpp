@@ -87,6 +87,7 @@ Status Archive::cancel_and_keep(const std::string& job_id) {
 Status Archive::keep_partial(const std::string& job_id, const UnitKey& unit, const WorkerRecord& worker, double seconds,
                              const PartialDescriptor& descriptor, std::string_view payload) {
     if (!store_) return {};
+    LL_RETURN_IF_ERROR(repay_drops(job_id));
     const std::string header = to_bytes<v1::SubmitResultHeader>(descriptor), who = to_bytes<v1::WorkerHello>(worker.hello);
     return store_->put_result(job_id, {.unit = unit,
                                        .digest = descriptor.payload_digest,
@@ -100,6 +101,7 @@ Status Archive::keep_partial(const std::string& job_id, const UnitKey& unit, con
 Status Archive::keep_training(const std::string& job_id, const UnitKey& unit, const WorkerRecord& worker, double seconds,
                               const Digest& digest, std::string_view payload) {
     if (!store_) return {};
+    LL_RETURN_IF_ERROR(repay_drops(job_id));
     const std::string who = to_bytes<v1::WorkerHello>(worker.hello);
     return store_->put_result(
         job_id,
@@ -115,12 +117,62 @@ Status Archive::end(const JobInfo& info) {
     return store_->end_job(info.job_id, info.state, info.message, to_bytes<v1::Job>(info)).get();
 }
 
+void Archive::owe(const std::string& job_id, bool drops, std::function<JobStore::Done()> change) {
+    const std::lock_guard lock(owed_mutex_);
+    Owed& owed = owed_.emplace_back(Owed{job_id, drops, std::move(change), {}});
+    owed.done = owed.change();
+}
+
+Status Archive::repay_if(const std::function<bool(const Owed&)>& due) {
+    std::vector<std::list<Owed>::iterator> found;
+    const auto find = [&] {
+        const std::lock_guard lock(owed_mutex_);
+        for (auto owed = owed_.begin(); owed != owed_.end(); ++owed)
+            if (due(*owed)) found.push_back(owed);
+        return !found.empty();
+    };
+    const std::lock_guard one_at_a_time(repaying_);
+    if (!find()) return {};
+    Status first;
+    for (const auto owed : found) {
+        Status status = owed->done.get();
+        if (status.code() == StatusCode::kResourceExhausted) {
+            owed->done = owed->change();
+            status = owed->done.get();
+        }
+        if (status.code() == StatusCode::kResourceExhausted) {
+            std::promise<Status> again;  // for the next time
+            again.set_value(status);
+            owed->done = again.get_future();
+            if (first.ok()) first = status;
+            continue;
+        }
+        // A job that is not there any more owes nothing; what else may go wrong will not go away.
+        if (!status.ok() && status.code() != StatusCode::kNotFound)
+            log_error("{}: a change of it could not be written down: {}", owed->job_id, status.message());
+        const std::lock_guard lock(owed_mutex_);
+        owed_.erase(owed);
+    }
+    return first;
+}
+
+void Archive::repay() {
+    (void)repay_if([](const Owed&) { return true; });
+}
+
+Status Archive::repay_drops(const std::string& job_id) {
+    return repay_if([&](const Owed& owed) { return owed.drops && owed.job_id == job_id; });
+}
+
 void Archive::end_soon(const JobInfo& info) {
-    if (store_) (void)store_->end_job(info.job_id, info.state, info.message, to_bytes<v1::Job>(info));
+    if (!store_) return;
+    owe(info.job_id, false, [this, id = info.job_id, state = info.state, message = info.message, bytes = to_bytes<v1::Job>(info)] {
+        return store_->end_job(id, state, message, bytes);
+    });
 }
 
 void Archive::forget_soon(const std::string& job_id) {
-    if (store_) (void)store_->forget_job(job_id);
+    if (store_) owe(job_id, false, [this, job_id] { return store_->forget_job(job_id); });
 }
 
 void Archive::spent_soon(const std::string& job_id, double learning_seconds, double rendering_seconds) {
@@ -131,11 +183,11 @@ void Archive::spent_soon(const std::string& job_id, double learning_seconds, dou
 }
 
 void Archive::drop_soon(const std::string& job_id, const UnitKey& unit) {
-    if (store_) (void)store_->drop_result(job_id, unit);
+    if (store_) owe(job_id, true, [this, job_id, unit] { return store_->drop_result(job_id, unit); });
 }
 
 void Archive::drop_all_soon(const std::string& job_id) {
-    if (store_) (void)store_->drop_results(job_id);
+    if (store_) owe(job_id, true, [this, job_id] { return store_->drop_results(job_id); });
 }
 
 Result<ArchivedJob> Archive::read(const StoredJob& stored, const std::filesystem::path& jobs_directory) const {

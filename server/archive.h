@@ -10,8 +10,11 @@
 //
 // Errors: kResourceExhausted if the disk is full; then nothing of the call is kept, and it can be repeated.
 
+#include <functional>
+#include <list>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -64,13 +67,16 @@ class Archive {
     Status checkpoint(const std::string& job_id, const Reducer::Saved& saved);
     Status end(const JobInfo& info);
 
-    // These come on disk soon, in the order of the calls.
+    // These come on disk soon, in the order of the calls; what the disk has no room for is owed, see repay().
     void end_soon(const JobInfo& info);
     void forget_soon(const std::string& job_id);
     void spent_soon(const std::string& job_id, double learning_seconds, double rendering_seconds);
     /// The result could not be used and will be made again; or all of the job's.
     void drop_soon(const std::string& job_id, const UnitKey& unit);
     void drop_all_soon(const std::string& job_id);
+
+    /// Tries again what is owed, and waits for it. Whoever has no lock calls it now and then.
+    void repay();
 
     /// All jobs, oldest first, and the workers that results name. `unreadable` takes a line for each job that this build cannot
     /// read.
@@ -82,8 +88,22 @@ class Archive {
     Result<std::string> read_checkpoint(const StoredCheckpoint& checkpoint) const { return store_->read_checkpoint(checkpoint); }
 
   private:
+    /// A change that nobody waits for.
+    struct Owed {
+        std::string job_id;
+        bool drops = false;  ///< Whether it drops results.
+        std::function<JobStore::Done()> change;
+        JobStore::Done done;
+    };
     Result<ArchivedJob> read(const StoredJob& stored, const std::filesystem::path& jobs_directory) const;
+    void owe(const std::string& job_id, bool drops, std::function<JobStore::Done()> change);
+    Status repay_if(const std::function<bool(const Owed&)>& due);
+    /// What is dropped of a job is gone before anything new of it is kept, which it would be taken for otherwise.
+    Status repay_drops(const std::string& job_id);
 
+    std::mutex repaying_;    ///< Held while changes are waited for; never taken while the book is open.
+    std::mutex owed_mutex_;  ///< Guards the list.
+    std::list<Owed> owed_;   ///< In the order of the calls.
     std::unique_ptr<JobStore> store_;
 };
 

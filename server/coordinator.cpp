@@ -82,6 +82,7 @@ void Coordinator::look_for_room(OpenBook& book) {
     room_checked_ = office_.now();
     book.close();
     const Status room = check_room(office_);
+    office_.archive.repay();
     book.reopen();
     book.set_paused(room.message());
 }

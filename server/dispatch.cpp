@@ -19,14 +19,17 @@ std::string describe(const BuildIdentity& identity) {
            identity.golden_digest.hex().substr(0, 16);
 }
 
+/// Whether the worker has a lease of the unit.
+bool has(const JobBook& book, const UnitReference& unit, uint32_t worker) {
+    const JobPtr file = book.find(unit.job_id);
+    const UnitTable* const units = file ? file->job.open_units(unit.key) : nullptr;
+    return units && units->is_held(unit.key, worker);
+}
+
 /// Of what a worker holds, takes out what it has lost: units of jobs that have ended, and leases that ran out. A worker that idles
 /// sends no heartbeats that would say so.
 void forget_what_it_has_not(JobBook& book, WorkerRecord& worker) {
-    std::erase_if(worker.held, [&](const UnitReference& unit) {
-        const JobPtr file = book.find(unit.job_id);
-        const UnitTable* const units = file ? file->job.open_units(unit.key) : nullptr;
-        return !units || !units->is_held(unit.key, worker.index);
-    });
+    std::erase_if(worker.held, [&](const UnitReference& unit) { return !has(book, unit, worker.index); });
 }
 
 /// In the line of those that wait for as long as it lives.
@@ -114,6 +117,7 @@ void Dispatch::make_lease(OpenBook& book, const JobPtr& file, WorkerRecord& work
     Job& job = file->job;
     book.look_again(file, office_.lease_end());
     worker.held.insert({job.id(), unit.key});
+    worker.unconfirmed.insert({job.id(), unit.key});
     crash_point("server.unit-leased");
     if (unit.key.kind == UnitKind::kRender) {
         *lease = UnitLease{job.id(), job.spec(), unit, job.tables().asset};
@@ -212,13 +216,14 @@ Result<std::vector<UnitReference>> Dispatch::heartbeat(const std::string& worker
     for (const RunningUnit& item : running) {
         const JobPtr file = book->find(item.unit.job_id);
         UnitTable* const units = file ? file->job.open_units(item.unit.key) : nullptr;
-        if (!units || !units->renew(item.unit.key, worker->index, office_.lease_end()) ||
+        if (!units || !units->renew(item.unit.key, worker->index, now, office_.lease_end()) ||
             (item.rendering && took_too_long(book, file, *units, item.unit.key, *worker))) {
             revoked.push_back(item.unit);
             continue;
         }
         book.look_again(file, office_.lease_end());
         held.insert(item.unit);
+        worker->unconfirmed.erase(item.unit);
         if (!item.rendering) continue;
         worker->in_work = item.unit;
         if (item.unit.key.kind != UnitKind::kRender) {
@@ -228,7 +233,10 @@ Result<std::vector<UnitReference>> Dispatch::heartbeat(const std::string& worker
             if (const auto end = file->job.end_of_time()) book.look_again(file, *end);
         }
     }
-    // A lease whose answer was lost on the way is not in `running`; it expires by itself.
+    // A lease whose answer crosses the heartbeat is not in `running`, and neither is one whose answer was lost, which expires by
+    // itself. Until then the worker is taken to hold it: it may be a suspect that runs alone.
+    std::erase_if(worker->unconfirmed, [&](const UnitReference& unit) { return !has(*book, unit, worker->index); });
+    held.insert(worker->unconfirmed.begin(), worker->unconfirmed.end());
     worker->held = std::move(held);
     return revoked;
 }
@@ -239,7 +247,7 @@ Status Dispatch::release(const std::string& worker_id, const UnitReference& unit
     OpenBook book(office_);
     WorkerRecord* const worker = book->workers.find(worker_id);
     if (!worker) return no_worker(worker_id);
-    worker->held.erase(unit);
+    worker->lets_go(unit);
     const JobPtr file = book->find(unit.job_id);
     UnitTable* const units = file ? file->job.open_units(unit.key) : nullptr;
     if (!units) return {};

@@ -45,7 +45,7 @@ Result<SubmitAck> Intake::submit_payload(const std::string& worker_id, const Uni
     OpenBook book(office_);
     WorkerRecord* const worker = book->workers.find(worker_id);
     if (!worker) return no_worker(worker_id);
-    worker->held.erase(unit);
+    worker->lets_go(unit);
     const JobPtr file = book->find(unit.job_id);
     UnitTable* const units = file ? file->job.open_units(unit.key) : nullptr;
     if (units) return reject_result(book, file, *units, unit.key, *worker, partial.status());
@@ -85,7 +85,7 @@ std::optional<Result<SubmitAck>> Intake::look_up(const std::string& worker_id, c
     WorkerRecord* const known = book->workers.find(worker_id);
     if (!known) return Result<SubmitAck>(no_worker(worker_id));
     known->last_heard = office_.now();
-    known->held.erase(unit);  // if it has to deliver again, its heartbeats say so
+    known->lets_go(unit);  // if it has to deliver again, its heartbeats say so
     *worker = *known;
     *file = book->find(unit.job_id);
     UnitTable* const units = *file ? (*file)->job.open_units(unit.key) : nullptr;

@@ -223,8 +223,11 @@ Status make_tables(Office& office, const JobPtr& file) {
         file->job.preparation().scene_built = false;
     }
     if (!build_scene) return internal_error("this coordinator cannot build the scene that tables are learned for");
-    const auto scene = build_scene();
-    if (!scene.ok()) return scene.status();
+    Result<std::shared_ptr<const Scene>> scene = internal_error("not built");
+    LL_RETURN_IF_ERROR(with_room(office, file, [&] {
+        scene = build_scene();
+        return scene.status();
+    }));
     {
         const OpenBook book(office);
         file->job.preparation().scene_built = true;

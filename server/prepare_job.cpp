@@ -116,8 +116,11 @@ Status prepare(Office& office, const JobPtr& file) {
         LL_RETURN_IF_ERROR(begin_anew(office, file, "another build did it"));
         archived.reset();
     }
-    auto facts = office.options.read_scene(office.assets, spec, file->stop.get_token());
-    if (!facts.ok()) return facts.status();
+    Result<SceneFacts> facts = internal_error("not read");
+    LL_RETURN_IF_ERROR(with_room(office, file, [&] {
+        facts = office.options.read_scene(office.assets, spec, file->stop.get_token());
+        return facts.status();
+    }));
     crash_point("server.scene-read");
     const Rect& crop = facts->frame.crop;
     if (crop.empty() || crop.area() > kMaxPartialPixels)

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <cerrno>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
@@ -9,6 +10,7 @@
 #include "common/scene/scene.h"
 #include "common/transport/catalog.h"
 #include "common/transport/first_hit.h"
+#include "server/store/files.h"
 
 namespace lightloom {
 namespace {
@@ -44,13 +46,16 @@ Result<ImportedScene> read_scene(const AssetStore& assets, const Digest& root, c
     std::string directory = (scratch / "scene-XXXXXX").string();
     std::error_code error;
     std::filesystem::create_directories(scratch, error);
-    if (!::mkdtemp(directory.data())) return internal_error(directory + ": cannot be made");
+    if (error) return file_error(scratch, "cannot be made", error.value());
+    if (!::mkdtemp(directory.data())) return file_error(scratch, "no directory can be made there", errno);
     const Status status = assets.materialise(*manifest, directory);
     // The scene may not refer to files outside of the directory.
     auto scene = status.ok() ? import_pbrt((std::filesystem::path(directory) / manifest->main).string(),
                                            {.root = directory, .without = manifest->without})
                              : Result<ImportedScene>(status);
     std::filesystem::remove_all(directory, error);
+    // Of the importer this says that memory is too small, and waiting for room on the disk would not help.
+    if (status.ok() && scene.status().code() == StatusCode::kResourceExhausted) return internal_error(scene.status().message());
     return scene;
 }
 

@@ -169,7 +169,7 @@ bool UnitTable::has_copy(const UnitKey& key, uint32_t worker) const {
     return copy != copies_.end() && copy->second.worker == worker;
 }
 
-bool UnitTable::renew(const UnitKey& key, uint32_t worker, TimePoint expiry) {
+bool UnitTable::renew(const UnitKey& key, uint32_t worker, TimePoint now, TimePoint expiry) {
     Entry* e = entry(key);
     if (!e || e->state == State::kDone) return false;
     if (has_copy(key, worker)) {
@@ -181,7 +181,9 @@ bool UnitTable::renew(const UnitKey& key, uint32_t worker, TimePoint expiry) {
     suspicion_.returned(key, worker);
     if (e->state == State::kPending) {  // its lease had expired, but the worker is still alive
         Lease again = e->lease;
-        if (again.worker != worker) again = {.worker = worker, .leased = again.leased, .begun = {}};
+        // An earlier coordinator leased it, nobody knows when.
+        if (again.ticket == 0) again.leased = now;
+        if (again.ticket == 0 || again.worker != worker) again = {.worker = worker, .leased = again.leased, .begun = {}};
         give(*e, again);
     }
     if (e->lease.worker == worker) e->lease.expiry = expiry;

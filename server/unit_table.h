@@ -46,7 +46,7 @@ class UnitTable {
     bool has_suspect();
     /// True if the unit is not merged yet, and was not taken from the worker; then `worker` holds it until `expiry` (unless another
     /// worker already does).
-    bool renew(const UnitKey& key, uint32_t worker, TimePoint expiry);
+    bool renew(const UnitKey& key, uint32_t worker, TimePoint now, TimePoint expiry);
     /// Gives the unit back if `worker` holds it. If another worker has a copy, that one holds it then.
     void release(const UnitKey& key, uint32_t worker);
     void release_all(uint32_t worker);

@@ -43,6 +43,7 @@ struct WorkerRecord {
     };
     std::map<std::string, Lack> lacks;  ///< By job.
     std::set<UnitReference> held;
+    std::set<UnitReference> unconfirmed;   ///< Of these, those that no heartbeat has named yet.
     std::optional<UnitReference> in_work;  ///< Of these, the one that it said it renders; it may have been delivered since.
     /// Of the latest units of `job`; see delivered().
     struct Pace {
@@ -53,6 +54,11 @@ struct WorkerRecord {
     /// The suspect that it was given to run alone.
     std::optional<UnitReference> alone;
 
+    /// It has delivered the unit or given it back.
+    void lets_go(const UnitReference& unit) {
+        held.erase(unit);
+        unconfirmed.erase(unit);
+    }
     /// A worker may hold one unit beside the one that it renders, so that it does not idle between two; but none beside a suspect.
     bool has_room() const { return held.size() < 2 && !(alone && held.contains(*alone)); }
     /// Camera samples, or light paths, of the job in a second; 0 if nothing has been measured.

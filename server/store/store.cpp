@@ -55,6 +55,7 @@ Result<std::unique_ptr<JobStore>> JobStore::open(Options options) {
     auto log = SegmentLog::open(segments, last, options.segment_bytes, *options.files);
     if (!log.ok()) return log.status();
     std::unique_ptr<JobStore> store(new JobStore(std::move(options), *std::move(database), *std::move(log)));
+    LL_RETURN_IF_ERROR(store->drop_leftovers());
     LL_RETURN_IF_ERROR(store->count_live());
     LL_RETURN_IF_ERROR(store->delete_unused());
     store->committer_ = std::jthread([self = store.get()](std::stop_token stop) { self->commit_loop(stop); });
@@ -69,6 +70,17 @@ JobStore::JobStore(Options options, Database database, SegmentLog log)
 JobStore::~JobStore() {
     committer_.request_stop();
     if (committer_.joinable()) committer_.join();
+}
+
+/// Results and checkpoints of jobs that have ended: nobody will ask for them.
+Status JobStore::drop_leftovers() {
+    for (const char* const sql : {"DELETE FROM result WHERE job IN (SELECT number FROM job WHERE final IS NOT NULL)",
+                                  "DELETE FROM checkpoint WHERE job IN (SELECT number FROM job WHERE final IS NOT NULL)"}) {
+        const Status status = database_.run(sql);
+        if (status.code() != StatusCode::kResourceExhausted) LL_RETURN_IF_ERROR(status);
+        if (!status.ok()) log_warn("results of jobs that have ended stay: {}; the next start tries again", status.message());
+    }
+    return {};
 }
 
 Status JobStore::count_live() {

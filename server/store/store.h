@@ -89,6 +89,7 @@ class JobStore {
 
     JobStore(Options options, Database database, SegmentLog log);
     Status count_live();
+    Status drop_leftovers();
     Status delete_unused();
     std::filesystem::path checkpoints() const { return options_.directory / "checkpoints"; }
 

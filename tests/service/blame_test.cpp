@@ -101,13 +101,13 @@ TEST(UnitTable, ACopyChangesNothingForTheOriginal) {
     table.release(key, 1);
     EXPECT_EQ(table.leased_count(), 1u);
     ASSERT_TRUE(table.copy(key, 1, at(12), kNever));
-    EXPECT_TRUE(table.renew(key, 0, kNever) && table.renew(key, 1, kNever)) << "both go on";
+    EXPECT_TRUE(table.renew(key, 0, {}, kNever) && table.renew(key, 1, {}, kNever)) << "both go on";
     table.release(key, 0);
     EXPECT_EQ(table.leased_count(), 1u) << "the copy holds it now";
     EXPECT_FALSE(table.lease(2, at(13), kNever));
     ASSERT_TRUE(table.copy(key, 2, at(13), kNever));
     EXPECT_EQ(table.complete(key, 2, sha256("x")), UnitTable::Completion::kFirst);
-    EXPECT_FALSE(table.renew(key, 1, kNever)) << "revoked";
+    EXPECT_FALSE(table.renew(key, 1, {}, kNever)) << "revoked";
     EXPECT_EQ(table.complete(key, 1, sha256("x")), UnitTable::Completion::kDuplicateSame);
     EXPECT_EQ(table.copies_made(), 4u);
 }
@@ -118,9 +118,9 @@ TEST(UnitTable, WhatWasTakenFromAWorkerIsNotRenewed) {
     EXPECT_EQ(table.rendering(key, 0, at(1)), at(1));
     EXPECT_EQ(table.rendering(key, 0, at(5)), at(1)) << "since when";
     table.fail(key, 0);
-    EXPECT_FALSE(table.renew(key, 0, kNever));
+    EXPECT_FALSE(table.renew(key, 0, {}, kNever));
     EXPECT_EQ(table.lease(0, at(6), kNever)->key, key) << "where nobody else is";
-    EXPECT_TRUE(table.renew(key, 0, kNever));
+    EXPECT_TRUE(table.renew(key, 0, {}, kNever));
 }
 
 TEST(Blame, FailuresCountOfWorkersThatDoBetterOrIfAllHaveTried) {
@@ -137,6 +137,16 @@ TEST(Blame, FailuresCountOfWorkersThatDoBetterOrIfAllHaveTried) {
     workers.lacks(workers.at(3), "job", "no disk", at(1));
     by.erase(3);
     EXPECT_EQ(counted(by).total, 8) << "and who lacks disk cannot";
+}
+
+/// Mutation: the time of the lease, which nobody knows, is left at the beginning of all time.
+TEST(UnitTable, ALeaseOfAnEarlierCoordinatorBeginsWhenItIsHeardOf) {
+    UnitTable table(Plan(whole(100, 60), PlanOptions{}), 1, 8, std::nullopt);
+    ASSERT_TRUE(table.has_more_than(0));
+    ASSERT_TRUE(table.renew({}, 3, at(70), kNever));
+    ASSERT_EQ(table.in_work().size(), 1u);
+    EXPECT_EQ(table.in_work()[0].leased, at(70));
+    EXPECT_EQ(table.in_work()[0].worker, 3u);
 }
 
 TEST(Straggler, AUnitHasTwentyTimesItsTimeAndAtLeastAMinute) {
@@ -265,6 +275,31 @@ TEST(Blame, AUnitThatTakesDownWorkersAloneFailsItsJobByName) {
         << info.message;
     for (int i = 2; i < 5; ++i) EXPECT_NE(info.message.find(names[size_t(i)]), std::string::npos) << info.message;
     EXPECT_EQ(info.message.find(names[0]), std::string::npos) << info.message;
+}
+
+/// Mutation: a heartbeat that was sent before the answer with a lease arrived takes the lease from what the worker holds.
+TEST(Blame, AHeartbeatThatCrossesALeaseLeavesASuspectAlone) {
+    Farm farm;
+    const std::string id = farm.submit(farm.spec(200)), able = farm.add_worker();
+    const auto crossed = [&](const std::string& worker) {
+        const UnitLease lease = farm.lease(worker).at(0);
+        farm.beat(worker);
+        return lease;
+    };
+    const std::string full = farm.add_worker();
+    crossed(full), crossed(full);
+    EXPECT_TRUE(farm.lease(full).empty()) << "it holds two";
+    ASSERT_TRUE(farm.coordinator->goodbye(full).ok());
+    for (int i = 0; i < 2; ++i) {
+        farm.lease(farm.add_worker());
+        EXPECT_EQ(farm.deliver(able, farm.lease(able).at(0)).outcome, SubmitOutcome::kAccepted);
+        farm.pass(12, {able}, id);
+    }
+    const std::string alone = farm.add_worker();
+    const UnitLease suspect = crossed(alone);
+    EXPECT_TRUE(farm.lease(alone).empty()) << "nothing is given beside a suspect";
+    EXPECT_EQ(farm.deliver(alone, suspect).outcome, SubmitOutcome::kAccepted);
+    EXPECT_EQ(farm.lease(alone).size(), 1u);
 }
 
 TEST(Blame, SeventyFiveDeathsAtRandomFailNoJob) {

@@ -67,7 +67,7 @@ TEST(UnitTable, MergedGroupsStillAnswerForTheirUnits) {
         EXPECT_EQ(found->render, leased[i].render);
         EXPECT_EQ(table.complete(key, 9, digest_of(key)), UnitTable::Completion::kDuplicateSame);
         EXPECT_EQ(table.complete(key, 9, sha256("other")), UnitTable::Completion::kDuplicateDifferent);
-        EXPECT_FALSE(table.renew(key, 9, kNever));
+        EXPECT_FALSE(table.renew(key, 9, {}, kNever));
         EXPECT_EQ(table.reopen(key).total, 0);
         if (key.tile == 0) iterations += found->render.iteration_count;
     }
@@ -85,7 +85,7 @@ TEST(UnitTable, KeysOfOtherKindsAndRoundsAreNobodys) {
     for (UnitKey key :
          {UnitKey{0, 0, UnitKind::kRender, 1}, UnitKey{0, 0, UnitKind::kTraining, 0}, UnitKey{0, 0, UnitKind::kProbe, 0}}) {
         EXPECT_FALSE(table.find(key));
-        EXPECT_FALSE(table.renew(key, 0, kNever));
+        EXPECT_FALSE(table.renew(key, 0, {}, kNever));
         EXPECT_EQ(table.fail(key, 0).total, 0);
         EXPECT_EQ(table.complete(key, 0, sha256("x")), UnitTable::Completion::kUnknown);
     }
