@@ -21,7 +21,7 @@ struct MergeRule {
 class MergeShares {
   public:
     /// Every share is 1.
-    MergeShares() = default;
+    MergeShares() {}  // NOLINT: "= default" would have {} clear the array for every weight
     /// The correlation factor of correlation.h, for merges: both sub-paths end at x_i, so that the factors of all i are products of
     /// prefixes. The view must have what view_footprint() writes.
     static MergeShares correlation(const PathView& view, const MergeRule& rule);
