@@ -9,15 +9,19 @@ extern const AlgorithmInfo kBdptRow;
 
 namespace {
 
-constexpr ParameterInfo kParameters[] = {
-    kRouletteByAlbedo,         kRouletteStart,   kRouletteMin, kHeuristic, kTechniques, kNextEvent,
-    emission_parameter(false), kEmissionTraining};
+constexpr ParameterInfo kParameters[] = {kRouletteByAlbedo,         kRouletteStart,   kRouletteMin,
+                                         kHeuristicOfSharing,       kTechniques,      kNextEvent,
+                                         emission_parameter(false), kEmissionTraining};
 
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
-    return make_unit_renderer(r, [&](auto&& select) {
-        const auto selection = select(BdptSelection{double(r.light_paths_per_iteration()), next_event_of(r.settings.algorithm)});
-        return BdptAlgorithm<std::remove_cvref_t<decltype(selection)>>{selection, heuristic_of(r.settings.algorithm)};
-    });
+    const AlgorithmSettings& settings = r.settings.algorithm;
+    return make_corrected(BdptSelection{double(r.light_paths_per_iteration()), next_event_of(settings)}, correction_of(settings),
+                          [&](const auto& densities) {
+                              return make_unit_renderer(r, [&](auto&& select) {
+                                  const auto selection = select(densities);
+                                  return BdptAlgorithm<std::remove_cvref_t<decltype(selection)>>{selection, heuristic_of(settings)};
+                              });
+                          });
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "common/transport/vcm.h"
 
+#include "common/tables/density_part.h"
+#include "common/tables/train_density.h"
 #include "common/transport/learn_walks.h"
 #include "common/transport/unit_renderer.h"
 
@@ -50,24 +52,37 @@ constexpr ParameterInfo kPhotonPaths{
     "N1 and n: light sub-paths per pixel and iteration; all of them splat, all of their vertices are "
     "photons, and every camera sample is connected to one of them"};
 
-constexpr std::string_view kCounts[] = {"off", "on", "one"};
-constexpr ParameterInfo kCorrelationAware{"correlation-aware",
-                                          1,
-                                          0,
-                                          2,
-                                          true,
-                                          "weights know that all merges of a camera sub-path share it [Grittmann et al. 2021]; "
-                                          "one: they count as one [Popov et al. 2015]",
-                                          kCounts};
+constexpr ParameterInfo kParameters[] = {
+    kRouletteByAlbedo,         kRouletteStart,   kRouletteMin, heuristic_parameter(HeuristicChoice::kCorrelationAware, 8),
+    kTechniquesOfMerging,      kNextEvent,       kPhotonPaths, kMergeRadius,
+    kMergeRadiusUnit,          kAlpha,           kMergeFirst,  kKernel,
+    emission_parameter(false), kEmissionTraining};
 
-constexpr ParameterInfo kParameters[] = {kRouletteByAlbedo,    kRouletteStart,
-                                         kRouletteMin,         kHeuristic,
-                                         kTechniquesOfMerging, kNextEvent,
-                                         kPhotonPaths,         kMergeRadius,
-                                         kMergeRadiusUnit,     kAlpha,
-                                         kMergeFirst,          kKernel,
-                                         kCorrelationAware,    emission_parameter(false),
-                                         kEmissionTraining};
+constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &GainPart::kPart, &DensityPart::kPart};
+
+bool wanted(const AlgorithmSettings& s) { return learns_density(s) || kWalkLearning.wanted(s); }
+
+/// As many light sub-paths are kept for the density map as there are camera samples.
+LearningPlan plan(const AlgorithmSettings& s) {
+    LearningPlan plan = kWalkLearning.plan(s);
+    if (learns_density(s)) plan.energy_paths = 1;
+    return plan;
+}
+
+Result<Tables> learn(const LearnRequest& r) {
+    auto tables = kWalkLearning.learn(r);
+    if (!tables.ok()) return tables.status();
+    DensityData density;
+    if (learns_density(r.settings.algorithm)) {
+        density = train_density(r.data);
+        if (!density.learned())
+            r.report->add_note("no light sub-path left a photon; heuristic=vcm+ and vcm* weight merges as if discs held one each");
+    }
+    tables->set(std::make_shared<const DensityPart>(DensityPart{std::move(density)}));
+    return tables;
+}
+
+constexpr LearningInfo kLearning{.parts = kParts, .plan = plan, .learn = learn, .wanted = wanted};
 
 MergeRadius radius_of(const AlgorithmSettings& s, const Scene& scene) {
     const double value = s.value(kMergeRadius.name), scene_radius = double(scene.emitters().scene_radius());
@@ -89,9 +104,10 @@ Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
                              radius_of(s, *r.scene),
                              MergeKernel(int(s.value(kKernel.name))),
                              s.value(kMergeFirst.name) != 0,
-                             MergeCount(int(s.value(kCorrelationAware.name)))};
+                             correction_of(s)};
+    const auto density = density_of(r.tables);
     return make_unit_renderer(r, [&](auto&& select) {
-        return VcmAlgorithm<std::remove_cvref_t<decltype(select)>>{select, first, s.value(kAlpha.name), heuristic_of(s)};
+        return VcmAlgorithm<std::remove_cvref_t<decltype(select)>>{select, first, s.value(kAlpha.name), heuristic_of(s), density};
     });
 }
 
@@ -107,7 +123,7 @@ const AlgorithmInfo kVcmRow{
     .frame = FrameShape::kWhole,
     .light_paths_per_pixel = chosen_light_paths,
     .shares_light_paths = true,
-    .learning = &kWalkLearning,
+    .learning = &kLearning,
     .make = make,
 };
 
