@@ -91,7 +91,9 @@ TEST(Heuristics, WeightsOfTheTechniquesThatRemainSumToOne) {
                 const Masked<std::remove_cvref_t<decltype(selection)>> masked{selection, mask};
                 const double sum = sum_of_weights(view, masked, Heuristic::kBalance);
                 // Between Dirac vertices nothing may be left.
-                if (sum != 0) EXPECT_NEAR(sum, 1, 1e-10) << name << ", seed " << seed << ", without kind " << kind;
+                if (sum != 0) {
+                    EXPECT_NEAR(sum, 1, 1e-10) << name << ", seed " << seed << ", without kind " << kind;
+                }
             });
         }
     }
@@ -115,7 +117,9 @@ TEST(Heuristics, SharesLieWhereTheySay) {
             sum += star(i), ++count;
             EXPECT_NEAR(star(i) / plus(i), star(1) / plus(1), 1e-9 * star(1) / plus(1)) << "equation 7 only scales equation 6";
         }
-        if (count > 0) EXPECT_NEAR(sum / count, 1, 1e-9) << "merges of a path count as uncorrected in total";
+        if (count > 0) {
+            EXPECT_NEAR(sum / count, 1, 1e-9) << "merges of a path count as uncorrected in total";
+        }
     }
 }
 
@@ -179,6 +183,26 @@ TEST(Heuristics, BytesDoNotDependOnThreads) {
             testing::expect_identical(render(scene, algorithm, parameters, 1, 1), render(scene, algorithm, parameters, 1, 4),
                                       algorithm + ", " + name);
         }
+}
+
+/// With rows as tiles and one iteration, camera samples and their light sub-paths are those of the frame.
+TEST(Heuristics, SamplesDoNotDependOnTiles) {
+    const auto scene = testing::glossy();
+    const Rect crop = scene->frame().crop;
+    for (const std::string& name : heuristics_of("bdpt")) {
+        const RenderSettings settings = testing::settings_of("bdpt", {{"heuristic", name}, {"next-event", "3"}}, 7);
+        const auto renderer = Renderer::create(scene, settings);
+        ASSERT_TRUE(renderer.ok()) << renderer.status().message();
+        const auto whole = (*renderer)->render(testing::whole_frame(*scene, settings.algorithm, 1), {});
+        ASSERT_TRUE(whole.ok());
+        for (int y0 = 0; y0 < crop.height(); y0 += 5) {
+            const Rect rows{0, y0, crop.width(), std::min(y0 + 5, crop.height())};
+            const uint64_t first = uint64_t(y0) * uint64_t(crop.width());
+            const auto part = (*renderer)->render({0, 1, 0, rows, first, uint64_t(rows.area())}, {});
+            ASSERT_TRUE(part.ok());
+            EXPECT_EQ(std::memcmp(part->camera.data(), &whole->camera[3 * first], part->camera.size() * sizeof(double)), 0) << name;
+        }
+    }
 }
 
 /// Weights decide how noisy an image is and not how bright.
