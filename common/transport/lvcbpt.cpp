@@ -17,6 +17,7 @@ constexpr ParameterInfo kParameters[] = {
     kHeuristic,
     kTechniques,
     kNextEventBesideCache,
+    kShadowRaysBesideCache,
     kLightPaths,
     kCache,
     kConnections,
