@@ -172,8 +172,8 @@ int replay(const ReplayOptions& options) {
         work.iteration_count = 1;
         work.tile = {x, y, x + 1, y + 1};
         if (shares_light_paths) {
-            work.owner_tile = whole.tile;        // the sample looks at the whole batch's cache
-            if (spec.algorithm.info().merges) {  // or at the photons of its iteration
+            work.owner_tile = whole.tile;   // the sample looks at the whole batch's cache
+            if (spec.algorithm.merges()) {  // or at the photons of its iteration
                 work.light_path_count = whole.light_path_count / whole.iteration_count;
                 work.first_light_path =
                     whole.first_light_path + (options.iteration - whole.first_iteration) * work.light_path_count;

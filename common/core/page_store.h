@@ -22,6 +22,9 @@ class PageStore {
   public:
     const T* at(uint32_t number) const { return page(number >> kPageBits) + (number & kInPage); }
 
+    /// What the store takes of memory, used or not. No writer may be in use.
+    uint64_t memory_bytes() const { return uint64_t(pages_.size()) * HugePage::kBytes; }
+
     /// Room for a run, uninitialised.
     struct Run {
         T* data = nullptr;

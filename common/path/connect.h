@@ -221,7 +221,7 @@ inline Rgb connect_to_camera(const Scene& scene, const PathVertex* y, int s, Vec
 /// 2 <= s, 2 <= t: y_{s-1} and z_{t-1} lie next to one another and count as one vertex x_i of a path of k = s + t - 2 edges,
 /// i = s - 1, scattered by the material and with the frame that z_{t-1} has. Returns the contribution without the kernel, m^2:
 /// the flux of the light sub-path times what the camera sub-path makes of the irradiance of one watt per square metre.
-template <class Vertex>
+template <ViewDetail detail = ViewDetail::kFull, class Vertex>
 Rgb merge(const Scene& scene, const Vertex* y, int s, const PathVertex* z, int t, PathView* view) {
     const Vertex& a = y[s - 1];
     const PathVertex& b = z[t - 1];
@@ -241,6 +241,11 @@ Rgb merge(const Scene& scene, const Vertex* y, int s, const PathVertex* z, int t
     view->fwd[i] = a.fwd;
     view->rev[i - 1] = double(e.pdf_fwd) * a.to_previous;
     if (t >= 3) view->fwd[i + 1] = double(e.pdf_rev) * b.to_previous;
+    if constexpr (detail == ViewDetail::kSubspace) {
+        view->step[i] = light_step(b, {e.f * std::fabs(wi.z), e.pdf_fwd, e.pdf_rev}, a.wo);
+        // Beyond the merge the camera knows the steps; as a technique's own end vertex this one is read in the view.
+        if (t >= 3) view->step[i + 1] = z[t - 2].step;
+    }
     const Emitter& emitter = scene.emitters()[uint32_t(y[0].emitter)];
     view->discrete_source = emitter.is_discrete();
     view->next_event = scene.emitters().pdf_next_event(emitter, y[1].p, y[0].p, y[0].ng, y[1].wo);

@@ -22,6 +22,14 @@ class MergeShares {
   public:
     /// Every share is 1.
     MergeShares() {}  // NOLINT: "= default" would have {} clear the array for every weight
+    /// As the correction has it.
+    static MergeShares of(Correction correction, const PathView& view, const MergeRule& rule);
+    /// All n count as one [Popov et al. 2015].
+    static MergeShares one(const MergeRule& rule) {
+        MergeShares out;
+        out.each_ = 1 / rule.paths;
+        return out;
+    }
     /// The correlation factor of correlation.h, for merges: both sub-paths end at x_i, so that the factors of all i are products of
     /// prefixes. The view must have what view_footprint() writes.
     static MergeShares correlation(const PathView& view, const MergeRule& rule);
@@ -37,10 +45,11 @@ class MergeShares {
     static MergeShares photons(const PathView& view, const MergeRule& rule, bool balanced);
 
     /// 1 <= i <= rule.last.
-    double operator()(int i) const { return all_ ? 1 : share_[i]; }
+    double operator()(int i) const { return all_ ? each_ : share_[i]; }
 
   private:
-    bool all_ = true;
+    bool all_ = true;  ///< Every share is each_.
+    double each_ = 1;
     double share_[kMaxEdges + 1];
 };
 
@@ -109,6 +118,18 @@ inline MergeShares MergeShares::photons(const PathView& view, const MergeRule& r
     if (balanced && count > 0)
         for (int i = 1; i <= rule.last; ++i) out.share_[i] *= double(count) / sum;
     return out;
+}
+
+inline MergeShares MergeShares::of(Correction correction, const PathView& view, const MergeRule& rule) {
+    switch (correction) {
+        case Correction::kOne: return one(rule);
+        case Correction::kCorrelation: return correlation(view, rule);
+        case Correction::kFootprint: return footprints(view, rule);
+        case Correction::kPhotons: return photons(view, rule, false);
+        case Correction::kPhotonsBalanced: return photons(view, rule, true);
+        case Correction::kUncorrected: return {};
+    }
+    return {};
 }
 
 }  // namespace lightloom

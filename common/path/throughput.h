@@ -10,7 +10,8 @@
 
 namespace lightloom {
 
-/// Fills in light_throughput of a path of technique s that was completed with ViewDetail::kSubspace from light prefix
+/// Fills in light_throughput of a path with s light vertices (of a merge, including the one that both sub-paths share) that was
+/// completed with ViewDetail::kSubspace from light prefix
 /// y[0 .. s-1] (s >= 2; for s <= 1 y is not read) and camera suffix z[0 .. t-1].
 inline void view_throughput(const LightSubPath& y, int s, const PathVertex* z, PathView* view) {
     const int k = view->k;

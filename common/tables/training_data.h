@@ -10,7 +10,7 @@
 //                corrections) but without the factor that is to be learned, N Gamma / Q; 0 where it is impossible.
 //                vertices[s].density is that of hitting the emitter (s = 0) and of connecting x_{s-1} with x_s
 //                (1 <= s <= k-1); next_event that of choosing x_0 afresh from x_1, as often as the render will; lens
-//                that of a light sub-path that reached the lens
+//                that of a light sub-path that reached the lens and, where the render merges, of one that merged
 // A camera sample keeps at most two paths of each length: with two, three, four, and more camera vertices (the lens
 // counts). The paths that it found are dealt to the two places in turn. A light sub-path that reached the lens keeps
 // one path. Each is chosen in proportion to its estimate; estimate and square are divided by the probability of that

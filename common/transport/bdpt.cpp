@@ -9,9 +9,13 @@ extern const AlgorithmInfo kBdptRow;
 
 namespace {
 
-constexpr ParameterInfo kParameters[] = {kRouletteByAlbedo,         kRouletteStart,   kRouletteMin,
-                                         kHeuristicOfSharing,       kTechniques,      kNextEvent,
-                                         emission_parameter(false), kEmissionTraining};
+constexpr ParameterInfo kParameters[] = {kRouletteByAlbedo, kRouletteStart, kRouletteMin, kHeuristicOfSharing,
+                                         kTechniques,       kNextEvent,     kShadowRays,  emission_parameter(false),
+                                         kEmissionTraining};
+
+constexpr AbsentParameter kAbsent[] = {
+    {"connections",
+     "every camera vertex is connected to all vertices of the one light sub-path of its sample; vcm connects to several"}};
 
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     const AlgorithmSettings& settings = r.settings.algorithm;
@@ -32,6 +36,7 @@ const AlgorithmInfo kBdptRow{
     .source = "Veach 1997, chapter 10",
     .bias = "unbiased; misses specular-diffuse-specular paths from lights that cannot be hit",
     .parameters = kParameters,
+    .absent = kAbsent,
     .light_paths_per_pixel = one_light_path,
     .learning = &kWalkLearning,
     .make = make,

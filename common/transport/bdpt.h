@@ -3,7 +3,7 @@
 //
 // Every camera sample owns one light sub-path; all their vertices are connected. Effective densities:
 //   s = 0          rho = A(0)
-//   s = 1          rho = n next_event A(1)      x_0 chosen afresh from x_1, n times at the first hit; for point lights there
+//   s = 1          rho = n next_event A(1)      x_0 chosen afresh from x_1, n times; for point lights at the first hit
 //                                               trusted by its variance (common/path/next_event.h)
 //   2 <= s <= k-1  rho = C(s) A(s)
 //   s = k          rho = N1 |crop| C(k)         N1 = 1 light path per pixel and iteration; |crop| rendered pixels, because

@@ -10,6 +10,9 @@
 //       Selection densities;                           // if all units have the same, so that single paths can be
 //                                                      // weighted
 //       static constexpr bool kUnitSelection;          // optional; true if they depend on the unit beyond its group
+//       static constexpr bool kMerges;                 // optional; true if camera vertices merge with the cache's vertices, too:
+//                                                      // then each iteration has a cache of its own, and units are whole frames
+//       MergeTerms merging(const UnitScope&) const;    // only where kMerges
 //       static constexpr ViewDetail kDetail;
 //       struct / using Index;                          // of a unit's cache, complete before the first camera sample
 //       uint64_t windows() const;                      // number of windows of light paths that the index may use
@@ -28,6 +31,8 @@
 #include "common/path/mis.h"
 #include "common/transport/contribution.h"
 #include "common/transport/light_cache.h"
+#include "common/transport/merging.h"
+#include "common/transport/photon_memory.h"
 
 namespace lightloom {
 
@@ -42,11 +47,27 @@ struct CachedAlgorithm {
         return false;
     }();
 
+    static constexpr bool kMerges = [] {
+        if constexpr (requires { Method::kMerges; }) return Method::kMerges;
+        return false;
+    }();
+    /// A map that served several iterations would be one sample and not several.
+    static constexpr bool kPerIteration = kMerges;
+
+    /// What a state has for merges.
+    struct Photons {
+        MergeTerms terms;
+        PhotonMap map;
+        uint64_t paths = 0;  ///< That the map is of.
+    };
+    struct NoPhotons {};
+
     using Selection = std::remove_cvref_t<decltype(std::declval<const Method&>().selection(std::declval<const UnitScope&>()))>;
     struct State {
         Selection selection;
         LightCache cache;
         typename Method::Index index;
+        [[no_unique_address]] std::conditional_t<kMerges, Photons, NoPhotons> photons;
     };
 
     float weight(const Selection& selection, const PathView& view, Technique own) const {
@@ -59,7 +80,7 @@ struct CachedAlgorithm {
     template <class Contribute>
     State prepare(const UnitScope& scope, UnitPreparation* preparation, Contribute&& contribute) const {
         const Scene& scene = scope.scene;
-        State state{.selection = method.selection(scope), .cache = {}, .index = {}};
+        State state{.selection = method.selection(scope), .cache = {}, .index = {}, .photons = {}};
         const uint64_t window = std::max(minimum_paths, scope.work.light_path_count);
         const auto splat = [&](const PathVertex* y, int s, Vec2 lens_sample, uint64_t m, auto& chunk) {
             PathView view;
@@ -77,6 +98,12 @@ struct CachedAlgorithm {
             splat);
         if (!scope.stop.stop_requested()) state.index = method.index(state.cache, window);
         state.cache.prefixes = {};
+        if constexpr (kMerges) {
+            if (!scope.stop.stop_requested()) {
+                state.photons = {method.merging(scope), PhotonMap(state.cache), state.cache.path_count()};
+                note_photon_memory({state.cache.memory_bytes(), state.photons.map.memory_bytes()});
+            }
+        }
         return state;
     }
 
@@ -143,6 +170,16 @@ struct CachedAlgorithm {
                                             .emitter = uint32_t(start.emitter),
                                             .survival = end.survival * v.survival},
                            view);
+            }
+            if constexpr (kMerges) {
+                const auto& [terms, map, paths] = state.photons;
+                if (t == 2 && !terms.first_hit) return;
+                const Disc disc{float(terms.radius.squared(camera_distance2(z, t))), float(1 / double(paths)), terms.kernel};
+                merge_near<kDetail>(scene, state.cache, map, disc, context.max_edges, z, t, &view,
+                                    [&](const PathContribution& c, PathView&) {
+                                        method.complete(scene, c.y, c.technique.light_vertices(), z, t, {}, &view);
+                                        contribute(c, view);
+                                    });
             }
         };
         const auto escape = [&](int t, const WalkRay& ray) {

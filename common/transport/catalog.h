@@ -42,6 +42,11 @@ struct ParameterInfo {
     std::string range() const;
 };
 
+/// A parameter of other algorithms that this one cannot have, and why: the end of a sentence, for people who ask for it.
+struct AbsentParameter {
+    std::string_view name, reason;
+};
+
 /// What the units of an algorithm cover.
 enum class FrameShape : uint8_t {
     kTiles,  ///< Any tile of the frame.
@@ -73,7 +78,10 @@ struct AlgorithmInfo {
     std::string_view source;   ///< Paper or book, with equation numbers.
     std::string_view bias;     ///< "unbiased", or what is biased or missing.
     bool merges = false;       ///< Whether its means are off by the bias of merging, which vanishes with merge-radius.
+    /// Whether these settings make it merge, and need units of the whole frame for that; null: `merges` and `frame` hold for all.
+    bool (*may_merge)(const AlgorithmSettings&) = nullptr;
     std::span<const ParameterInfo> parameters;
+    std::span<const AbsentParameter> absent = {};
     Traces traces = Traces::kBoth;
     FrameShape frame = FrameShape::kTiles;
     bool camera_samples = true;  ///< False: all of its light is in splats.

@@ -42,6 +42,8 @@ class LightCache {
     std::vector<std::vector<LightPrefix>> prefixes;  ///< By chunk of paths; dropped once the method has made its index.
 
     uint64_t path_count() const { return paths.size(); }
+    /// What the sub-paths take of memory, without `prefixes`.
+    uint64_t memory_bytes() const { return vertices_.memory_bytes() + surfaces_.memory_bytes() + paths.capacity() * sizeof(Path); }
     /// y_0 of the path or prefix with this `first_vertex`; the others follow it.
     const LightVertex* at(uint32_t first_vertex) const { return vertices_.at(first_vertex); }
     template <class Visit>

@@ -17,6 +17,7 @@ constexpr ParameterInfo kParameters[] = {
     kHeuristicOfSharing,
     kTechniques,
     kNextEventBesideCache,
+    kShadowRaysBesideCache,
     kLightPaths,
     kCache,
     kConnections,

@@ -112,6 +112,23 @@ inline constexpr ParameterInfo kNextEventBesideCache{"next-event",
                                                      true,
                                                      "shadow rays of next event estimation, beside the cache's connections to "
                                                      "lights, at the camera's first hit; later hits send none"};
+/// Splitting. A camera vertex that found its way once asks for light n times.
+inline constexpr ParameterInfo kShadowRays{"shadow-rays",
+                                           1,
+                                           1,
+                                           1024,
+                                           true,
+                                           "n: every ray of next event estimation is split into so many, to places spread evenly "
+                                           "[Grittmann et al. 2021, section 3]"};
+/// Beside a cache 1 leaves later hits to the cache, as kNextEventBesideCache says.
+inline constexpr ParameterInfo kShadowRaysBesideCache{
+    "shadow-rays",
+    1,
+    1,
+    1024,
+    true,
+    "n: from 2 on, every camera vertex sends so many shadow rays of next event estimation, its first hit next-event times as many "
+    "[Grittmann et al. 2021, section 3]"};
 inline constexpr ParameterInfo kLightPaths{
     "light-paths",
     0.3,
@@ -168,10 +185,14 @@ inline RouletteRule roulette_of(const AlgorithmSettings& s) {
     if (s.has(kRoulette) && s.value(kRoulette) == 2) rule.min_survival = 1;
     return rule;
 }
-inline NextEventRays next_event_of(const AlgorithmSettings& s) { return {int(s.value(kNextEvent.name)), 1}; }
-/// Rays of next event estimation besides a cache; see kNextEventBesideCache.
+inline NextEventRays next_event_of(const AlgorithmSettings& s) {
+    const int split = int(s.value(kShadowRays.name));
+    return {int(s.value(kNextEvent.name)) * split, split};
+}
+/// Rays of next event estimation besides a cache; see kNextEventBesideCache and kShadowRaysBesideCache.
 inline NextEventRays next_event_beside_cache_of(const AlgorithmSettings& s) {
-    return {int(s.value(kNextEventBesideCache.name)), 0};
+    const int split = int(s.value(kShadowRaysBesideCache.name));
+    return {int(s.value(kNextEventBesideCache.name)) * split, split > 1 ? split : 0};
 }
 inline HeuristicChoice heuristic_choice_of(const AlgorithmSettings& s) {
     return s.has(kHeuristic.name) ? HeuristicChoice(int(s.value(kHeuristic.name))) : HeuristicChoice::kBalance;

@@ -15,6 +15,7 @@ constexpr ParameterInfo kParameters[] = {
     kRouletteMinOfPath,
     kHeuristic,
     kNextEvent,
+    kShadowRays,
     {kTrainingPaths, 50000, 1, 1e8, true,
      "camera samples of the training set from which roulette=learned learns; at most, where a job settles it"},
 };

@@ -3,7 +3,7 @@
 //
 // Techniques and effective densities (PathView's symbols):
 //   s = 0  rho = A(0)                                         the camera sub-path hits the emitter
-//   s = 1  rho = n next_event A(1)                            x_0 chosen from x_1, n times at the first hit
+//   s = 1  rho = n next_event A(1)                            x_0 chosen from x_1, n times
 // Tables: none. Bias: none. Light that reaches the scene only through Dirac vertices from a light that cannot be hit
 // (caustics of point lights) is missing, because no technique here can make such a path.
 

@@ -21,6 +21,7 @@ class PhotonMap {
     explicit PhotonMap(const LightCache& cache);
 
     size_t size() const { return photons_.size(); }
+    uint64_t memory_bytes() const { return photons_.capacity() * sizeof(Photon) + nodes_.capacity() * sizeof(Node); }
 
     struct Photon {
         Vec3 p;
@@ -72,6 +73,12 @@ class PhotonMap {
         float split = 0;
         uint32_t axis = 0;
     };
+
+  public:
+    /// memory_bytes() of a large map, for each of its photons, at most: leaves may be half full.
+    static constexpr double kBytesPerPhoton = sizeof(Photon) + 2.0 * sizeof(Node) / kLeaf;
+
+  private:
     /// The photons of a node: its children have the halves.
     struct Range {
         uint32_t node, begin, end;

@@ -164,7 +164,7 @@ std::vector<Chunk> in_chunks(size_t count, size_t room, const Each& each) {
 
 RareLight estimate_rare_light(const Scene& scene, const RenderSettings& settings, std::stop_token stop) {
     const AlgorithmInfo& info = settings.algorithm.info();
-    if (info.traces == Traces::kLight || info.merges || scene.emitters().empty()) return {};
+    if (info.traces == Traces::kLight || settings.algorithm.merges() || scene.emitters().empty()) return {};
     const Estimator estimator{scene, settings.seed, settings.max_edges(), info.traces};
     const size_t light_room = size_t(std::min(settings.max_edges(), kLongestChain)) + 1,
                  camera_room = size_t(settings.max_edges()) + 2;

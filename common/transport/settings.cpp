@@ -48,6 +48,9 @@ Status unknown_parameter(const AlgorithmInfo& algorithm, const std::string& name
     std::vector<std::string_view> known;
     for (const ParameterInfo& p : algorithm.parameters) known.push_back(p.name);
     const std::string owner(algorithm.name);
+    for (const AbsentParameter& absent : algorithm.absent)
+        if (absent.name == name)
+            return invalid_argument("algorithm '" + owner + "' has no parameter '" + name + "': " + std::string(absent.reason));
     return invalid_argument("algorithm '" + owner + "' has no parameter '" + name + "'" + did_you_mean(name, known) +
                             "; `lightloom algorithms " + owner + "` lists them");
 }

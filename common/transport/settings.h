@@ -27,6 +27,9 @@ class AlgorithmSettings {
         const LearningInfo* learning = info_->learning;
         return learning && (!learning->wanted || learning->wanted(*this)) ? learning : nullptr;
     }
+    /// AlgorithmInfo::merges and frame, of these settings.
+    bool merges() const { return info_->merges || (info_->may_merge && info_->may_merge(*this)); }
+    FrameShape frame() const { return info_->may_merge && info_->may_merge(*this) ? FrameShape::kWhole : info_->frame; }
     std::string name() const { return std::string(info_->name); }
     bool has(std::string_view parameter) const { return index(parameter) < values_.size(); }
     /// The value of a parameter, which the algorithm must have and which must be one number.

@@ -1,6 +1,8 @@
 #include "common/transport/spcbpt.h"
 
 #include "common/transport/learn_walks.h"
+#include "common/transport/merging_parameters.h"
+#include "common/transport/spcbpt_merging.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {
@@ -18,6 +20,7 @@ constexpr ParameterInfo kParameters[] = {
     heuristic_parameter(HeuristicChoice::kCorrelationAware, 5),
     kTechniques,
     kNextEventBesideCache,
+    kShadowRaysBesideCache,
     kLightPaths,
     kCache,
     kConnections,
@@ -49,6 +52,12 @@ constexpr ParameterInfo kParameters[] = {
      "weights know that a cache of M paths limits what a subspace can deliver "
      "[Nabata et al. 2020, eq. 9]",
      kSwitch},
+    kMerging,
+    kMergeRadius,
+    kMergeRadiusUnit,
+    kAlpha,
+    kMergeFirst,
+    kKernel,
 };
 static_assert(SubspaceTables::kMaxSubspaces == 16384 && SubspaceTables::kMaxWindow == 32, "the ranges above");
 constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &GainPart::kPart, &SubspaceTables::kPart};
@@ -105,6 +114,7 @@ Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
                                     .correction = correction_of(settings),
                                     .roulette = roulette_of(settings),
                                     .rays = next_event_beside_cache_of(settings)});
+    if (merging_on(settings)) return make_merging_spcbpt(r, densities, prepared);
     return make_unit_renderer(r, [&](auto&& select) {
         const auto selection = select(densities);
         return SpcbptAlgorithm<std::remove_cvref_t<decltype(selection)>>{
@@ -118,7 +128,8 @@ const AlgorithmInfo kSpcbptRow{
     .name = "spcbpt",
     .summary = "subspace-based probabilistic connections: learns which light sub-paths matter to which camera sub-paths",
     .source = "Su, Li and Wang 2022",
-    .bias = "unbiased; misses what bdpt misses",
+    .bias = "unbiased and misses what bdpt misses; with merging=on as vcm",
+    .may_merge = merging_on,
     .parameters = kParameters,
     .light_paths_per_pixel = chosen_light_paths,
     .shares_light_paths = true,

@@ -60,22 +60,36 @@ struct SubspaceLabeller {
         if (s == 0 && !hit) view->light_label[1] = source(uint32_t(emitters.environment_index()), {}, -towards);
         // Prefixes that end on the camera side, at z_j; the camera's end vertex z_{t-1} has no successor of its own unless it was
         // the emitter.
-        for (int j = 2; j < t; ++j) {
-            const bool end = j == t - 1;
-            if (end && hit) break;
-            if (end) {
-                view->light_label[k - j + 1] =
-                    z[j].bsdf.has_smooth_lobe() ? reverse_label(tables.light_tree, z[j], towards) : kNoLabel;
-            } else {
-                if (z[j].reverse_label == kNoLabel && z[j].bsdf.has_smooth_lobe())
-                    z[j].reverse_label = reverse_label(tables.light_tree, z[j], -z[j + 1].wo);
-                view->light_label[k - j + 1] = z[j].reverse_label;
-            }
-        }
-        // The weight will read Gamma once per technique, each time in another column.
-        for (int i = 1; i < k; ++i)
-            if (view->light_label[i] != kNoLabel && view->eye_label[i] != kNoLabel)
-                __builtin_prefetch(tables.column(view->eye_label[i]) + view->light_label[i]);
+        for (int j = 2; j + 1 < t; ++j) label_crossed(z, j, view);
+        if (t >= 3 && !hit)
+            view->light_label[k - t + 2] =
+                z[t - 1].bsdf.has_smooth_lobe() ? reverse_label(tables.light_tree, z[t - 1], towards) : kNoLabel;
+        prefetch_gamma(*view);
+    }
+    /// The same for a path that y[0 .. s-1] and z[0 .. t-1] made by merging at y_{s-1} and z_{t-1}: one vertex, labelled for
+    /// prefixes as the light's and for suffixes as the camera's.
+    void complete_merge(const LightSubPath& y, int s, PathVertex* z, int t, PathView* view) const {
+        view_throughput(y, s, z, view);
+        view_footprint(emitters[uint32_t(y[0].emitter)], y, s, z, t, view);
+        for (int i = 0; i < s; ++i) view->light_label[i + 1] = y[i].label;
+        for (int i = 1; i + 1 < s; ++i) view->eye_label[i] = y[i].reverse_label;
+        for (int j = 1; j < t; ++j) view->eye_label[view->k - j] = z[j].label;
+        for (int j = 2; j + 1 < t; ++j) label_crossed(z, j, view);
+        prefetch_gamma(*view);
+    }
+
+  private:
+    /// The label of the prefix that ends at z_j, which went on to z_{j+1}.
+    void label_crossed(PathVertex* z, int j, PathView* view) const {
+        if (z[j].reverse_label == kNoLabel && z[j].bsdf.has_smooth_lobe())
+            z[j].reverse_label = reverse_label(tables.light_tree, z[j], -z[j + 1].wo);
+        view->light_label[view->k - j + 1] = z[j].reverse_label;
+    }
+    /// The weight will read Gamma once per technique, each time in another column.
+    void prefetch_gamma(const PathView& view) const {
+        for (int i = 1; i < view.k; ++i)
+            if (view.light_label[i] != kNoLabel && view.eye_label[i] != kNoLabel)
+                __builtin_prefetch(tables.column(view.eye_label[i]) + view.light_label[i]);
     }
 };
 

@@ -10,9 +10,10 @@
 #include "common/path/throughput.h"
 #include "common/tables/emission_part.h"
 #include "common/transport/bdpt.h"
+#include "common/transport/merging_parameters.h"
 #include "common/transport/parameters.h"
 #include "common/transport/path.h"
-#include "common/transport/spcbpt.h"
+#include "common/transport/spcbpt_merging.h"
 #include "common/transport/visits.h"
 
 namespace lightloom {
@@ -32,6 +33,7 @@ using RenderSelection = Corrected<SubspaceSelection<UnlearnedAffinity>>;
 struct RenderToCome {
     const EmitterSet& emitters;
     RenderSelection selection;
+    std::shared_ptr<const MergeTerms> merging;  ///< Of the first iteration; null if it does not merge.
 };
 
 /// What a contribution is worth to the image; 0 where that is no finite number.
@@ -69,6 +71,16 @@ class Reservoir {
         const double inverse_own = double(c.inverse_density) * scale / double(c.survival);
         path_.next_event = path_.lens = 0;
         const auto on = render.selection.on(view);
+        std::optional<MergesOnPath> merges;
+        if (render.merging) {
+            view.footprint_distance2 = c.t >= 2 ? camera_distance2(c.z, c.t) : view.primary_distance2;
+            merges.emplace(view, *render.merging, render.selection.correction);
+        }
+        double merged = 0;
+        const auto keep_merge = [&](int i, const WideProduct& chain) {
+            if (merges && i > 0 && i < k && !view.delta[i])
+                merged += chain.value(view.fwd[i] * inverse_own * merges->sigma(i, on.survival));
+        };
         const auto keep = [&](int s, double ratio) {
             if (!can_connect(view, s)) return;
             const double sub_paths = ratio * inverse_own * on.survivors(s);
@@ -79,7 +91,12 @@ class Reservoir {
         };
         const int own = c.technique.s;
         keep(own, 1);
-        for_each_split(view, own, 0, k, [&](int s, const WideProduct& chain) { keep(s, chain.value(1)); });
+        keep_merge(own, {});
+        for_each_split(view, own, 0, k, [&](int s, const WideProduct& chain) {
+            keep(s, chain.value(1));
+            keep_merge(s, chain);
+        });
+        if (merged > 0) path_.lens = single(double(path_.lens) + merged);
         return estimate;
     }
     /// Adds the path that was kept, if any, to `data`; the reservoir is empty again.
@@ -157,6 +174,7 @@ Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const Re
     if (generator.plan_.keeps_visits) generator.camera_roulette_.min_survival = 1;
     generator.next_event_ = algorithm.has(kNextEvent.name) ? next_event_of(algorithm) : NextEventRays{};
     generator.unidirectional_ = algorithm.info().traces == Traces::kCamera;
+    if (merging_on(algorithm)) generator.merging_ = std::make_shared<const MergeTerms>(spcbpt_merge_terms(algorithm, scene, 1));
     generator.light_paths_per_iteration_ = algorithm.light_paths_per_iteration(scene.frame().crop.area());
     if (!guide.empty()) {
         LL_RETURN_IF_ERROR(guide.validate(scene.emitters()));
@@ -196,7 +214,8 @@ class TrainingGenerator::Unit {
                   0,
                   TypicalSurvival(generator_.roulette_),
                   plan.rays},
-                 plan.correction}};
+                 plan.correction},
+                generator_.merging_};
     }
     TrainingData empty() const {
         TrainingData data;

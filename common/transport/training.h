@@ -13,6 +13,7 @@
 
 namespace lightloom {
 
+struct MergeTerms;
 struct PreparedTables;
 
 /// Samples that one thread traces at a time.
@@ -49,8 +50,9 @@ class TrainingGenerator {
     LearningPlan plan_;
     Heuristic heuristic_ = Heuristic::kBalance;
     NextEventRays next_event_;
-    bool unidirectional_ = false;             ///< Without light sub-paths.
-    uint64_t light_paths_per_iteration_ = 0;  ///< Of the render that the tables are for.
+    std::shared_ptr<const MergeTerms> merging_;  ///< Of the first iteration of the render; null if it does not merge.
+    bool unidirectional_ = false;                ///< Without light sub-paths.
+    uint64_t light_paths_per_iteration_ = 0;     ///< Of the render that the tables are for.
     std::shared_ptr<const PreparedTables> guide_;
     uint64_t seed_ = 0;
     int max_edges_ = 0;

@@ -133,7 +133,7 @@ class UnitRenderer final : public Renderer {
         // Checks the catalog's row against the algorithm, as far as the algorithm's type shows it.
         const AlgorithmInfo& info = settings_.algorithm.info();
         const double light_paths = settings_.algorithm.light_paths_per_pixel();
-        LL_CHECK(info.frame == FrameShape::kWhole || !(has_unit_selection<A>() || prepares_per_iteration<A>()));
+        LL_CHECK(settings_.algorithm.frame() == FrameShape::kWhole || !(has_unit_selection<A>() || prepares_per_iteration<A>()));
         if constexpr (UnitAlgorithm<A>)
             LL_CHECK(!info.shares_light_paths && (light_paths == 0 || light_paths == 1),
                      "an algorithm that is asked sample by sample has one light path for each, or none");
@@ -167,7 +167,7 @@ class UnitRenderer final : public Renderer {
     Status check_shape(const RenderUnit& work) const {
         const AlgorithmInfo& info = settings_.algorithm.info();
         const std::string name = "algorithm '" + settings_.algorithm.name() + "' ";
-        if (info.frame == FrameShape::kWhole && work.owner() != scene_->frame().crop)
+        if (settings_.algorithm.frame() == FrameShape::kWhole && work.owner() != scene_->frame().crop)
             return invalid_argument(name + "renders units of the whole frame, not tiles of it");
         if (info.camera_samples == work.splats_only)
             return invalid_argument(name + (work.splats_only ? "makes camera samples, and the unit has none"

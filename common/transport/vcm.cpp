@@ -3,6 +3,7 @@
 #include "common/tables/density_part.h"
 #include "common/tables/train_density.h"
 #include "common/transport/learn_walks.h"
+#include "common/transport/merging_parameters.h"
 #include "common/transport/unit_renderer.h"
 
 namespace lightloom {
@@ -11,38 +12,9 @@ extern const AlgorithmInfo kVcmRow;
 
 namespace {
 
-constexpr std::string_view kRadiusUnits[] = {"pixel", "scene"};
-constexpr std::string_view kKernels[] = {"constant", "epanechnikov"};
-
-// One pixel is the footprint of Georgiev et al.'s and Grittmann et al.'s programs, too.
-constexpr ParameterInfo kMergeRadius{
-    "merge-radius", 1,     1e-3,
-    1000,           false, "radius of merges in the first iteration, in the unit of merge-radius-unit [Georgiev et al. 2012]"};
-constexpr ParameterInfo kMergeRadiusUnit{"merge-radius-unit",
-                                         0,
-                                         0,
-                                         1,
-                                         true,
-                                         "pixel: the width of a pixel where the camera sub-path first meets something that is "
-                                         "neither mirror nor glass; scene: a thousandth of the radius of the scene",
-                                         kRadiusUnits};
-constexpr ParameterInfo kAlpha{
-    "alpha",
-    0.75,
-    0.01,
-    1,
-    false,
-    "how the radius shrinks: its square is in proportion to the number of the iteration to the power of alpha - 1; 1 keeps "
-    "it as it is [Knaus and Zwicker 2011]"};
-constexpr ParameterInfo kMergeFirst{
-    "merge-first",
-    0,
-    0,
-    1,
-    true,
-    "merge at the camera's first hit, too, where light tracing finds the same light without bias [off in Grittmann et al. 2021]",
-    kSwitch};
-constexpr ParameterInfo kKernel{"kernel", 0, 0, 1, true, "weight of a photon by its distance from the camera vertex", kKernels};
+// The first is the sub-path that the camera sample would own in bdpt.
+constexpr ParameterInfo kConnectionsToPhotonPaths{
+    "connections", 1, 1, 64, true, "N: light sub-paths whose vertices a camera vertex is connected to", {}, true};
 constexpr ParameterInfo kPhotonPaths{
     "light-paths",
     1,
@@ -50,13 +22,24 @@ constexpr ParameterInfo kPhotonPaths{
     64,
     false,
     "N1 and n: light sub-paths per pixel and iteration; all of them splat, all of their vertices are "
-    "photons, and every camera sample is connected to one of them"};
+    "photons"};
 
-constexpr ParameterInfo kParameters[] = {
-    kRouletteByAlbedo,         kRouletteStart,   kRouletteMin, heuristic_parameter(HeuristicChoice::kCorrelationAware, 8),
-    kTechniquesOfMerging,      kNextEvent,       kPhotonPaths, kMergeRadius,
-    kMergeRadiusUnit,          kAlpha,           kMergeFirst,  kKernel,
-    emission_parameter(false), kEmissionTraining};
+constexpr ParameterInfo kParameters[] = {kRouletteByAlbedo,
+                                         kRouletteStart,
+                                         kRouletteMin,
+                                         heuristic_parameter(HeuristicChoice::kCorrelationAware, 8),
+                                         kTechniquesOfMerging,
+                                         kNextEvent,
+                                         kShadowRays,
+                                         kConnectionsToPhotonPaths,
+                                         kPhotonPaths,
+                                         kMergeRadius,
+                                         kMergeRadiusUnit,
+                                         kAlpha,
+                                         kMergeFirst,
+                                         kKernel,
+                                         emission_parameter(false),
+                                         kEmissionTraining};
 
 constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &GainPart::kPart, &DensityPart::kPart};
 
@@ -84,27 +67,15 @@ Result<Tables> learn(const LearnRequest& r) {
 
 constexpr LearningInfo kLearning{.parts = kParts, .plan = plan, .learn = learn, .wanted = wanted};
 
-MergeRadius radius_of(const AlgorithmSettings& s, const Scene& scene) {
-    const double value = s.value(kMergeRadius.name), scene_radius = double(scene.emitters().scene_radius());
-    MergeRadius radius{.most2 = scene_radius * scene_radius};
-    const FrameLayout& frame = scene.frame();
-    if (s.value(kMergeRadiusUnit.name) != 0) {
-        radius.fixed2 = value * value * radius.most2 * 1e-6;
-        return radius;
-    }
-    const float centre_density =
-        scene.camera().sample_ray({0.5f * float(frame.width), 0.5f * float(frame.height)}, {0.5f, 0.5f}).pdf;
-    (scene.camera().has_parallel_rays() ? radius.fixed2 : radius.per_distance2) = value * value / double(centre_density);
-    return radius;
-}
-
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     const AlgorithmSettings& s = r.settings.algorithm;
+    LL_RETURN_IF_ERROR(check_photon_memory(r, r.light_paths_per_iteration(), usable_memory()));
     const VcmSelection first{{double(r.light_paths_per_iteration()), next_event_of(s)},
-                             radius_of(s, *r.scene),
+                             merge_radius_of(s, *r.scene),
                              MergeKernel(int(s.value(kKernel.name))),
                              s.value(kMergeFirst.name) != 0,
-                             correction_of(s)};
+                             correction_of(s),
+                             s.value_by_depth(kConnectionsToPhotonPaths.name)};
     const auto density = density_of(r.tables);
     return make_unit_renderer(r, [&](auto&& select) {
         return VcmAlgorithm<std::remove_cvref_t<decltype(select)>>{select, first, s.value(kAlpha.name), heuristic_of(s), density};

@@ -6,7 +6,8 @@
 //   merge at x_i, 1 <= i <= k-2  rho = n a C(i+1) A(i)    a = 1 / (integral of the kernel's square): pi r^2 for the constant
 //                                                         kernel, 3/4 of that for Epanechnikov's
 // and at the camera's first hit, i = k-1, where merge-first is on: there light tracing does as well without bias. Dirac vertices do
-// not merge. The radius is a function of the path and of the iteration alone,
+// not merge. A camera vertex is connected to N of the n sub-paths, so that rho = N C(s) A(s) for 2 <= s <= k-1. The radius is a
+// function of the path and of the iteration alone,
 //     r(j)^2 = r(0)^2 (j + 1)^(alpha - 1)                 [Knaus and Zwicker 2011, eq. 18 in its limit]
 // with r(0) in pixels as they appear at the first vertex that the camera sees, mirrors and glass aside, or relative to the scene.
 // Each iteration has photons of its own: a map that served several would be one sample and not several.
@@ -15,33 +16,31 @@
 // little; both vanish as r does. Missing: nothing that has a vertex to merge at.
 
 #include <algorithm>
-#include <array>
 #include <memory>
 
 #include "common/path/merge_shares.h"
 #include "common/tables/density_map.h"
 #include "common/transport/bdpt.h"
-#include "common/transport/photon_map.h"
+#include "common/transport/merging.h"
+#include "common/transport/photon_memory.h"
 
 namespace lightloom {
 
-/// The radius of merges, m.
-struct MergeRadius {
-    double per_distance2 = 0;  ///< Squared; for each square metre of PathView::footprint_distance2.
-    double fixed2 = 0;         ///< Squared; for every path.
-    double most2 = 0;          ///< Squared; no radius is larger.
+/// The connections of vcm: each camera vertex to N light sub-paths, as bdpt's to one.
+struct SeveralConnections {
+    BdptSelection bdpt;
+    ByDepth<double> count = 1;  ///< N
 
-    double squared(double distance2) const { return std::min(per_distance2 * distance2 + fixed2, most2); }
-    MergeRadius scaled(double factor2) const { return {per_distance2 * factor2, fixed2 * factor2, most2 * factor2}; }
+    struct OnPath : BdptSelection::OnPath {
+        ByDepth<double> count;
+
+        double connections(int s) const { return count(view.k + 1 - s); }
+        double connect(int s) const { return s == 1 ? 0 : connections(s); }
+        double connect(int s, double share) const { return connect(s) * share; }
+    };
+    OnPath on(const PathView& view) const { return {bdpt.on(view), count}; }
+    NextEventRays next_event_rays() const { return bdpt.rays; }
 };
-
-enum class MergeKernel : uint8_t { kConstant, kEpanechnikov };
-
-/// The kernel at a squared distance below radius2, m^-2.
-inline float kernel(MergeKernel kind, float distance2, float radius2) {
-    const float constant = kInvPi / radius2;
-    return kind == MergeKernel::kConstant ? constant : 2 * constant * (1 - distance2 / radius2);
-}
 
 struct VcmSelection {
     BdptSelection bdpt;
@@ -49,8 +48,9 @@ struct VcmSelection {
     MergeKernel kernel = MergeKernel::kConstant;
     bool first_hit = false;  ///< Whether merges at x_{k-1} count.
     Correction correction = Correction::kUncorrected;
+    ByDepth<double> connections = 1;  ///< N: light sub-paths that a camera vertex is connected to.
 
-    struct OnPath : Corrected<BdptSelection>::OnPath {
+    struct OnPath : Corrected<SeveralConnections>::OnPath {
         static constexpr bool kMerges = true;
         double merges;
         int last;  ///< Last vertex that may merge.
@@ -59,26 +59,13 @@ struct VcmSelection {
         double merge(int i) const { return i > last ? 0 : merges * shares(i); }
     };
     OnPath on(const PathView& view) const {
-        const double disc = kPiD * radius.squared(view.footprint_distance2);
-        const double area = disc * (kernel == MergeKernel::kConstant ? 1 : 0.75), n = bdpt.light_paths_per_iteration;
+        const double disc = kPiD * radius.squared(view.footprint_distance2), n = bdpt.light_paths_per_iteration;
+        const double area = disc * (kernel == MergeKernel::kConstant ? 1 : 0.75);
         const MergeRule rule{n, disc, first_hit ? view.k - 1 : view.k - 2};
-        const double count = correction == Correction::kOne ? 1 : n;
-        return {Corrected<BdptSelection>{bdpt, correction}.on(view), count * area, rule.last, shares_on(view, rule)};
+        return {Corrected<SeveralConnections>{{bdpt, connections}, correction}.on(view), n * area, rule.last,
+                MergeShares::of(correction, view, rule)};
     }
     NextEventRays next_event_rays() const { return bdpt.rays; }
-
-  private:
-    MergeShares shares_on(const PathView& view, const MergeRule& rule) const {
-        switch (correction) {
-            case Correction::kCorrelation: return MergeShares::correlation(view, rule);
-            case Correction::kFootprint: return MergeShares::footprints(view, rule);
-            case Correction::kPhotons: return MergeShares::photons(view, rule, false);
-            case Correction::kPhotonsBalanced: return MergeShares::photons(view, rule, true);
-            case Correction::kUncorrected:
-            case Correction::kOne: return {};
-        }
-        return {};
-    }
 };
 
 /// What weights of single paths need to know (unit_renderer.h), at the radius of the first iteration.
@@ -113,13 +100,6 @@ struct VcmMethod {
         view->source = light_source(e);
         if (correction == Correction::kFootprint) view_edges(e, start, y, z, t, view);
         if (correction == Correction::kPhotons || correction == Correction::kPhotonsBalanced) view_photons(y, z, t, view);
-    }
-    /// The same for every path with the camera sub-path z[0 .. t-1], t >= 2: along it from the lens to its first vertex that is not
-    /// a Dirac vertex.
-    static double camera_distance2(const PathVertex* z, int t) {
-        float distance = length(z[1].p - z[0].p);
-        for (int j = 1; j + 1 < t && z[j].delta; ++j) distance += length(z[j + 1].p - z[j].p);
-        return double(distance) * double(distance);
     }
 
   private:
@@ -185,7 +165,10 @@ struct VcmAlgorithm {
             scope, scope.work.light_path_count, preparation,
             [&](PathVertex* y, int n) { method.label_light_path(scope.scene, y, n); }, splat);
         state.cache.prefixes = {};
-        if (!scope.stop.stop_requested()) state.photons = PhotonMap(state.cache);
+        if (!scope.stop.stop_requested()) {
+            state.photons = PhotonMap(state.cache);
+            note_photon_memory({state.cache.memory_bytes(), state.photons.memory_bytes()});
+        }
         return state;
     }
 
@@ -200,14 +183,18 @@ struct VcmAlgorithm {
         const Scene& scene = context.scene;
         PathVertex* z = context.camera_path;
         PathView view;
-        // Every camera sample is connected to a sub-path of its own where there are as many as pixels.
+        // Every camera sample is connected to a sub-path of its own where there are as many as pixels, and to others of the frame
+        // if there are to be several.
         const std::vector<LightCache::Path>& paths = state.cache.paths;
-        const LightCache::Path none;
-        const LightCache::Path& own =
-            paths.empty() ? none : paths[context.pixel * paths.size() / uint64_t(scene.frame().crop.area())];
-        const int n = int(own.length);
-        const LightVertex* y = n > 0 ? state.cache.at(own.first_vertex) : nullptr;
-        for (int s = 1; s <= n; ++s) prefetch(&y[s - 1]);
+        const uint64_t own = context.pixel * paths.size() / uint64_t(scene.frame().crop.area());
+        const ByDepth<int> connections = first.connections.each([](double n) { return int(n); });
+        const uint64_t stride = std::max<uint64_t>(1, paths.size() / uint64_t(std::max(connections.at_first, connections.later)));
+        const auto sub_path = [&](int c) {
+            return paths.empty() ? LightCache::Path{} : paths[(own + uint64_t(c) * stride) % paths.size()];
+        };
+        const LightCache::Path nearest = sub_path(0);
+        if (nearest.length > 0)
+            for (const LightVertex *y = state.cache.at(nearest.first_vertex), *end = y + nearest.length; y != end; ++y) prefetch(y);
 
         const NextEventRays rays = state.selection.next_event_rays();
         CameraSampler sampler(context.seed, context.iteration, context.pixel);
@@ -219,67 +206,37 @@ struct VcmAlgorithm {
         const auto visit = [&](int t) {
             method.label_camera_vertex(scene, &z[t - 1]);
             if (t == 2) view.primary_distance2 = double(length_squared(z[1].p - z[0].p));
-            view.footprint_distance2 = method.camera_distance2(z, t);
+            view.footprint_distance2 = camera_distance2(z, t);
             contribute_hit<ViewDetail::kFull>(scene, z, t, &view, weigh);
             if (t > context.max_edges || !z[t - 1].bsdf.has_smooth_lobe()) return;
             contribute_next_event<ViewDetail::kFull>(scene, z, t, sampler, rays(t), &view, &context.counters, weigh);
-            for (int s = 2; s <= n && s + t - 1 <= context.max_edges; ++s) {
-                if (!y[s - 1].smooth) continue;
-                if (const Rgb c = connect(scene, y, s, z, t, &view, &context.counters); !c.is_black())
-                    weigh(from_light_path(c, Technique::connect(s), y, z, t), view);
+            const float share = 1 / float(connections(t));
+            for (int c = 0; c < connections(t); ++c) {
+                const LightCache::Path path = c == 0 ? nearest : sub_path(c);
+                const LightVertex* y = path.length > 0 ? state.cache.at(path.first_vertex) : nullptr;
+                for (int s = 2; s <= int(path.length) && s + t - 1 <= context.max_edges; ++s) {
+                    if (!y[s - 1].smooth) continue;
+                    const Rgb value = connect(scene, y, s, z, t, &view, &context.counters);
+                    if (value.is_black()) continue;
+                    PathContribution found = from_light_path(value * share, Technique::connect(s), y, z, t);
+                    found.inverse_density = share;
+                    weigh(found, view);
+                }
             }
-            if (t > 2 || first.first_hit) merge_near(context, state, t, &view, weigh);
+            if (t > 2 || first.first_hit) {
+                const Disc disc{float(state.merging.radius.squared(view.footprint_distance2)),
+                                float(1 / first.bdpt.light_paths_per_iteration), first.kernel};
+                merge_near<ViewDetail::kFull>(scene, state.cache, state.photons, disc, context.max_edges, z, t, &view, weigh);
+            }
         };
         const auto escape = [&](int t, const WalkRay& ray) {
             // A camera path that branches may have visited a longer branch before.
-            if (t >= 2) view.footprint_distance2 = method.camera_distance2(z, t);
+            if (t >= 2) view.footprint_distance2 = camera_distance2(z, t);
             if (t <= context.max_edges) contribute_escape<ViewDetail::kFull>(scene, z, t, ray, &view, weigh);
         };
         return trace_camera_path<branches>(scene, sampler, context.px, context.py, context.max_edges, context.roulette, z,
                                            &context.counters, visit, escape);
     }
-
-    /// Merges z_{t-1} with the photons around it. `view` has the footprint of the camera sub-path.
-    template <class Contribute>
-    void merge_near(const SampleContext& context, const State& state, int t, PathView* view, Contribute&& contribute) const {
-        const PathVertex* z = context.camera_path;
-        const PathVertex& v = z[t - 1];
-        const float radius2 = float(state.merging.radius.squared(view->footprint_distance2));
-        const float per_path = float(1 / first.bdpt.light_paths_per_iteration);
-        const uint32_t longest = uint32_t(context.max_edges + 2 - t);
-        struct Near {
-            const LightVertex* y;
-            int s;
-            float distance2;
-        };
-        // The photons of a disc are far apart in memory, and so they are all asked for before the first is read.
-        std::array<Near, 32> near;
-        size_t count = 0;
-        const auto merge_all = [&] {
-            for (size_t i = 0; i < count; ++i) {
-                const auto& [y, s, distance2] = near[i];
-                if (abs_dot(y[s - 1].ng, v.ng) < kSameSurface) continue;
-                const Rgb c = merge(context.scene, y, s, z, t, view);
-                if (c.is_black()) continue;
-                const float scale = per_path * kernel(first.kernel, distance2, radius2);
-                PathContribution found = from_light_path(c * scale, Technique::merge(s - 1), y, z, t);
-                found.inverse_density = scale;
-                contribute(found, *view);
-            }
-            count = 0;
-        };
-        state.photons.for_each_near(v.p, radius2, [&](const PhotonMap::Photon& photon, float distance2) {
-            if (photon.s > longest) return;
-            const LightVertex* y = state.cache.at(photon.first_vertex);
-            for (uint32_t i = 0; i < photon.s; ++i) prefetch(&y[i]);
-            near[count++] = {y, int(photon.s), distance2};
-            if (count == near.size()) merge_all();
-        });
-        merge_all();
-    }
-
-    /// Least cosine between the geometric normals of two vertices that merge: those of a box's edge do not.
-    static constexpr float kSameSurface = 0.7f;
 };
 
 }  // namespace lightloom

@@ -44,7 +44,7 @@ uint32_t group_size(uint64_t done, uint32_t cap) { return uint32_t(std::clamp<ui
 
 PlanOptions plan_options(const FrameLayout& frame, const AlgorithmSettings& algorithm) {
     return {.light_paths_per_iteration = algorithm.light_paths_per_iteration(frame.crop.area()),
-            .whole_frame = algorithm.info().frame == FrameShape::kWhole,
+            .whole_frame = algorithm.frame() == FrameShape::kWhole,
             .splats_only = !algorithm.info().camera_samples,
             .shares_light_paths = algorithm.info().shares_light_paths};
 }

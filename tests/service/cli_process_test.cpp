@@ -283,7 +283,7 @@ TEST_F(CommandLine, ChoicesHaveNamesInManifestsAndNumbersInImages) {
     for (const char* name : {"name", "number"})
         EXPECT_EQ(Json::parse(*read_file(path(std::string(name) + ".manifest.json")))["spec"]["parameters"]["heuristic"], "power");
     EXPECT_EQ(read_exr(path("name.exr"))->attribute(exr_attribute::kParameters),
-              "heuristic=1 next-event=1 roulette=0 rr-min=0.7 rr-start=4 training-paths=50000");
+              "heuristic=1 next-event=1 roulette=0 rr-min=0.7 rr-start=4 shadow-rays=1 training-paths=50000");
 }
 
 /// Help of every command names what it takes, its units and its defaults.

@@ -72,5 +72,19 @@ TEST(Merging, AnySubsetHasTheSameMeanUpToTheKernel) {
     }
 }
 
+/// With discs too small for their bias to be seen, spcbpt has the same mean whether it merges or not.
+TEST(Merging, InSpcbptHasTheSameMeanUpToTheKernel) {
+    for (const auto& [name, scene] : {std::pair{"diffuse box", testing::diffuse_box()}, {"glossy", testing::glossy()}}) {
+        const testing::Sample expected = frame_mean(scene, "spcbpt", {}, {.min_k = 2}, 100);
+        for (const auto& [radius, seed] : {std::pair{"2", 20000}, {"0.2", 21000}}) {
+            const testing::Sample found =
+                frame_mean(scene, "spcbpt", {{"merging", "on"}, {"merge-radius", radius}}, {.min_k = 2}, uint64_t(seed));
+            const double error = std::sqrt(found.variance + expected.variance) / expected.mean;
+            EXPECT_LT(error, 0.01) << name;
+            EXPECT_NEAR(found.mean / expected.mean, 1, 0.01 + 4 * error) << name << ", radius " << radius;
+        }
+    }
+}
+
 }  // namespace
 }  // namespace lightloom

@@ -14,8 +14,9 @@ using testing::SceneBuilder;
 
 constexpr int kSeeds = 32;
 
-RegionMeans estimate(const std::shared_ptr<const Scene>& scene, const std::string& algorithm, uint64_t first_seed) {
-    return testing::replicate(testing::catalog_image(scene, algorithm, 5, 32), scene->frame().crop, kSeeds, first_seed);
+RegionMeans estimate(const std::shared_ptr<const Scene>& scene, const std::string& algorithm, uint64_t first_seed,
+                     const std::map<std::string, std::string>& parameters = {}) {
+    return testing::replicate(testing::catalog_image(scene, algorithm, 5, 32, parameters), scene->frame().crop, kSeeds, first_seed);
 }
 
 /// Caustic of a point light, seen directly: whatever traces light sub-paths has it, and agrees about it; what traces from the
@@ -78,6 +79,14 @@ TEST(MissingPaths, SpecularDiffuseSpecular) {
             EXPECT_GT(mean, 0) << row->name << " should see this point light";
         else
             EXPECT_EQ(mean, 0) << row->name << " should not be able to see this point light";
+        // The same energy as vcm finds, which is the only other one that finds any.
+        if (row->may_merge) {
+            const testing::Sample vcm = estimate(with_point, "vcm", 400, {{"merge-radius", "1"}}).frame();
+            const testing::Sample merged =
+                estimate(with_point, std::string(row->name), 500, {{"merging", "on"}, {"merge-radius", "1"}}).frame();
+            EXPECT_GT(merged.mean, 0);
+            EXPECT_NEAR(merged.mean, vcm.mean, 4 * std::sqrt(merged.variance + vcm.variance) + 0.02 * vcm.mean) << row->name;
+        }
     }
     // The lamp can be hit: everything with hits sees it, and agrees; light tracing still does not.
     const RegionMeans path = estimate(with_lamp, "path", 300);

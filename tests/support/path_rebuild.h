@@ -223,7 +223,7 @@ inline std::optional<Rebuilt> rebuild(const Scene& scene, const FullPath& path, 
             y = rebuild_light(scene, path, s + 1);
             z = rebuild_camera(scene, path, k + 1 - s, nullptr, false);
             if (!y || !z) return std::nullopt;
-            r.contribution = merge(scene, y->data(), s + 1, z->data(), k + 1 - s, &r.view);
+            r.contribution = merge<ViewDetail::kSubspace>(scene, y->data(), s + 1, z->data(), k + 1 - s, &r.view);
             break;
         }
     }

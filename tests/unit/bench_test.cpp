@@ -110,6 +110,7 @@ TEST(AlgorithmChoice, ParsesSettingsAndNamesMistakes) {
                                                                                  {"roulette", "albedo"},
                                                                                  {"rr-min", "0.5"},
                                                                                  {"rr-start", "6"},
+                                                                                 {"shadow-rays", "1"},
                                                                                  {"techniques", "all"},
                                                                                  {"training-paths", "100000"}}));
     EXPECT_EQ(choice->label, "bdpt:rr-start=6:heuristic=power");

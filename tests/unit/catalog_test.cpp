@@ -289,5 +289,17 @@ TEST(Units, OfTheWrongShapeAreRefused) {
     EXPECT_GE(splats, 1);
 }
 
+/// Mutation: bdpt without its reason says only that there is no such parameter.
+TEST(Catalog, AParameterThatMakesNoSenseIsRefusedWithTheReason) {
+    EXPECT_EQ(AlgorithmSettings::parse("bdpt", {{"connections", "4"}}).status().message(),
+              "algorithm 'bdpt' has no parameter 'connections': every camera vertex is connected to all vertices of the one light "
+              "sub-path of its sample; vcm connects to several");
+    for (const AlgorithmInfo* row : catalog())
+        for (const AbsentParameter& absent : row->absent)
+            for (const ParameterInfo& p : row->parameters) EXPECT_NE(p.name, absent.name) << row->name;
+    EXPECT_EQ(AlgorithmSettings::parse("path", {{"shadow-rays", "1025"}}).status().message(),
+              "parameter shadow-rays=1025 of 'path' must be an integer from 1 to 1024");
+}
+
 }  // namespace
 }  // namespace lightloom

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/transport/spcbpt.h"
+#include "common/transport/spcbpt_merging.h"
 #include "common/transport/unit_renderer.h"
 #include "tests/support/path_generator.h"
 #include "tests/support/random_emission.h"
@@ -34,7 +34,10 @@ bool can_be_hit(const Scene& scene) {
     return std::any_of(emitters.begin(), emitters.end(), [](const Emitter& e) { return e.can_be_hit(); });
 }
 
-using SpcbptWeights = detail::CachedWeights<SubspaceConnections<>>;
+struct EveryTechnique {
+    MergingSelection operator()(MergingSelection s) const { return s; }
+};
+using SpcbptWeights = detail::CachedWeights<MergingConnections<EveryTechnique>>;
 
 SpcbptWeights weights_of(const Scene& scene, SubspaceTables tables, int connections) {
     const auto prepared = std::make_shared<const PreparedTables>(std::move(tables));
@@ -42,7 +45,8 @@ SpcbptWeights weights_of(const Scene& scene, SubspaceTables tables, int connecti
         spcbpt_selection(prepared, {.light_paths_per_iteration = 0.7 * double(scene.frame().crop.area()),
                                     .connections = connections,
                                     .roulette = RouletteRule{}});
-    return {SubspaceConnections<>{selection, prepared, connections}, Heuristic::kBalance};
+    const MergingSelection merging{selection, {.paths = 2000, .radius = {.fixed2 = 1e-3, .most2 = 1}}};
+    return {MergingConnections<EveryTechnique>({}, merging, 1, prepared, connections), Heuristic::kBalance};
 }
 
 TEST(TypicalSurvival, CountsTheEventsThatASubPathWentThrough) {
@@ -106,7 +110,6 @@ void check_labels(const testing::NamedScene& named, bool lit) {
             const int k = path.k();
             if (k < 2) return;
             testing::for_each_technique(k, [&](Technique t) {
-                if (t.kind == TechniqueKind::kMerge) return;  // has no labels yet
                 const auto other = rebuild(*stage, path, t, &weights);
                 if (!other) return;
                 // What a connection of s' light vertices reads, where it is possible and light tracing reaches it.
@@ -168,7 +171,6 @@ TEST(Walk, DoesNotFollowDirectionsOfZeroDensity) {
 template <class Visit>
 void each_weighted(const Scene& scene, const FullPath& path, const SpcbptWeights& a, const SpcbptWeights& b, Visit&& visit) {
     testing::for_each_technique(path.k(), [&](Technique t) {
-        if (t.kind == TechniqueKind::kMerge) return;
         const auto ra = rebuild(scene, path, t, &a), rb = rebuild(scene, path, t, &b);
         ASSERT_EQ(ra.has_value(), rb.has_value());
         if (ra) visit(t, ra->view, rb->view);

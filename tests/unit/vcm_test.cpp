@@ -93,12 +93,12 @@ TEST(Vcm, MergesAtTheFirstHitAreAChoice) {
 TEST(Vcm, RadiusFollowsTheFootprint) {
     std::vector<PathVertex> z(5);
     z[1].p = {0, 0, 2}, z[2].p = {0, 3, 2}, z[3].p = {1, 3, 2}, z[4].p = {9, 3, 2};
-    EXPECT_FLOAT_EQ(float(VcmMethod<>::camera_distance2(z.data(), 2)), 4);
-    EXPECT_FLOAT_EQ(float(VcmMethod<>::camera_distance2(z.data(), 5)), 4);
+    EXPECT_FLOAT_EQ(float(camera_distance2(z.data(), 2)), 4);
+    EXPECT_FLOAT_EQ(float(camera_distance2(z.data(), 5)), 4);
     z[1].delta = z[2].delta = true;
-    EXPECT_FLOAT_EQ(float(VcmMethod<>::camera_distance2(z.data(), 2)), 4);
-    EXPECT_FLOAT_EQ(float(VcmMethod<>::camera_distance2(z.data(), 3)), 25);
-    EXPECT_FLOAT_EQ(float(VcmMethod<>::camera_distance2(z.data(), 5)), 36);
+    EXPECT_FLOAT_EQ(float(camera_distance2(z.data(), 2)), 4);
+    EXPECT_FLOAT_EQ(float(camera_distance2(z.data(), 3)), 25);
+    EXPECT_FLOAT_EQ(float(camera_distance2(z.data(), 5)), 36);
     const MergeRadius radius{.per_distance2 = 0.25, .fixed2 = 1, .most2 = 4};
     EXPECT_EQ(radius.squared(4), 2);
     EXPECT_EQ(radius.squared(1e9), 4);

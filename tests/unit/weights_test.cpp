@@ -42,7 +42,8 @@ struct Member {
 };
 using Family = std::vector<Member>;
 
-/// A row with its defaults, with each value of each of its choices, and with few and many connections, by depth or not; all with
+/// A row with its defaults, with each value of each of its choices, and with few and many
+/// connections and shadow rays, by depth or not; all with
 /// the same tables. Empty where single paths cannot be asked about.
 Family family_of(const AlgorithmInfo& row, const std::shared_ptr<const Scene>& scene, uint64_t seed) {
     const std::string name(row.name);
@@ -50,10 +51,16 @@ Family family_of(const AlgorithmInfo& row, const std::shared_ptr<const Scene>& s
     if (parameters.contains("cache")) parameters["cache"] = "50";
     if (parameters.contains("merge-radius")) parameters["merge-radius"] = "2";  // merges count for as much as the rest
     std::vector<std::pair<std::string, std::string>> changes{{"", ""}};
+    // The first of a family completes the paths for all of them, and a row that may merge reads the most if it does.
+    if (row.may_merge) {
+        changes.insert(changes.begin(), {"merging", "on"});
+        for (const char* radius : {"0.1", "2", "100"}) changes.emplace_back("merging=on merge-radius", radius);
+    }
     for (const ParameterInfo& p : row.parameters) {
         for (const std::string_view choice : p.choices)
             if (choice != "merge") changes.emplace_back(p.name, choice);  // no path here is made by a merge, and hits alone are few
         if (p.name == "merge-radius") changes.insert(changes.end(), {{"merge-radius", "0.1"}, {"merge-radius", "100"}});
+        if (p.name == "shadow-rays") changes.insert(changes.end(), {{"shadow-rays", "4"}, {"shadow-rays", "100"}});
         if (p.name == "connections") changes.insert(changes.end(), {{"connections", "1,4"}, {"connections", "5"}});
     }
     const Tables all_tables = testing::random_tables_for(row, *scene, seed);
@@ -62,6 +69,11 @@ Family family_of(const AlgorithmInfo& row, const std::shared_ptr<const Scene>& s
     for (const auto& [parameter, value] : changes) {
         auto set = parameters;
         if (!parameter.empty()) set[parameter] = value;
+        if (parameter.starts_with("merging=on ")) {
+            set.erase(parameter);
+            set["merging"] = "on";
+            set["merge-radius"] = value;
+        }
         const RenderSettings settings = testing::settings_of(name, set, seed);
         const Tables tables = settings.algorithm.learning() ? all_tables : Tables();
         const auto renderer = Renderer::create(scene, settings, tables);
