@@ -11,8 +11,9 @@ namespace lightloom {
 namespace {
 
 constexpr double kLongestLeaseWait = 5;
-/// A waiting call looks by itself that often whether its caller is still there, and whether a worker that rested may go on.
-constexpr double kLookSeconds = 1;
+/// A waiting call looks by itself that often whether its caller is still there, and whether a worker that rested may go on. Since
+/// the worker is heard of in this way, it is at most a share of a lease.
+constexpr double kLookSeconds = 2.5, kLookShare = 0.25;
 
 std::string describe(const BuildIdentity& identity) {
     return "build " + identity.build_id + ", math profile \"" + identity.math_profile + "\", golden unit " +
@@ -132,6 +133,7 @@ bool Dispatch::took_too_long(OpenBook& book, const JobPtr& file, UnitTable& unit
 Result<std::vector<UnitLease>> Dispatch::lease(const std::string& worker_id, double wait_seconds,
                                                const std::function<bool()>& cancelled) {
     if (!(wait_seconds >= 0)) return invalid_argument("a worker waits for 0 or more seconds");
+    const double look_seconds = std::min(kLookSeconds, kLookShare * office_.options.lease_seconds);
     const auto deadline = seconds_after(std::chrono::steady_clock::now(), std::min(wait_seconds, kLongestLeaseWait));
     OpenBook book(office_);
     WorkerRecord* const worker = book->workers.find(worker_id);
@@ -154,7 +156,7 @@ Result<std::vector<UnitLease>> Dispatch::lease(const std::string& worker_id, dou
             }
             const auto now = std::chrono::steady_clock::now();
             if (now >= deadline) break;
-            const auto until = std::min(deadline, seconds_after(now, kLookSeconds));
+            const auto until = std::min(deadline, seconds_after(now, look_seconds));
             while (!place.waiter().look && std::chrono::steady_clock::now() < until) book.wait_until(place.waiter().woken, until);
         }
     }

@@ -14,7 +14,7 @@ class Dispatch {
 
     Result<WorkerGrant> register_worker(const WorkerHello& hello);
     Result<std::vector<UnitLease>> lease(const std::string& worker_id, double wait_seconds, const std::function<bool()>& cancelled);
-    /// Makes calls of lease() look at `cancelled` now; they do so by themselves once a second.
+    /// Makes calls of lease() look at `cancelled` now; they do so by themselves every few seconds.
     void wake();
     Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running);
     Status release(const std::string& worker_id, const UnitReference& unit, const Status& why);
