@@ -52,7 +52,8 @@ void Coordinator::keep_time(std::stop_token stop) {
     while (!stop.stop_requested()) {
         const TimePoint now = office_.now();
         double seconds = office_.options.longest_sleep_seconds;
-        if (office_.archive.keeps()) seconds = std::min(seconds, book->paused.empty() ? kRoomSeconds : kPausedSeconds);
+        const bool looks = office_.archive.keeps() || !book->paused.empty();
+        if (looks) seconds = std::min(seconds, book->paused.empty() ? kRoomSeconds : kPausedSeconds);
         if (office_.options.beat) {
             office_.options.beat();
             seconds = std::min(seconds, kBeatSeconds);
@@ -62,7 +63,7 @@ void Coordinator::keep_time(std::stop_token stop) {
         if (seconds > 0) book.wait_until(book->agenda_changed, seconds_after(std::chrono::steady_clock::now(), seconds));
         if (stop.stop_requested()) break;
         dispatch_.tick(book);
-        if (office_.archive.keeps() &&
+        if ((office_.archive.keeps() || !book->paused.empty()) &&
             seconds_between(room_checked_, now) >= (book->paused.empty() ? kRoomSeconds : kPausedSeconds))
             look_for_room(book);
     }

@@ -11,8 +11,9 @@ namespace lightloom {
 namespace {
 
 constexpr double kLongestLeaseWait = 5;
-/// A waiting call looks by itself that often whether its caller is still there, and whether a worker that rested may go on.
-constexpr double kLookSeconds = 1;
+/// A waiting call looks by itself that often whether its caller is still there, and whether a worker that rested may go on. Since
+/// the worker is heard of in this way, it is at most a share of a lease.
+constexpr double kLookSeconds = 2.5, kLookShare = 0.25;
 
 std::string describe(const BuildIdentity& identity) {
     return "build " + identity.build_id + ", math profile \"" + identity.math_profile + "\", golden unit " +
@@ -68,47 +69,28 @@ Result<WorkerGrant> Dispatch::register_worker(const WorkerHello& hello) {
     return WorkerGrant{worker.id, options.heartbeat_seconds, options.lease_seconds};
 }
 
-Dispatch::Turn Dispatch::next_unit(OpenBook& book, WorkerRecord& worker, std::optional<UnitLease>* lease) {
-    if (!book->paused.empty()) return Turn::kNothingLeft;
+Choice::Turn Dispatch::next_unit(OpenBook& book, WorkerRecord& worker, std::optional<UnitLease>* lease) {
+    if (!book->paused.empty()) return Choice::Turn::kNothingLeft;
     forget_what_it_has_not(*book, worker);
-    const TimePoint now = office_.now();
-    WorkerRegistry& workers = book->workers;
-    if (!worker.has_room() || workers.rests(worker, now)) return Turn::kNotForThisOne;
-    // A worker gets a second unit only if enough are left for the workers that have none: a unit must not wait behind
-    // another one while a worker idles.
-    const size_t idle = worker.held.empty() ? 0 : workers.idle();
-    bool passed_over = false;
-    for (const auto& [number, in_line] : book->open_jobs()) {
-        const JobPtr file = book->in_its_place(in_line);
-        Job& job = file->job;
-        if (file != in_line && job.state() != JobState::kPreparing) continue;
-        UnitTable* const units = job.open_units();
-        if (!units) continue;
-        const bool suspect = units->has_suspect();
-        if (!suspect && (units->holds_back_others() || !units->has_more_than(0))) continue;
-        passed_over = true;
-        if (WorkerRegistry::rests_from(worker, job.id(), now)) continue;
-        // For the unit's job, a worker whose host lacks something is not there.
-        const auto anyone_else = [&](const UnitTable::FailedWorkers& but) {
-            return workers.anyone_else([&](const WorkerRecord& w) { return but.contains(w.index) || w.lacks.contains(job.id()); },
-                                       now);
-        };
-        std::optional<WorkUnit> unit;
-        if (suspect) {
-            // As long as a suspect waits, nobody gets a second unit: somebody will soon hold nothing, and take it.
-            if (!worker.held.empty()) return Turn::kNotForThisOne;
-            unit = units->lease_suspect(worker.index, now, office_.lease_end(), anyone_else);
-            if (unit) worker.alone = UnitReference{job.id(), unit->key};
+    const auto offers = [&](const std::function<bool(const Offer&)>& visit) {
+        for (const auto& [number, in_line] : book->open_jobs()) {
+            const JobPtr file = book->in_its_place(in_line);
+            const JobState state = file->job.state();
+            UnitTable* const units = file->job.open_units();
+            if (!units || (file != in_line && state != JobState::kPreparing)) continue;
+            if (!visit({file->number, file->job.id(), units, state == JobState::kRunning})) return;
         }
-        if (!unit && units->holds_back_others()) continue;
-        if (!unit && !worker.held.empty() && !units->has_more_than(idle)) continue;
-        if (!unit) unit = units->lease(worker.index, now, office_.lease_end(), anyone_else);
-        if (!unit) continue;
-        make_lease(book, file, worker, *unit, lease);
-        return Turn::kLeased;
-    }
-    if (lease_copy(book, worker, lease)) return Turn::kLeased;
-    return passed_over ? Turn::kNotForThisOne : Turn::kNothingLeft;
+    };
+    const Choice choice = choose_unit(offers, worker, book->workers, office_.now(), office_.lease_end());
+    if (choice.turn != Choice::Turn::kLeased) return choice.turn;
+    const JobPtr file = book->find(choice.job);
+    const UnitKey& key = choice.unit.key;
+    if (choice.kind == Choice::Kind::kSuspect) worker.alone = UnitReference{file->job.id(), key};
+    if (choice.kind == Choice::Kind::kCopy)
+        book.note().info(file->job.id() + ": unit " + unit_name(key) + " is rendered by " + worker.id +
+                         ", too, which has nothing else");
+    make_lease(book, file, worker, choice.unit, lease);
+    return choice.turn;
 }
 
 void Dispatch::make_lease(OpenBook& book, const JobPtr& file, WorkerRecord& worker, const WorkUnit& unit,
@@ -133,27 +115,6 @@ void Dispatch::make_lease(OpenBook& book, const JobPtr& file, WorkerRecord& work
     }
 }
 
-bool Dispatch::lease_copy(OpenBook& book, WorkerRecord& worker, std::optional<UnitLease>* lease) {
-    if (!worker.held.empty()) return false;
-    const TimePoint now = office_.now();
-    for (const auto& [number, file] : book->open_jobs()) {
-        const Job& job = file->job;
-        const double pace = worker.samples_per_second(job.id());
-        if (pace <= 0 || job.state() != JobState::kRunning || WorkerRegistry::rests_from(worker, job.id(), now)) continue;
-        UnitTable& units = *file->job.open_units();
-        if (!may_copy(units)) continue;
-        for (const UnitKey& key : worth_copying(units, job.id(), book->workers, pace, now)) {
-            const auto unit = units.copy(key, worker.index, now, office_.lease_end());
-            if (!unit) continue;
-            book.note().info(job.id() + ": unit " + unit_name(key) + " is rendered by " + worker.id +
-                             ", too, which has nothing else");
-            make_lease(book, file, worker, *unit, lease);
-            return true;
-        }
-    }
-    return false;
-}
-
 bool Dispatch::took_too_long(OpenBook& book, const JobPtr& file, UnitTable& units, const UnitKey& key, WorkerRecord& worker) {
     const TimePoint now = office_.now();
     const auto begun = units.rendering(key, worker.index, now);
@@ -172,6 +133,7 @@ bool Dispatch::took_too_long(OpenBook& book, const JobPtr& file, UnitTable& unit
 Result<std::vector<UnitLease>> Dispatch::lease(const std::string& worker_id, double wait_seconds,
                                                const std::function<bool()>& cancelled) {
     if (!(wait_seconds >= 0)) return invalid_argument("a worker waits for 0 or more seconds");
+    const double look_seconds = std::min(kLookSeconds, kLookShare * office_.options.lease_seconds);
     const auto deadline = seconds_after(std::chrono::steady_clock::now(), std::min(wait_seconds, kLongestLeaseWait));
     OpenBook book(office_);
     WorkerRecord* const worker = book->workers.find(worker_id);
@@ -184,16 +146,17 @@ Result<std::vector<UnitLease>> Dispatch::lease(const std::string& worker_id, dou
             worker->last_heard = office_.now();
             std::optional<UnitLease> unit;
             const bool woken = std::exchange(place.waiter().look, false);
-            const Turn turn = next_unit(book, *worker, &unit);
+            const Choice::Turn turn = next_unit(book, *worker, &unit);
             // Where there may be more, the next in line looks, too.
-            if (turn == Turn::kLeased || (woken && turn == Turn::kNotForThisOne)) book->wake_one_waiter(place.behind());
+            if (turn == Choice::Turn::kLeased || (woken && turn == Choice::Turn::kNotForThisOne))
+                book->wake_one_waiter(place.behind());
             if (unit) {
                 leases.push_back(*std::move(unit));
                 break;
             }
             const auto now = std::chrono::steady_clock::now();
             if (now >= deadline) break;
-            const auto until = std::min(deadline, seconds_after(now, kLookSeconds));
+            const auto until = std::min(deadline, seconds_after(now, look_seconds));
             while (!place.waiter().look && std::chrono::steady_clock::now() < until) book.wait_until(place.waiter().woken, until);
         }
     }
@@ -245,11 +208,8 @@ Status Dispatch::release(const std::string& worker_id, const UnitReference& unit
     const bool lost_bytes = why.code() == StatusCode::kDataLoss || why.code() == StatusCode::kNotFound;
     const bool repaired = lost_bytes && repair_tables(office_, unit.job_id);
     OpenBook book(office_);
-    WorkerRecord* const worker = book->workers.find(worker_id);
+    const auto [worker, file, units] = book->take_back(worker_id, unit);
     if (!worker) return no_worker(worker_id);
-    worker->lets_go(unit);
-    const JobPtr file = book->find(unit.job_id);
-    UnitTable* const units = file ? file->job.open_units(unit.key) : nullptr;
     if (!units) return {};
     // Network errors say nothing about the unit and only cost time.
     const bool blameless = repaired || why.code() == StatusCode::kCancelled || why.code() == StatusCode::kUnavailable ||

@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "server/choose_unit.h"
 #include "server/office.h"
 
 namespace lightloom {
@@ -13,7 +14,7 @@ class Dispatch {
 
     Result<WorkerGrant> register_worker(const WorkerHello& hello);
     Result<std::vector<UnitLease>> lease(const std::string& worker_id, double wait_seconds, const std::function<bool()>& cancelled);
-    /// Makes calls of lease() look at `cancelled` now; they do so by themselves once a second.
+    /// Makes calls of lease() look at `cancelled` now; they do so by themselves every few seconds.
     void wake();
     Result<std::vector<UnitReference>> heartbeat(const std::string& worker_id, const std::vector<RunningUnit>& running);
     Status release(const std::string& worker_id, const UnitReference& unit, const Status& why);
@@ -23,14 +24,11 @@ class Dispatch {
     void tick(OpenBook& book);
 
   private:
-    enum class Turn { kLeased, kNotForThisOne, kNothingLeft };
     /// Leases a unit to the worker, if there is one for it.
-    Turn next_unit(OpenBook& book, WorkerRecord& worker, std::optional<UnitLease>* lease);
+    Choice::Turn next_unit(OpenBook& book, WorkerRecord& worker, std::optional<UnitLease>* lease);
     /// What the worker is told about the unit that it has got.
     void make_lease(OpenBook& book, const JobPtr& file, WorkerRecord& worker, const WorkUnit& unit,
                     std::optional<UnitLease>* lease);
-    /// Leases a unit that another worker has to the worker as well, which would otherwise idle, where that saves time.
-    bool lease_copy(OpenBook& book, WorkerRecord& worker, std::optional<UnitLease>* lease);
     /// Takes the unit away from the worker if it has rendered it for too long.
     bool took_too_long(OpenBook& book, const JobPtr& file, UnitTable& units, const UnitKey& key, WorkerRecord& worker);
 

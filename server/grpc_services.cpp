@@ -16,10 +16,8 @@
 namespace lightloom {
 
 struct GrpcServer::Services {
-    explicit Services(Coordinator& coordinator)
-        : job(coordinator, closing),
-          asset(coordinator, closing),
-          worker(coordinator, closing) {}
+    explicit Services(Coordinator& c) : coordinator(c), job(c, closing), asset(c, closing), worker(c, closing) {}
+    Coordinator& coordinator;
     std::atomic<bool> closing{false};
     JobServiceImpl job;
     AssetServiceImpl asset;
@@ -89,7 +87,9 @@ GrpcServer::~GrpcServer() {
     if (!server_) return;
     health_ = {};
     services_->closing = true;
-    // Waiting handlers check `closing` once a second at least; calls that do not end by themselves are cancelled.
+    services_->coordinator.wake_leases();
+    // Handlers that wait for something else check `closing` once a second at least; calls that do not end by themselves are
+    // cancelled.
     server_->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(3));
 }
 

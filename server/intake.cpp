@@ -43,11 +43,8 @@ Result<SubmitAck> Intake::submit_payload(const std::string& worker_id, const Uni
     if (partial.ok()) return take_partial(worker_id, unit, {descriptor, payload}, *std::move(partial), render_seconds);
 
     OpenBook book(office_);
-    WorkerRecord* const worker = book->workers.find(worker_id);
+    const auto [worker, file, units] = book->take_back(worker_id, unit);
     if (!worker) return no_worker(worker_id);
-    worker->lets_go(unit);
-    const JobPtr file = book->find(unit.job_id);
-    UnitTable* const units = file ? file->job.open_units(unit.key) : nullptr;
     if (units) return reject_result(book, file, *units, unit.key, *worker, partial.status());
     return SubmitAck{SubmitOutcome::kRejected, partial.status().message()};
 }
@@ -82,13 +79,11 @@ Result<SubmitAck> Intake::submit_partial(const std::string& worker_id, const Uni
 std::optional<Result<SubmitAck>> Intake::look_up(const std::string& worker_id, const UnitReference& unit, const Digest& digest,
                                                  JobPtr* file, WorkerRecord* worker) {
     OpenBook book(office_);
-    WorkerRecord* const known = book->workers.find(worker_id);
+    const auto [known, of, units] = book->take_back(worker_id, unit);  // if it has to deliver again, its heartbeats say so
     if (!known) return Result<SubmitAck>(no_worker(worker_id));
     known->last_heard = office_.now();
-    known->lets_go(unit);  // if it has to deliver again, its heartbeats say so
     *worker = *known;
-    *file = book->find(unit.job_id);
-    UnitTable* const units = *file ? (*file)->job.open_units(unit.key) : nullptr;
+    *file = of;
     if (!units) return Result<SubmitAck>(unexpected_result(not_running(unit.job_id)));
     if (!units->find(unit.key)) return Result<SubmitAck>(SubmitAck{SubmitOutcome::kRejected, "no such unit was leased"});
     if (!units->is_done(unit.key)) return std::nullopt;

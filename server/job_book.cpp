@@ -91,6 +91,14 @@ void JobBook::wake_one_waiter(std::list<Waiter*>::iterator from) {
     (*next)->woken.notify_one();
 }
 
+JobBook::Returned JobBook::take_back(const std::string& worker_id, const UnitReference& unit) {
+    WorkerRecord* const worker = workers.find(worker_id);
+    if (!worker) return {};
+    worker->lets_go(unit);
+    const JobPtr file = find(unit.job_id);
+    return {worker, file, file ? file->job.open_units(unit.key) : nullptr};
+}
+
 void JobBook::wake_all_waiters() {
     for (Waiter* waiter : waiters) {
         waiter->look = true;

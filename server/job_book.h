@@ -65,6 +65,14 @@ class JobBook {
     JobPtr in_its_place(const JobPtr& file) const;
     JobInfo info(const JobFile& file, TimePoint now) const;
 
+    /// A unit that a worker does not hold any more, because it has delivered it or gives it back.
+    struct Returned {
+        WorkerRecord* worker = nullptr;  ///< Null for an unknown one; then there is nothing else.
+        JobPtr file;                     ///< Null for an unknown job.
+        UnitTable* units = nullptr;      ///< The job's, if it has units of this kind now.
+    };
+    Returned take_back(const std::string& worker_id, const UnitReference& unit);
+
     /// A call that waits for a unit.
     struct Waiter {
         std::condition_variable_any woken;

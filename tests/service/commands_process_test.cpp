@@ -17,32 +17,14 @@ using testing::Service;
 using testing::wait_until;
 using Json = nlohmann::json;
 
-/// Runs commands against a service, one after the other.
-struct Client {
-    explicit Client(const Service& s) : service(s) {}
-    /// The exit code; what it printed is in `output`.
-    int run(std::vector<std::string> arguments) {
-        const std::string name = "command" + std::to_string(++runs);
-        arguments.insert(arguments.end(), {"--server", service.address()});
-        const int code = Process("lightloom", arguments, service.path(name + ".log")).wait();
-        output = service.log(name);
-        return code;
-    }
-    /// Of a submission that waits for workers.
-    std::string submit(std::vector<std::string> more) {
-        more.insert(more.begin(), {"submit", kScene, "--detach", "-q"});
-        EXPECT_EQ(run(more), 0) << output;
-        return output.substr(0, output.find('\n'));
-    }
+struct Client : testing::Client {
+    using testing::Client::Client;
     std::vector<Json> lines() const {
         std::vector<Json> all;
         std::istringstream text(output);
         for (std::string line; std::getline(text, line);) all.push_back(Json::parse(line, nullptr, false));
         return all;
     }
-    const Service& service;
-    std::string output;
-    int runs = 0;
 };
 
 TEST(Commands, ListShowsNamesAndOwners) {

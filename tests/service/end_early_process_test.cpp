@@ -9,25 +9,15 @@ namespace lightloom {
 namespace {
 
 using testing::kScene;
-using testing::Process;
 using testing::Service;
 using testing::wait_until;
 
-struct Client {
-    explicit Client(const Service& s) : service(s) {}
-    /// The exit code; what it printed is in `output`.
-    int run(std::vector<std::string> arguments) {
-        const std::string name = "command" + std::to_string(++runs);
-        arguments.insert(arguments.end(), {"--server", service.address()});
-        const int code = Process("lightloom", arguments, service.path(name + ".log")).wait();
-        output = service.log(name);
-        return code;
-    }
+struct Client : testing::Client {
+    using testing::Client::Client;
     /// The id of a job of 24 x 18 pixels.
     std::string submit(std::vector<std::string> more) {
-        more.insert(more.begin(), {"submit", kScene, "--detach", "--resolution", "24x18", "--algorithm", "path", "-q"});
-        EXPECT_EQ(run(more), 0) << output;
-        return output.substr(0, output.find('\n'));
+        more.insert(more.end(), {"--resolution", "24x18", "--algorithm", "path"});
+        return testing::Client::submit(std::move(more));
     }
     void wait_samples(const std::string& id, uint64_t samples) {
         GrpcJobPort jobs = service.jobs();
@@ -37,10 +27,6 @@ struct Client {
         const auto image = decode_exr(*read_file(service.path(name)), name);
         return image.ok() ? image->attribute(exr_attribute::kSamples) : image.status().message();
     }
-    bool printed(const std::string& text) const { return output.find(text) != std::string::npos; }
-    const Service& service;
-    std::string output;
-    int runs = 0;
 };
 
 TEST(EndEarly, NothingThatWasRenderedIsLost) {

@@ -77,6 +77,14 @@ TEST(NoRoom, ASceneForWhichThereIsNoneIsReadLater) {
     const std::string id = service.submit(service.spec(5));
     EXPECT_EQ(service.coordinator->get_job(id)->state, JobState::kRunning) << service.coordinator->get_job(id)->message;
     EXPECT_EQ(reads, 2);
+    service.now_ms += 2000;  // the next look for room
+    const std::string worker = service.add_worker();
+    size_t leased = 0;
+    for (int i = 0; i < 200 && leased == 0; ++i) {
+        leased = service.lease(worker).size();
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    EXPECT_EQ(leased, 1u);
 }
 
 TEST(NoRoom, ResultsOfJobsThatHaveEndedGoWhenTheStoreIsOpened) {

@@ -56,4 +56,28 @@ struct Service {
     int port = 0, status_port = 0;
 };
 
+/// Runs commands against a service, one after the other.
+struct Client {
+    explicit Client(const Service& s) : service(s) {}
+    /// The exit code; what it printed is in `output`.
+    int run(std::vector<std::string> arguments) {
+        const std::string name = "command" + std::to_string(++runs);
+        arguments.insert(arguments.end(), {"--server", service.address()});
+        const int code = Process("lightloom", arguments, service.path(name + ".log")).wait();
+        output = service.log(name);
+        return code;
+    }
+    /// The id of a job that is submitted and not waited for.
+    std::string submit(std::vector<std::string> more) {
+        more.insert(more.begin(), {"submit", kScene, "--detach", "-q"});
+        EXPECT_EQ(run(more), 0) << output;
+        return output.substr(0, output.find('\n'));
+    }
+    bool printed(const std::string& text) const { return output.find(text) != std::string::npos; }
+
+    const Service& service;
+    std::string output;
+    int runs = 0;
+};
+
 }  // namespace lightloom::testing
