@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "client/inspect_density.h"
 #include "client/inspect_emission.h"
 #include "client/inspect_gain.h"
 #include "common/core/atomic_file.h"
@@ -180,13 +181,13 @@ Result<TableFile> read_tables(const std::string& path, const Scene& scene) {
     if (!bytes.ok()) return bytes.status();
     const auto content = tables_of_file(*std::move(bytes));
     if (!content.ok()) return invalid_argument(path + ": " + content.status().message());
-    const TablePart* const known[] = {&EmissionPart::kPart, &GainPart::kPart, &SubspaceTables::kPart};
+    const TablePart* const known[] = {&EmissionPart::kPart, &GainPart::kPart, &DensityPart::kPart, &SubspaceTables::kPart};
     const auto parts = parse_tables(*content, known);
     if (!parts.ok()) return invalid_argument(path + ": " + parts.status().message());
     if (const Status s = parts->validate(scene.emitters()); !s.ok())
         return invalid_argument(path + ": the tables are not those of this scene: " + s.message());
-    return TableFile{parts->get<SubspaceTables>(), parts->get<EmissionPart>(), parts->get<GainPart>(), sha256(*content),
-                     content->size()};
+    return TableFile{parts->get<SubspaceTables>(), parts->get<EmissionPart>(), parts->get<GainPart>(),
+                     parts->get<DensityPart>(),    sha256(*content),           content->size()};
 }
 
 nlohmann::ordered_json describe(const TableFile& file, const Scene& scene) {
@@ -194,6 +195,7 @@ nlohmann::ordered_json describe(const TableFile& file, const Scene& scene) {
     if (file.subspaces) out.update(describe_subspaces(*file.subspaces));
     if (file.emission) out["emission"] = describe_emission(file.emission->data, scene);
     if (file.gain) out["gain"] = describe_gain(file.gain->data);
+    if (file.density) out["photons"] = describe_density(file.density->data);
     return out;
 }
 
@@ -202,6 +204,7 @@ void print(const TableFile& file, const Scene& scene) {
     if (file.subspaces) print_subspaces(*file.subspaces);
     if (file.emission) print_emission(file.emission->data, scene);
     if (file.gain) print_gain(file.gain->data);
+    if (file.density) print_density(file.density->data);
 }
 
 Status draw(const TableFile& file, const Scene& scene, const std::string& prefix) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "common/scene/scene.h"
+#include "common/tables/density_part.h"
 #include "common/tables/emission_part.h"
 #include "common/tables/gain_part.h"
 #include "common/tables/subspace_tables.h"
@@ -17,14 +18,15 @@ struct TableFile {
     std::shared_ptr<const SubspaceTables> subspaces;  ///< Null where an algorithm learns emission alone.
     std::shared_ptr<const EmissionPart> emission;     ///< Null in bare tables of subspaces.
     std::shared_ptr<const GainPart> gain;             ///< Null without roulette=learned.
+    std::shared_ptr<const DensityPart> density;       ///< Null where an algorithm does not merge.
     Digest digest;
     uint64_t size_bytes = 0;
 };
 
 /// Reads an entry of a table cache, or bare tables, and checks that they fit the scene.
 Result<TableFile> read_tables(const std::string& path, const Scene& scene);
-/// Sizes, labels that occur, quantiles of Q, entropy of Gamma's columns in bits, windows, digest; what is known of emission and
-/// gains.
+/// Sizes, labels that occur, quantiles of Q, entropy of Gamma's columns in bits, windows, digest; what is known of emission,
+/// gains and photons.
 nlohmann::ordered_json describe(const TableFile& file, const Scene& scene);
 void print(const TableFile& file, const Scene& scene);
 /// What follows PREFIX in the names of the pictures.

@@ -23,12 +23,21 @@ inline void view_footprint(const Emitter& e, const LightSubPath& y, int s, const
     view->source = light_source(e);
 }
 
+/// The same of a complete path, whichever technique it was made by: the emitter of a path without a light prefix is that on which
+/// z_{t-1} lies, or the sky.
+inline void view_footprint(const EmitterSet& emitters, const LightSubPath& y, int s, const PathVertex* z, int t, PathView* view) {
+    const bool hit = s == 0 && view->k == t - 1;
+    const int32_t emitter = s > 0 ? y[0].emitter : hit ? z[t - 1].emitter : emitters.environment_index();
+    view_footprint(emitters[uint32_t(emitter)], y, s, z, t, view);
+}
+
 /// pi tan^2 of the paper's one degree: the radius is that share of the length of the camera's first edge.
 inline constexpr double kCorrelationDisc = 3.14159265358979323846 * 0.017455064928217585 * 0.017455064928217585;
 
 /// c_s in [1/n, 1]: of n connections that split the path after s light vertices, n c_s count. The factor is a function
 /// of the path and n; it reads what view_footprint() wrote.
 inline double correlation_factor(const PathView& view, int s, double n) {
+    if (n <= 1) return 1;
     const double area = kCorrelationDisc * view.primary_distance2;
     // Shares of either sub-path's neighbours within the radius; a Dirac event has no neighbour but itself.
     double camera = 1, light = 1;
@@ -41,33 +50,5 @@ inline double correlation_factor(const PathView& view, int s, double n) {
     const double either = camera + light * (1 - camera);  // rounds to no less than `camera`
     return either > 0 ? std::max(camera / either, 1 / n) : 1;
 }
-
-/// The same for merges: c_i in [1/n, 1] of the n light sub-paths that may merge with one camera sub-path at x_i. Both end
-/// at x_i, so that the factors of all i are products of prefixes.
-class MergeCorrelation {
-  public:
-    /// Reads what correlation_factor() reads. `n` >= 1.
-    MergeCorrelation(const PathView& view, double n) {
-        const double area = kCorrelationDisc * view.primary_distance2;
-        double product = 1;
-        for (int i = view.k - 1; i >= 1; --i) {
-            if (i + 1 == view.k || !view.delta[i + 1]) product *= std::min(area * view.rev[i], 1.0);
-            factor_[i] = product;
-        }
-        product = view.source == PathView::Source::kDiscrete    ? 1
-                  : view.source == PathView::Source::kDirection ? std::min(kCorrelationDisc * view.fwd[0], 1.0)
-                                                                : std::min(area * view.fwd[0], 1.0);
-        for (int i = 1; i < view.k; ++i) {
-            if (!view.delta[i - 1]) product *= std::min(area * view.fwd[i], 1.0);
-            const double camera = factor_[i], either = camera + product * (1 - camera);
-            factor_[i] = either > 0 ? std::max(camera / either, 1 / n) : 1;
-        }
-    }
-    /// 1 <= i < k.
-    double operator()(int i) const { return factor_[i]; }
-
-  private:
-    double factor_[kMaxEdges + 1];
-};
 
 }  // namespace lightloom

@@ -29,10 +29,12 @@
 // Range: densities of 1e12 per vertex and 64 vertices overflow even double, so the sweep walks outward from the
 // technique that made the path with ratios, and keeps the exponent in a variable of its own.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
 #include "common/core/inline.h"
+#include "common/core/math.h"
 #include "common/path/path_view.h"
 #include "common/path/technique.h"
 
@@ -59,28 +61,6 @@ struct WideProduct {
 };
 
 enum class Heuristic : uint8_t { kBalance, kPower, kMaximum };
-
-namespace detail {
-
-/// Collects ratios rho_other / rho_own under one heuristic.
-struct RatioSum {
-    Heuristic heuristic;
-    double tie = 0;  ///< For the maximum heuristic: ratios closer to 1 are ties.
-    double sum = 0;
-    bool beaten = false;
-
-    /// `earlier` breaks ties of the maximum heuristic: the technique that comes first in the sweep order wins.
-    LL_ALWAYS_INLINE void add(double ratio, bool earlier) {
-        switch (heuristic) {
-            case Heuristic::kBalance: sum += ratio; break;
-            case Heuristic::kPower: sum += ratio * ratio; break;
-            case Heuristic::kMaximum: beaten |= earlier ? ratio >= 1 - tie : ratio > 1 + tie; break;
-        }
-    }
-    double weight() const { return heuristic == Heuristic::kMaximum ? (beaten ? 0.0 : 1.0) : 1 / (1 + sum); }
-};
-
-}  // namespace detail
 
 /// The answers of most selections: every split exists, roulette is ignored, and there are hits and one next event, but
 /// no other techniques.
@@ -109,6 +89,14 @@ double sigma(const OnPath& on, Technique t) {
         case TechniqueKind::kMerge: return on.merge(t.s);
     }
     return 0;
+}
+
+/// The place of a technique in the order in which ties are broken: hit, next event, connect 1, merge 1, connect 2, merge 2, ...,
+/// lens.
+constexpr int order_of(Technique t) {
+    return t.kind == TechniqueKind::kHit         ? 0
+           : t.kind == TechniqueKind::kNextEvent ? 1
+                                                 : 2 * t.s + (t.kind == TechniqueKind::kMerge ? 1 : 0);
 }
 
 /// Calls visit(technique) for the techniques without merging that split the path after s light vertices, 0 <= s <= k, in the order
@@ -144,54 +132,101 @@ LL_ALWAYS_INLINE inline void for_each_split(const PathView& view, int base, int 
     }
 }
 
+namespace detail {
+
+/// Calls add(sigma, chain, technique) for every technique but `own`: sigma * chain is its effective density over C(own.s) A(own.s),
+/// and zero where it is impossible.
+template <class OnPath, class Add>
+LL_ALWAYS_INLINE inline void for_each_other(const PathView& view, Technique own, const OnPath& on, Add&& add) {
+    const int k = view.k, base = own.s, s_min = on.s_min(), s_max = on.s_max();
+    const auto split = [&](int s, const WideProduct& chain) LL_ALWAYS_INLINE {
+        if (s < s_min || s > s_max || !can_connect(view, s)) return;
+        const double survivors = on.survivors(s);
+        if (s > 1 && s < k) [[likely]]
+            return add(survivors * on.connect(s), chain, Technique::connect(s));
+        if (s == 0) return add(survivors * on.hit(), chain, Technique::hit());
+        if (s == k) return add(survivors * on.lens(), chain, Technique::lens(k));
+        add(survivors * on.next_event(), chain, Technique::next_event());
+        add(survivors * on.connect(s), chain, Technique::connect(s));
+    };
+    const auto merge = [&](int i, const WideProduct& chain) LL_ALWAYS_INLINE {
+        if constexpr (OnPath::kMerges) {
+            if (i < 1 || i > k - 1 || view.delta[i] || own == Technique::merge(i)) return;
+            add(on.merge(i) * view.fwd[i], chain, Technique::merge(i));
+        }
+    };
+    if (own.kind == TechniqueKind::kMerge) split(base, WideProduct{});
+    if (own.kind == TechniqueKind::kConnect && base == 1)
+        add(on.survivors(1) * on.next_event(), WideProduct{}, Technique::next_event());
+    if (own.kind == TechniqueKind::kNextEvent) add(on.survivors(1) * on.connect(1), WideProduct{}, Technique::connect(1));
+    merge(base, WideProduct{});
+    for_each_split(view, base, OnPath::kMerges ? 0 : s_min, OnPath::kMerges ? k : s_max,
+                   [&](int s, const WideProduct& chain) LL_ALWAYS_INLINE {
+                       split(s, chain);
+                       merge(s, chain);
+                   });
+}
+
+/// Densities are compared by sixteenths of an octave, counted from the first technique in order_of() that can make the path, and
+/// the earlier of equals wins. That is one order for all techniques, and rounding, which is different in each technique's view,
+/// decides next to nothing: ratios of one, as those of merges at both ends of an edge between diffuse surfaces, lie in the middle
+/// of their sixteenth.
+class MaximumContest {
+  public:
+    void enter(double sigma, const WideProduct& chain, Technique t) {
+        if (!(sigma > 0) || !(chain.mantissa > 0)) return;
+        const double octaves = math::log(chain.mantissa * sigma) / 0.69314718055994530942 + 512.0 * chain.shift;
+        entries_[count_++] = {std::clamp(octaves, -1e6, 1e6), order_of(t)};
+    }
+    /// Whether the technique that entered first has the largest density.
+    bool first_wins() const {
+        const Entry* reference =
+            std::min_element(entries_, entries_ + count_, [](const Entry& a, const Entry& b) { return a.order < b.order; });
+        const auto step = [&](const Entry& e) { return std::floor((e.octaves - reference->octaves) * 16 + 0.5); };
+        const double mine = step(entries_[0]);
+        return std::none_of(entries_ + 1, entries_ + count_, [&](const Entry& other) {
+            const double theirs = step(other);
+            return theirs > mine || (theirs == mine && other.order < entries_[0].order);
+        });
+    }
+
+  private:
+    struct Entry {
+        double octaves;
+        int order;
+    };
+    Entry entries_[2 * kMaxEdges + 2];
+    int count_ = 0;
+};
+
+}  // namespace detail
+
 /// The weight of technique `own` for the path in `on`'s view, in [0, 1]; zero when the selection has switched it off.
 /// `own` must be able to produce the path.
 template <class OnPath>
 double mis_weight(const PathView& view, Technique own, const OnPath& on, Heuristic heuristic = Heuristic::kBalance) {
-    const int k = view.k, base = own.s;
-    if (k == 1) return own.kind == TechniqueKind::kHit && on.hit() > 0 ? 1 : 0;
-    const int s_min = on.s_min(), s_max = on.s_max();
+    if (view.k == 1) return own.kind == TechniqueKind::kHit && on.hit() > 0 ? 1 : 0;
     // sigma of the own technique, relative to C(base) A(base) of the split.
     double own_sigma = sigma(on, own);
     if constexpr (OnPath::kMerges) {
-        if (own.kind == TechniqueKind::kMerge) own_sigma *= view.fwd[base];
+        if (own.kind == TechniqueKind::kMerge) own_sigma *= view.fwd[own.s];
     }
     if (!(own_sigma > 0)) return 0;
+    if (heuristic == Heuristic::kMaximum) [[unlikely]] {
+        detail::MaximumContest contest;
+        contest.enter(own_sigma, WideProduct{}, own);
+        detail::for_each_other(view, own, on, [&](double s, const WideProduct& chain, Technique t) { contest.enter(s, chain, t); });
+        return contest.first_wins() ? 1 : 0;
+    }
     const double inv_own = 1 / own_sigma;
-    // Merges at both ends of an edge between diffuse surfaces are always as likely: rounding, different in each technique's view,
-    // must not decide between them.
-    detail::RatioSum ratios{heuristic, OnPath::kMerges ? 1e-4 : 0};
-    const auto add = [&](double other_sigma, const WideProduct& chain, bool earlier) LL_ALWAYS_INLINE {
-        if (other_sigma > 0) ratios.add(chain.value(other_sigma * inv_own), earlier);
-    };
-    // Order for ties: hit, next event, connect 1, merge 1, connect 2, merge 2, ..., lens.
-    const auto split = [&](int s, const WideProduct& chain, bool earlier) LL_ALWAYS_INLINE {
-        if (s < s_min || s > s_max || !can_connect(view, s)) return;
-        const double survivors = on.survivors(s);
-        if (s > 1 && s < k) [[likely]]
-            return add(survivors * on.connect(s), chain, earlier);
-        if (s == 0) return add(survivors * on.hit(), chain, earlier);
-        if (s == k) return add(survivors * on.lens(), chain, earlier);
-        add(survivors * on.next_event(), chain, earlier);
-        add(survivors * on.connect(s), chain, earlier);
-    };
-    const auto merge = [&](int i, const WideProduct& chain, bool earlier) LL_ALWAYS_INLINE {
-        if constexpr (OnPath::kMerges) {
-            if (i < 1 || i > k - 1 || view.delta[i] || own == Technique::merge(i)) return;
-            const double factor = on.merge(i);
-            if (factor > 0) ratios.add(chain.value(factor * view.fwd[i] * inv_own), earlier);
-        }
-    };
-    if (own.kind == TechniqueKind::kMerge) split(base, WideProduct{}, true);
-    if (own.kind == TechniqueKind::kConnect && base == 1) add(on.survivors(1) * on.next_event(), WideProduct{}, true);
-    if (own.kind == TechniqueKind::kNextEvent) add(on.survivors(1) * on.connect(1), WideProduct{}, false);
-    merge(base, WideProduct{}, false);
-    for_each_split(view, base, OnPath::kMerges ? 0 : s_min, OnPath::kMerges ? k : s_max,
-                   [&](int s, const WideProduct& chain) LL_ALWAYS_INLINE {
-                       split(s, chain, s < base);
-                       merge(s, chain, s < base);
-                   });
-    return ratios.weight();
+    const bool squares = heuristic == Heuristic::kPower;
+    double sum = 0;
+    detail::for_each_other(view, own, on, [&](double other_sigma, const WideProduct& chain, Technique) LL_ALWAYS_INLINE {
+        if (!(other_sigma > 0)) return;
+        const double ratio = chain.value(other_sigma * inv_own);
+        sum += squares ? ratio * ratio : ratio;
+    });
+    return 1 / (1 + sum);
 }
 
 }  // namespace lightloom

@@ -36,6 +36,10 @@ struct PathView {
     double next_event = 0;
     /// Of algorithms that merge only: squared distance that the radius of merges is in proportion to; see VcmMethod::complete().
     double footprint_distance2 = 0;
+    /// Where they were asked for (VcmMethod::complete()): photons per light sub-path and square metre at x_i, 1 <= i < k, as a
+    /// density map has them; and |x_{i+1} - x_i|, m, 0 <= i < k, 0 where x_0 is outside the scene.
+    float photons[kMaxEdges + 1];
+    float edge[kMaxEdges + 1];
     bool discrete_source = false;  ///< x_0 is one of countably many: fwd[0] and next_event are probabilities.
 };
 

@@ -9,7 +9,7 @@ extern const AlgorithmInfo kBdptRow;
 
 namespace {
 
-constexpr ParameterInfo kParameters[] = {kRouletteByAlbedo, kRouletteStart, kRouletteMin, kHeuristic,
+constexpr ParameterInfo kParameters[] = {kRouletteByAlbedo, kRouletteStart, kRouletteMin, kHeuristicOfSharing,
                                          kTechniques,       kNextEvent,     kShadowRays,  emission_parameter(false),
                                          kEmissionTraining};
 
@@ -18,10 +18,14 @@ constexpr AbsentParameter kAbsent[] = {
      "every camera vertex is connected to all vertices of the one light sub-path of its sample; vcm connects to several"}};
 
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
-    return make_unit_renderer(r, [&](auto&& select) {
-        const auto selection = select(BdptSelection{double(r.light_paths_per_iteration()), next_event_of(r.settings.algorithm)});
-        return BdptAlgorithm<std::remove_cvref_t<decltype(selection)>>{selection, heuristic_of(r.settings.algorithm)};
-    });
+    const AlgorithmSettings& settings = r.settings.algorithm;
+    return make_corrected(BdptSelection{double(r.light_paths_per_iteration()), next_event_of(settings)}, correction_of(settings),
+                          [&](const auto& densities) {
+                              return make_unit_renderer(r, [&](auto&& select) {
+                                  const auto selection = select(densities);
+                                  return BdptAlgorithm<std::remove_cvref_t<decltype(selection)>>{selection, heuristic_of(settings)};
+                              });
+                          });
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 // k = 1 (directly visible emitters) is s = 0 alone. Tables: none. Bias: none. Paths of the form light - specular -
 // diffuse - specular - camera (SDS) with lights that cannot be hit are missing, as in every method without merging.
 
-#include "common/path/mis.h"
+#include "common/path/corrected.h"
 #include "common/transport/contribution.h"
 #include "common/transport/unit_loop.h"
 
@@ -27,7 +27,10 @@ struct BdptSelection {
 
         double next_event() const { return rays.sigma(view); }
 
+        double shadow_rays() const { return rays(view.k); }
+        double connections(int) const { return 1; }
         double connect(int s) const { return s == 1 ? 0 : 1; }
+        double connect(int s, double share) const { return connect(s) * share; }
         double lens() const { return light_paths_per_iteration; }
     };
     OnPath on(const PathView& view) const { return {{view}, light_paths_per_iteration, rays}; }
@@ -77,10 +80,19 @@ struct BdptAlgorithm {
     void trace(SampleContext& context, Contribute&& contribute) const {
         const auto light_done = [](const PathVertex*, int) {};
         const NextEventRays rays = selection.next_event_rays();
-        if (context.roulette.gain)
-            trace_bdpt_sample<ViewDetail::kFull, true>(context, context.roulette, rays, light_done, contribute);
+        const auto run = [&](auto&& found) {
+            if (context.roulette.gain)
+                trace_bdpt_sample<ViewDetail::kFull, true>(context, context.roulette, rays, light_done, found);
+            else
+                trace_bdpt_sample<ViewDetail::kFull, false>(context, context.roulette, rays, light_done, found);
+        };
+        if constexpr (kReadsFootprint<Selection>)
+            run([&](const PathContribution& c, PathView& view) {
+                view_footprint(context.scene.emitters()[c.emitter], c.y, c.technique.light_vertices(), c.z, c.t, &view);
+                contribute(c, view);
+            });
         else
-            trace_bdpt_sample<ViewDetail::kFull, false>(context, context.roulette, rays, light_done, contribute);
+            run(contribute);
     }
 };
 

@@ -14,7 +14,7 @@ constexpr ParameterInfo kParameters[] = {
     kRouletteByAlbedo,
     kRouletteStart,
     kRouletteMin,
-    kHeuristic,
+    kHeuristicOfSharing,
     kTechniques,
     kNextEventBesideCache,
     kShadowRaysBesideCache,
@@ -59,12 +59,17 @@ Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     const AlgorithmSettings& settings = r.settings.algorithm;
     const CacheParameters p = CacheParameters::of(settings);
     const double vertices_per_path = r.tables.get<SubspaceTables>()->vertices_per_path;
-    return make_unit_renderer(r, [&](auto&& select) {
-        const auto selection = select(UniformSelection{
-            double(r.light_paths_per_iteration()), p.connections.each([&](int n) { return double(n) / vertices_per_path; }),
-            TypicalSurvival(roulette_of(settings)), next_event_beside_cache_of(settings)});
-        return LvcbptAlgorithm<std::remove_cvref_t<decltype(selection)>>{
-            {selection, p.connections}, heuristic_of(settings), p.minimum_paths};
+    const UniformSelection uniform{.light_paths_per_iteration = double(r.light_paths_per_iteration()),
+                                   .connection_density = p.connections.each([&](int n) { return double(n) / vertices_per_path; }),
+                                   .survival = TypicalSurvival(roulette_of(settings)),
+                                   .rays = next_event_beside_cache_of(settings),
+                                   .connections = p.connections.each([](int n) { return double(n); })};
+    return make_corrected(uniform, correction_of(settings), [&](const auto& densities) {
+        return make_unit_renderer(r, [&](auto&& select) {
+            const auto selection = select(densities);
+            return LvcbptAlgorithm<std::remove_cvref_t<decltype(selection)>>{
+                {selection, p.connections}, heuristic_of(settings), p.minimum_paths};
+        });
     });
 }
 

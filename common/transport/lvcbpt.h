@@ -12,6 +12,7 @@
 // each times the share of light sub-paths of s vertices and of camera sub-paths of t vertices that survive roulette
 // (common/path/survival.h). Tables: v (vertices_per_path). Bias: none. Missing: what `bdpt` misses.
 
+#include "common/path/corrected.h"
 #include "common/path/survival.h"
 #include "common/transport/cached.h"
 
@@ -22,6 +23,7 @@ struct UniformSelection {
     ByDepth<double> connection_density;    ///< N / v
     TypicalSurvival survival;
     NextEventRays rays;
+    ByDepth<double> connections = 1;  ///< N
 
     struct OnPath : PlainTechniques {
         const UniformSelection& selection;
@@ -29,7 +31,10 @@ struct UniformSelection {
 
         double survivors(int s) const { return survival.light(s) * survival.camera(view.k + 1 - s); }
         double next_event() const { return selection.rays.sigma(view); }
+        double shadow_rays() const { return selection.rays(view.k); }
+        double connections(int s) const { return selection.connections(view.k + 1 - s); }
         double connect(int s) const { return selection.connection_density(view.k + 1 - s); }
+        double connect(int s, double share) const { return connect(s) * share; }
         double lens() const { return selection.light_paths_per_iteration; }
     };
     OnPath on(const PathView& view) const { return {{view}, *this, {survival, view}}; }
@@ -51,7 +56,9 @@ struct UniformConnections {
     uint64_t windows() const { return 1; }
     void label_light_path(const Scene&, PathVertex*, int) const {}
     void label_camera_vertex(const Scene&, PathVertex*) const {}
-    void complete(const Scene&, const LightSubPath&, int, PathVertex*, int, const Vec3&, PathView*) const {}
+    void complete(const Scene& scene, const LightSubPath& y, int s, PathVertex* z, int t, const Vec3&, PathView* view) const {
+        if constexpr (kReadsFootprint<Selection>) view_footprint(scene.emitters(), y, s, z, t, view);
+    }
     float inverse_density(const LightPick& pick) const { return pick.scale; }
 
     Index index(const LightCache& cache, uint64_t paths) const {

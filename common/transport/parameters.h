@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "common/path/corrected.h"
 #include "common/path/mask.h"
 #include "common/path/next_event.h"
 #include "common/path/random_walk.h"
@@ -41,10 +42,32 @@ inline constexpr ParameterInfo kRouletteMin = roulette_minimum(0.5);
 // What `path` finds at the end of a long sub-path it finds in no other way. relMSE times rays, relative to 0.5, is
 // 0.72 (door), 0.77 (veach-ajar) and 0.98 (bedroom) with 0.7, and 0.78, 0.59 and 1.13 with 0.85.
 inline constexpr ParameterInfo kRouletteMinOfPath = roulette_minimum(0.7);
-inline constexpr std::string_view kHeuristicNames[] = {"balance", "power", "maximum"};
+inline constexpr std::string_view kHeuristicNames[] = {"balance",           "power",       "maximum", "popov",
+                                                       "correlation-aware", "jendersie19", "vcm+",    "vcm*"};
+/// The values of `heuristic`, in the order of kHeuristicNames.
+enum class HeuristicChoice { kBalance, kPower, kMaximum, kPopov, kCorrelationAware, kJendersie19, kVcmPlus, kVcmStar };
 inline constexpr std::string_view kSwitch[] = {"off", "on"};
-inline constexpr ParameterInfo kHeuristic{
-    "heuristic", 0, 0, 2, true, "balance [Veach 1997, eq. 9.8], power with exponent 2, or maximum", kHeuristicNames};
+/// How weights follow from densities. An algorithm has the first `count` names: three where no two samples of a pixel share a
+/// sub-path, five where connections and shadow rays share the camera's, all where merging does.
+constexpr ParameterInfo heuristic_parameter(HeuristicChoice best, int count) {
+    constexpr std::string_view kHelp =
+        "how techniques share a path: balance [Veach 1997, eq. 9.8], power with exponent 2, or maximum; balance, but samples that "
+        "share a camera sub-path count as one [popov: Popov et al. 2015], as far as they are independent [correlation-aware: "
+        "Grittmann et al. 2021]; and for merges alone, by the footprints of both sub-paths [jendersie19: Jendersie 2019], or over "
+        "the photons that training found around a vertex [vcm+, vcm*: Jendersie and Grosch 2018, eq. 6 and 7]";
+    constexpr size_t kOfSharing = kHelp.find("; and for merges"), kPlain = kHelp.find("; balance, but");
+    return {"heuristic",
+            double(int(best)),
+            0,
+            double(count - 1),
+            true,
+            count <= 3   ? kHelp.substr(0, kPlain)
+            : count <= 5 ? kHelp.substr(0, kOfSharing)
+                         : kHelp,
+            std::span(kHeuristicNames).first(size_t(count))};
+}
+inline constexpr ParameterInfo kHeuristic = heuristic_parameter(HeuristicChoice::kBalance, 3),
+                               kHeuristicOfSharing = heuristic_parameter(HeuristicChoice::kBalance, 5);
 inline constexpr std::string_view kTechniqueSets[] = {"all",     "no-hit",   "no-next-event", "no-connect",
                                                       "no-lens", "no-merge", "merge"};
 /// Which techniques remain, in the order of kTechniqueSets; `count` of them are for the algorithm.
@@ -171,8 +194,32 @@ inline NextEventRays next_event_beside_cache_of(const AlgorithmSettings& s) {
     const int split = int(s.value(kShadowRaysBesideCache.name));
     return {int(s.value(kNextEventBesideCache.name)) * split, split > 1 ? split : 0};
 }
+inline HeuristicChoice heuristic_choice_of(const AlgorithmSettings& s) {
+    return s.has(kHeuristic.name) ? HeuristicChoice(int(s.value(kHeuristic.name))) : HeuristicChoice::kBalance;
+}
 inline Heuristic heuristic_of(const AlgorithmSettings& s) {
-    return s.has(kHeuristic.name) ? Heuristic(int(s.value(kHeuristic.name))) : Heuristic::kBalance;
+    const HeuristicChoice choice = heuristic_choice_of(s);
+    return choice == HeuristicChoice::kPower     ? Heuristic::kPower
+           : choice == HeuristicChoice::kMaximum ? Heuristic::kMaximum
+                                                 : Heuristic::kBalance;
+}
+inline Correction correction_of(const AlgorithmSettings& s) {
+    switch (heuristic_choice_of(s)) {
+        case HeuristicChoice::kPopov: return Correction::kOne;
+        case HeuristicChoice::kCorrelationAware: return Correction::kCorrelation;
+        case HeuristicChoice::kJendersie19: return Correction::kFootprint;
+        case HeuristicChoice::kVcmPlus: return Correction::kPhotons;
+        case HeuristicChoice::kVcmStar: return Correction::kPhotonsBalanced;
+        case HeuristicChoice::kBalance:
+        case HeuristicChoice::kPower:
+        case HeuristicChoice::kMaximum: return Correction::kUncorrected;
+    }
+    return Correction::kUncorrected;
+}
+/// Whether weights read how many photons there are around a vertex.
+inline bool learns_density(const AlgorithmSettings& s) {
+    const Correction correction = correction_of(s);
+    return correction == Correction::kPhotons || correction == Correction::kPhotonsBalanced;
 }
 
 /// AlgorithmInfo::light_paths_per_pixel of algorithms that trace one light path per camera sample, and of those that let the user

@@ -17,7 +17,7 @@ constexpr ParameterInfo kParameters[] = {
     kRouletteByAlbedo,
     kRouletteStart,
     kRouletteMin,
-    kHeuristic,
+    heuristic_parameter(HeuristicChoice::kCorrelationAware, 5),
     kTechniques,
     kNextEventBesideCache,
     kShadowRaysBesideCache,
@@ -48,8 +48,6 @@ constexpr ParameterInfo kParameters[] = {
     {"reuse-target", 200, 1, 1e6, false,
      "M0: light prefixes that a subspace should hold, as far as windows allow "
      "[Su et al. 2022, section 7.4]"},
-    {"correlation-aware", 1, 0, 1, true,
-     "weights know that the N connections of a vertex share its camera sub-path [Grittmann et al. 2021]", kSwitch},
     {"ris-aware", 0, 0, 1, true,
      "weights know that a cache of M paths limits what a subspace can deliver "
      "[Nabata et al. 2020, eq. 9]",
@@ -63,10 +61,6 @@ constexpr ParameterInfo kParameters[] = {
 };
 static_assert(SubspaceTables::kMaxSubspaces == 16384 && SubspaceTables::kMaxWindow == 32, "the ranges above");
 constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &GainPart::kPart, &SubspaceTables::kPart};
-
-Correction correction_of(const AlgorithmSettings& s) {
-    return s.value("correlation-aware") != 0 ? Correction::kCorrelation : Correction::kUncorrected;
-}
 
 LearningPlan plan(const AlgorithmSettings& s) {
     const uint64_t samples = uint64_t(s.value(kTrainingPaths));

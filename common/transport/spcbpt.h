@@ -12,7 +12,7 @@
 //     s = 1          rho = n next_event A(1)                     next event estimation at the first hit, beside the cache's own
 //     1 <= s <= k-1  rho = N Gamma(i, j) L(F(s)) / Q(i) A(s)                                      [Eq. 11]: the target, not
 //                    what was really drawn; with ris_aware 1 / rho = 1 / rho + 1 / (M C(s) A(s)): a cache of M paths cannot
-//                    deliver more than that; with correlation_aware N c_s stands for N (common/path/correlation.h)
+//                    deliver more than that; corrected, N c_s stands for N (common/path/corrected.h)
 //     s = k          rho = N1 |crop| C(k)
 // each times the share of camera sub-paths of t vertices that roulette leaves, s = k also of light sub-paths of s
 // (common/path/survival.h); the draws among prefixes make up for roulette, a survivor has that much more throughput.
@@ -77,6 +77,7 @@ struct SubspaceSelection {
         /// Draws among prefixes compensate for roulette: a survivor has correspondingly more throughput.
         double survivors(int s) const { return s == view.k ? survival.light(s) : survival.camera(view.k + 1 - s); }
         double next_event() const { return selection.rays.sigma(view); }
+        double shadow_rays() const { return selection.rays(view.k); }
         double connections(int s) const { return selection.connections(view.k + 1 - s); }
         double connect(int s) const { return connect(s, 1); }
         double connect(int s, double share) const {

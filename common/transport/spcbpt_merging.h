@@ -2,12 +2,11 @@
 // `spcbpt` with merging=on: the light sub-paths of the cache are photons as well. Effective densities, besides those of spcbpt.h,
 // at x_i as in vcm.h:
 //     merge at x_i   rho = n a S_L(i+1) S_E(k+1-i) C(i+1) A(i)      n: the cache's light sub-paths, S: typical survival of roulette
-// With correlation_aware, n c_i stands for n (common/path/correlation.h). Each iteration has a cache, and so photons, of its own,
+// With a correction, n c_i stands for n (common/path/merge_shares.h). Each iteration has a cache, and so photons, of its own,
 // and n is a constant of the frame. Tables: those of spcbpt, learned by a loss that counts merges among the techniques that Gamma
 // does not change. Bias: as vcm's. Missing: nothing that has a vertex to merge at.
 
-#include <optional>
-
+#include "common/path/merge_shares.h"
 #include "common/transport/renderer.h"
 #include "common/transport/spcbpt.h"
 
@@ -18,21 +17,21 @@ class MergesOnPath {
   public:
     /// Reads footprint_distance2 and, for corrections, what view_footprint() writes.
     MergesOnPath(const PathView& view, const MergeTerms& terms, Correction correction)
-        : density_(terms.density(view.footprint_distance2)),
+        : density_(terms.density(view.footprint_distance2) / (correction == Correction::kOne ? terms.paths : 1)),
           k_(view.k),
-          last_(terms.last(view.k)) {
-        if (correction == Correction::kCorrelation) correlation_.emplace(view, terms.paths);
-    }
+          last_(terms.last(view.k)),
+          shares_(correction == Correction::kCorrelation
+                      ? MergeShares::correlation(view, {terms.paths, terms.disc(view.footprint_distance2), last_})
+                      : MergeShares()) {}
     /// sigma of merging at x_i, 1 <= i <= k-1.
     double sigma(int i, const PathSurvival& survival) const {
-        if (i > last_) return 0;
-        return density_ * (correlation_ ? (*correlation_)(i) : 1) * survival.light(i + 1) * survival.camera(k_ + 1 - i);
+        return i > last_ ? 0 : density_ * shares_(i) * survival.light(i + 1) * survival.camera(k_ + 1 - i);
     }
 
   private:
     double density_;
     int k_, last_;
-    std::optional<MergeCorrelation> correlation_;
+    MergeShares shares_;
 };
 
 /// A selection of spcbpt.h and merges.

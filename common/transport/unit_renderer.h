@@ -80,7 +80,10 @@ struct PlainWeights : PathWeights {
     PlainWeights(Selection s, Heuristic h) : selection(std::move(s)), heuristic(h) {}
     void label_light_path(const Scene&, PathVertex*, int) const override {}
     void label_camera_vertex(const Scene&, PathVertex*) const override {}
-    void complete(const Scene&, const LightSubPath&, int, PathVertex*, int, const Vec3&, PathView*) const override {}
+    void complete(const Scene& scene, const LightSubPath& y, int s, PathVertex* z, int t, const Vec3&,
+                  PathView* view) const override {
+        view_footprint(scene.emitters(), y, s, z, t, view);
+    }
     double sigma(const PathView& view, Technique t) const override { return lightloom::sigma(selection.on(view), t); }
     double weight(const PathView& view, Technique own) const override {
         return mis_weight(view, own, selection.on(view), heuristic);
@@ -99,6 +102,7 @@ struct CachedWeights : PlainWeights<std::remove_cvref_t<decltype(std::declval<co
     void label_camera_vertex(const Scene& scene, PathVertex* v) const override { method.label_camera_vertex(scene, v); }
     void complete(const Scene& scene, const LightSubPath& y, int s, PathVertex* z, int t, const Vec3& towards,
                   PathView* view) const override {
+        view_footprint(scene.emitters(), y, s, z, t, view);
         method.complete(scene, y, s, z, t, towards, view);
     }
 };

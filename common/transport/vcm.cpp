@@ -1,5 +1,7 @@
 #include "common/transport/vcm.h"
 
+#include "common/tables/density_part.h"
+#include "common/tables/train_density.h"
 #include "common/transport/learn_walks.h"
 #include "common/transport/merging_parameters.h"
 #include "common/transport/unit_renderer.h"
@@ -22,33 +24,61 @@ constexpr ParameterInfo kPhotonPaths{
     "N1 and n: light sub-paths per pixel and iteration; all of them splat, all of their vertices are "
     "photons"};
 
-constexpr std::string_view kCounts[] = {"off", "on", "one"};
-constexpr ParameterInfo kCorrelationAware{"correlation-aware",
-                                          1,
-                                          0,
-                                          2,
-                                          true,
-                                          "weights know that all merges of a camera sub-path share it [Grittmann et al. 2021]; "
-                                          "one: they count as one [Popov et al. 2015]",
-                                          kCounts};
-
-constexpr ParameterInfo kParameters[] = {kRouletteByAlbedo,    kRouletteStart, kRouletteMin,      kHeuristic,
-                                         kTechniquesOfMerging, kNextEvent,     kShadowRays,       kConnectionsToPhotonPaths,
-                                         kPhotonPaths,         kMergeRadius,   kMergeRadiusUnit,  kAlpha,
-                                         kMergeFirst,          kKernel,        kCorrelationAware, emission_parameter(false),
+constexpr ParameterInfo kParameters[] = {kRouletteByAlbedo,
+                                         kRouletteStart,
+                                         kRouletteMin,
+                                         heuristic_parameter(HeuristicChoice::kCorrelationAware, 8),
+                                         kTechniquesOfMerging,
+                                         kNextEvent,
+                                         kShadowRays,
+                                         kConnectionsToPhotonPaths,
+                                         kPhotonPaths,
+                                         kMergeRadius,
+                                         kMergeRadiusUnit,
+                                         kAlpha,
+                                         kMergeFirst,
+                                         kKernel,
+                                         emission_parameter(false),
                                          kEmissionTraining};
+
+constexpr const TablePart* kParts[] = {&EmissionPart::kPart, &GainPart::kPart, &DensityPart::kPart};
+
+bool wanted(const AlgorithmSettings& s) { return learns_density(s) || kWalkLearning.wanted(s); }
+
+/// As many light sub-paths are kept for the density map as there are camera samples.
+LearningPlan plan(const AlgorithmSettings& s) {
+    LearningPlan plan = kWalkLearning.plan(s);
+    if (learns_density(s)) plan.energy_paths = 1;
+    return plan;
+}
+
+Result<Tables> learn(const LearnRequest& r) {
+    auto tables = kWalkLearning.learn(r);
+    if (!tables.ok()) return tables.status();
+    DensityData density;
+    if (learns_density(r.settings.algorithm)) {
+        density = train_density(r.data);
+        if (!density.learned())
+            r.report->add_note("no light sub-path left a photon; heuristic=vcm+ and vcm* weight merges as if discs held one each");
+    }
+    tables->set(std::make_shared<const DensityPart>(DensityPart{std::move(density)}));
+    return tables;
+}
+
+constexpr LearningInfo kLearning{.parts = kParts, .plan = plan, .learn = learn, .wanted = wanted};
 
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     const AlgorithmSettings& s = r.settings.algorithm;
     LL_RETURN_IF_ERROR(check_photon_memory(r, r.light_paths_per_iteration(), usable_memory()));
-    const VcmSelection first{{double(r.light_paths_per_iteration()), next_event_of(s)},
-                             merge_radius_of(s, *r.scene),
-                             MergeKernel(int(s.value(kKernel.name))),
-                             s.value(kMergeFirst.name) != 0,
-                             MergeCount(int(s.value(kCorrelationAware.name))),
-                             s.value_by_depth(kConnectionsToPhotonPaths.name)};
+    const VcmSelection first{
+        {{double(r.light_paths_per_iteration()), next_event_of(s)}, s.value_by_depth(kConnectionsToPhotonPaths.name)},
+        merge_radius_of(s, *r.scene),
+        MergeKernel(int(s.value(kKernel.name))),
+        s.value(kMergeFirst.name) != 0,
+        correction_of(s)};
+    const auto density = density_of(r.tables);
     return make_unit_renderer(r, [&](auto&& select) {
-        return VcmAlgorithm<std::remove_cvref_t<decltype(select)>>{select, first, s.value(kAlpha.name), heuristic_of(s)};
+        return VcmAlgorithm<std::remove_cvref_t<decltype(select)>>{select, first, s.value(kAlpha.name), heuristic_of(s), density};
     });
 }
 
@@ -64,7 +94,7 @@ const AlgorithmInfo kVcmRow{
     .frame = FrameShape::kWhole,
     .light_paths_per_pixel = chosen_light_paths,
     .shares_light_paths = true,
-    .learning = &kWalkLearning,
+    .learning = &kLearning,
     .make = make,
 };
 

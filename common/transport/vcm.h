@@ -11,70 +11,120 @@
 //     r(j)^2 = r(0)^2 (j + 1)^(alpha - 1)                 [Knaus and Zwicker 2011, eq. 18 in its limit]
 // with r(0) in pixels as they appear at the first vertex that the camera sees, mirrors and glass aside, or relative to the scene.
 // Each iteration has photons of its own: a map that served several would be one sample and not several.
-// Tables: none. Bias: the kernel blurs, and discs that reach over an edge find too little; both vanish as r does. Missing: nothing
-// that has a vertex to merge at.
+// With a correction, n c_i stands for n (common/path/merge_shares.h).
+// Tables: the density map of the corrections vcm+ and vcm*. Bias: the kernel blurs, and discs that reach over an edge find too
+// little; both vanish as r does. Missing: nothing that has a vertex to merge at.
 
 #include <algorithm>
-#include <optional>
+#include <memory>
 
-#include "common/path/correlation.h"
+#include "common/path/merge_shares.h"
+#include "common/tables/density_map.h"
 #include "common/transport/bdpt.h"
 #include "common/transport/merging.h"
 #include "common/transport/photon_memory.h"
 
 namespace lightloom {
 
-/// How many of the n photon paths that one camera sub-path may merge with count in the weights.
-enum class MergeCount : uint8_t {
-    kAll,         ///< Georgiev et al. 2012.
-    kCorrelated,  ///< As far as they are independent [Grittmann, Georgiev and Slusallek 2021]; common/path/correlation.h.
-    kOne,         ///< A camera sub-path is one sample, whatever it merges with [as for connections: Popov et al. 2015].
+/// bdpt's techniques with N light sub-paths for a camera vertex.
+struct ConnectedSubPaths : BdptSelection {
+    ByDepth<double> number = 1;  ///< N
+
+    struct OnPath : BdptSelection::OnPath {
+        ByDepth<double> number;
+
+        double connections(int s) const { return number(view.k + 1 - s); }
+        double connect(int s) const { return s == 1 ? 0 : connections(s); }
+        double connect(int s, double share) const { return connect(s) * share; }
+    };
+    OnPath on(const PathView& view) const { return {BdptSelection::on(view), number}; }
 };
 
 struct VcmSelection {
-    BdptSelection bdpt;
+    ConnectedSubPaths bdpt;
     MergeRadius radius;
     MergeKernel kernel = MergeKernel::kConstant;
     bool first_hit = false;  ///< Whether merges at x_{k-1} count.
-    MergeCount count = MergeCount::kAll;
-    ByDepth<double> connections = 1;  ///< N: light sub-paths that a camera vertex is connected to.
+    Correction correction = Correction::kUncorrected;
 
-    struct OnPath : BdptSelection::OnPath {
+    struct OnPath : Corrected<ConnectedSubPaths>::OnPath {
         static constexpr bool kMerges = true;
-        ByDepth<double> connections;
         double merges;
         int last;  ///< Last vertex that may merge.
-        std::optional<MergeCorrelation> correlation;
+        MergeShares shares;
 
-        double connect(int s) const { return s == 1 ? 0 : connections(view.k + 1 - s); }
-        double merge(int i) const { return i > last ? 0 : correlation ? merges * (*correlation)(i) : merges; }
+        double merge(int i) const { return i > last ? 0 : merges * shares(i); }
     };
     OnPath on(const PathView& view) const {
-        const double area = kPiD * radius.squared(view.footprint_distance2) * (kernel == MergeKernel::kConstant ? 1 : 0.75);
-        const double n = count == MergeCount::kOne ? 1 : bdpt.light_paths_per_iteration;
-        OnPath path{bdpt.on(view), connections, n * area, first_hit ? view.k - 1 : view.k - 2, {}};
-        if (count == MergeCount::kCorrelated) path.correlation.emplace(view, n);
-        return path;
+        const double disc = kPiD * radius.squared(view.footprint_distance2);
+        const double area = disc * (kernel == MergeKernel::kConstant ? 1 : 0.75), n = bdpt.light_paths_per_iteration;
+        const MergeRule rule{n, disc, first_hit ? view.k - 1 : view.k - 2};
+        const double count = correction == Correction::kOne ? 1 : n;
+        return {Corrected<ConnectedSubPaths>{bdpt, correction}.on(view), count * area, rule.last, shares_on(view, rule)};
     }
     NextEventRays next_event_rays() const { return bdpt.rays; }
+
+  private:
+    MergeShares shares_on(const PathView& view, const MergeRule& rule) const {
+        switch (correction) {
+            case Correction::kCorrelation: return MergeShares::correlation(view, rule);
+            case Correction::kFootprint: return MergeShares::footprints(view, rule);
+            case Correction::kPhotons: return MergeShares::photons(view, rule, false);
+            case Correction::kPhotonsBalanced: return MergeShares::photons(view, rule, true);
+            case Correction::kUncorrected:
+            case Correction::kOne: return {};
+        }
+        return {};
+    }
 };
 
 /// What weights of single paths need to know (unit_renderer.h), at the radius of the first iteration.
 template <class Selection = VcmSelection>
 struct VcmMethod {
     Selection densities;
+    Correction correction = Correction::kUncorrected;
+    std::shared_ptr<const DensityMap> photons;  ///< Null: nothing is known.
 
     static constexpr ViewDetail kDetail = ViewDetail::kFull;
-    void label_light_path(const Scene&, PathVertex*, int) const {}
-    void label_camera_vertex(const Scene&, PathVertex*) const {}
-    /// Sets footprint_distance2, primary_distance2 and source of a path's view.
+    /// Labels are those of the density map.
+    void label_light_path(const Scene&, PathVertex* y, int n) const {
+        if (!photons) return;
+        for (int i = 1; i < n; ++i) y[i].label = photons->label(y[i].p);
+    }
+    void label_camera_vertex(const Scene&, PathVertex* v) const {
+        if (photons) v->label = photons->label(v->p);
+    }
+    /// Sets footprint_distance2, primary_distance2, source, photons and edge of a path's view.
     void complete(const Scene& scene, const LightSubPath& y, int s, const PathVertex* z, int t, const Vec3&, PathView* view) const {
-        const EmitterSet& emitters = scene.emitters();
-        const bool hit = s == 0 && view->k == t - 1;
-        const int32_t emitter = s > 0 ? y[0].emitter : hit ? z[t - 1].emitter : emitters.environment_index();
-        view_footprint(emitters[uint32_t(emitter)], y, s, z, t, view);
+        view_footprint(scene.emitters(), y, s, z, t, view);
         // With t = 1, x_{k-1} is no Dirac vertex.
         view->footprint_distance2 = t >= 2 ? camera_distance2(z, t) : view->primary_distance2;
+        view_photons(y, z, t, view);
+        const bool hit = s == 0 && view->k == t - 1;
+        const int32_t emitter = s > 0 ? y[0].emitter : hit ? z[t - 1].emitter : scene.emitters().environment_index();
+        view_edges(scene.emitters()[uint32_t(emitter)], s > 0 ? y[0].p : z[t - 1].p, y, z, t, view);
+    }
+    /// What the correction reads besides what all paths of a camera sub-path have in common; x_0 is at `start`.
+    LL_ALWAYS_INLINE void complete_for_correction(const Emitter& e, const Vec3& start, const LightSubPath& y, const PathVertex* z,
+                                                  int t, PathView* view) const {
+        view->source = light_source(e);
+        if (correction == Correction::kFootprint) view_edges(e, start, y, z, t, view);
+        if (correction == Correction::kPhotons || correction == Correction::kPhotonsBalanced) view_photons(y, z, t, view);
+    }
+
+  private:
+    // Where both sub-paths have x_i, because they merged there, the camera's place is that of the path.
+    void view_photons(const LightSubPath& y, const PathVertex* z, int t, PathView* view) const {
+        const int k = view->k;
+        const auto density = [&](uint16_t label) { return photons && label != kNoLabel ? photons->density(label) : 0; };
+        for (int i = 1; i < k && k - i >= t; ++i) view->photons[i] = density(y[i].label);
+        for (int j = 1; j < t && j < k; ++j) view->photons[k - j] = density(z[j].label);
+    }
+    static void view_edges(const Emitter& e, const Vec3& start, const LightSubPath& y, const PathVertex* z, int t, PathView* view) {
+        const int k = view->k;
+        const auto place = [&](int i) { return i == 0 ? start : k - i < t ? z[k - i].p : y[i].p; };
+        view->edge[0] = e.is_infinite() ? 0 : length(place(1) - start);
+        for (int i = 1; i < k; ++i) view->edge[i] = length(place(i + 1) - place(i));
     }
 };
 
@@ -87,7 +137,8 @@ struct VcmAlgorithm {
     VcmSelection first;  ///< Of the first iteration.
     double alpha = 1;
     Heuristic heuristic = Heuristic::kBalance;
-    VcmMethod<Selection> method{select(first)};
+    std::shared_ptr<const DensityMap> density{};  ///< Null: nothing is known.
+    VcmMethod<Selection> method{select(first), first.correction, density};
 
     static constexpr bool kPerIteration = true;
 
@@ -115,12 +166,14 @@ struct VcmAlgorithm {
             z0.p = scope.scene.camera().sample_lens(lens_sample);
             const Rgb c = connect_to_camera(scope.scene, y, s, &z0.p, &film, &view, &chunk.counters);
             if (c.is_black()) return;
-            method.complete(scope.scene, y, s, &z0, 1, {}, &view);
             const PathContribution found = from_light_path(c, Technique::lens(s), y, &z0, 1, film);
+            view.primary_distance2 = view.footprint_distance2 = double(length_squared(y[s - 1].p - z0.p));
+            method.complete_for_correction(scope.scene.emitters()[found.emitter], y[0].p, y, &z0, 1, &view);
             contribute(found, view, weight(state, view, found.technique), m, chunk);
         };
         state.cache = trace_light_cache(
-            scope, scope.work.light_path_count, preparation, [](PathVertex*, int) {}, splat);
+            scope, scope.work.light_path_count, preparation,
+            [&](PathVertex* y, int n) { method.label_light_path(scope.scene, y, n); }, splat);
         state.cache.prefixes = {};
         if (!scope.stop.stop_requested()) {
             state.photons = PhotonMap(state.cache);
@@ -144,7 +197,7 @@ struct VcmAlgorithm {
         // if there are to be several.
         const std::vector<LightCache::Path>& paths = state.cache.paths;
         const uint64_t own = context.pixel * paths.size() / uint64_t(scene.frame().crop.area());
-        const ByDepth<int> connections = first.connections.each([](double n) { return int(n); });
+        const ByDepth<int> connections = first.bdpt.number.each([](double n) { return int(n); });
         const uint64_t stride = std::max<uint64_t>(1, paths.size() / uint64_t(std::max(connections.at_first, connections.later)));
         const auto sub_path = [&](int c) {
             return paths.empty() ? LightCache::Path{} : paths[(own + uint64_t(c) * stride) % paths.size()];
@@ -157,10 +210,11 @@ struct VcmAlgorithm {
         CameraSampler sampler(context.seed, context.iteration, context.pixel);
         // What VcmMethod::complete() sets: the same for all paths of a camera sub-path but for the kind of light.
         const auto weigh = [&](const PathContribution& c, PathView& v) LL_ALWAYS_INLINE {
-            v.source = light_source(scene.emitters()[c.emitter]);
+            method.complete_for_correction(scene.emitters()[c.emitter], c.position, c.y, c.z, c.t, &v);
             contribute(c, v);
         };
         const auto visit = [&](int t) {
+            method.label_camera_vertex(scene, &z[t - 1]);
             if (t == 2) view.primary_distance2 = double(length_squared(z[1].p - z[0].p));
             view.footprint_distance2 = camera_distance2(z, t);
             contribute_hit<ViewDetail::kFull>(scene, z, t, &view, weigh);

@@ -75,7 +75,8 @@ TEST_F(CommandLine, MistakesAreOneLineThatSuggestsWhatIsNear) {
         {{"render", kScene, "-a", "bdpt", "--set", "heuristics=power"},
          "lightloom: algorithm 'bdpt' has no parameter 'heuristics' (did you mean 'heuristic'?)"},
         {{"render", kScene, "-a", "bdpt", "--set", "heuristic=powr"},
-         "lightloom: parameter heuristic=powr of 'bdpt' must be balance, power or maximum (did you mean 'power'?)"},
+         "lightloom: parameter heuristic=powr of 'bdpt' must be balance, power, maximum, popov or correlation-aware (did you mean "
+         "'power'?)"},
         {{"algorithms", "spcbt"}, "lightloom: no algorithm named 'spcbt' (did you mean 'spcbpt'?); choose one of: path, "},
         {{"inspect", path("none.pbrt")}, "lightloom: "},
         {{"compare", path("none.exr"), path("none.exr")}, "lightloom: "},

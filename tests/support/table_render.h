@@ -1,10 +1,12 @@
 #pragma once
 // Settings and random tables of the rows of the catalog that learn, for renders whose means must not depend on them.
 
+#include "common/tables/density_part.h"
 #include "common/tables/emission_part.h"
 #include "common/tables/gain_part.h"
 #include "common/tables/subspace_tables.h"
 #include "tests/support/estimates.h"
+#include "tests/support/random_density.h"
 #include "tests/support/random_emission.h"
 #include "tests/support/random_gain.h"
 #include "tests/support/random_tables.h"
@@ -20,7 +22,7 @@ inline Tables random_tables_for(const AlgorithmInfo& row, const Scene& scene, ui
     if (!row.learning) return tables;
     const std::span<const TablePart* const> parts = row.learning->parts;
     const bool known = std::all_of(parts.begin(), parts.end(), [](const TablePart* p) {
-        return p == &SubspaceTables::kPart || p == &EmissionPart::kPart || p == &GainPart::kPart;
+        return p == &SubspaceTables::kPart || p == &EmissionPart::kPart || p == &GainPart::kPart || p == &DensityPart::kPart;
     });
     if (!known) {
         const std::string name(row.name);
@@ -40,6 +42,8 @@ inline Tables random_tables_for(const AlgorithmInfo& row, const Scene& scene, ui
         GainData data = seed % 2 == 0 && parts.size() > 1 ? GainData{} : random_gain(scene.frame().crop, seed);
         tables.set(std::make_shared<const GainPart>(GainPart{std::move(data)}));
     }
+    if (std::find(parts.begin(), parts.end(), &DensityPart::kPart) != parts.end())
+        tables.set(std::make_shared<const DensityPart>(DensityPart{random_density(scene.emitters(), seed)}));
     tables.belong_to(std::string(row.name));
     return tables;
 }
@@ -64,7 +68,7 @@ inline RenderSettings cache_settings(const std::string& algorithm, const CacheOp
                              {"light-paths", std::to_string(o.light_paths)},
                              {"merge-radius", "0.05"},
                              {"ris-aware", o.ris_aware ? "on" : "off"},
-                             {"correlation-aware", o.correlation_aware ? "on" : "off"}}),
+                             {"heuristic", o.correlation_aware ? "correlation-aware" : "balance"}}),
         0, max_depth);
 }
 

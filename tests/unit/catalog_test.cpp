@@ -141,7 +141,7 @@ TEST(Settings, ChoicesHaveNamesForPeopleAndNumbersForDigests) {
     const std::map<std::string, std::string> numbers{{"heuristic", "1"}, {"trainer", "1"}, {"ris-aware", "1"}};
     EXPECT_EQ(settings->chosen_named_text(), named);
     EXPECT_EQ(settings->chosen_text(), numbers);
-    EXPECT_EQ(settings->named_text().at("correlation-aware"), "on");
+    EXPECT_EQ(settings->named_text().at("ris-aware"), "on");
     EXPECT_EQ(settings->named_text().at("training-paths"), "500000");
     EXPECT_EQ(settings->named_text().at("mix"), "0.1");
     for (const AlgorithmInfo* row : catalog()) {
@@ -181,9 +181,12 @@ TEST(Settings, RefusalsSuggestWhatIsNear) {
     EXPECT_TRUE(refusal("bpdt", {}).starts_with("no algorithm named 'bpdt' (did you mean 'bdpt'?); choose one of: path, "));
     EXPECT_EQ(refusal("bdpt", {{"heuristics", "power"}}),
               "algorithm 'bdpt' has no parameter 'heuristics' (did you mean 'heuristic'?); `lightloom algorithms bdpt` lists them");
-    EXPECT_EQ(refusal("bdpt", {{"heuristic", "powr"}}),
-              "parameter heuristic=powr of 'bdpt' must be balance, power or maximum (did you mean 'power'?)");
-    EXPECT_EQ(refusal("bdpt", {{"heuristic", "3"}}), "parameter heuristic=3 of 'bdpt' must be balance, power or maximum");
+    EXPECT_EQ(
+        refusal("bdpt", {{"heuristic", "powr"}}),
+        "parameter heuristic=powr of 'bdpt' must be balance, power, maximum, popov or correlation-aware (did you mean 'power'?)");
+    EXPECT_EQ(refusal("path", {{"heuristic", "3"}}), "parameter heuristic=3 of 'path' must be balance, power or maximum");
+    EXPECT_EQ(refusal("lvcbpt", {{"heuristic", "vcm+"}}),
+              "parameter heuristic=vcm+ of 'lvcbpt' must be balance, power, maximum, popov or correlation-aware");
     EXPECT_EQ(refusal("spcbpt", {{"ris-aware", "yes"}}), "parameter ris-aware=yes of 'spcbpt' must be off or on");
     EXPECT_EQ(refusal("bdpt", {{"rr-start", "1"}}), "parameter rr-start=1 of 'bdpt' must be an integer from 2 to 256");
 }

@@ -42,8 +42,8 @@ TEST(ConnectionsByDepth, WeightsKnowTheNumberOfEachVertex) {
         if (!defaults.has("connections")) continue;
         ++rows;
         std::vector<Parameters> variants{{}};
-        for (const char* aware : {"correlation-aware", "ris-aware"})
-            if (defaults.has(aware)) variants.insert(variants.end(), {{{aware, "off"}}, {{aware, "on"}}});
+        if (defaults.has("ris-aware")) variants.insert(variants.end(), {{{"ris-aware", "off"}}, {{"ris-aware", "on"}}});
+        for (const char* heuristic : {"balance", "correlation-aware"}) variants.push_back({{"heuristic", heuristic}});
         for (const Parameters& changes : variants) {
             const Three weights = weights_of(*row, scene, changes);
             int first = 0, later = 0, different = 0;

@@ -65,6 +65,7 @@ Family family_of(const AlgorithmInfo& row, const std::shared_ptr<const Scene>& s
     }
     const Tables all_tables = testing::random_tables_for(row, *scene, seed);
     Family family;
+    bool front_knows_all = false;  // the first member tells what all of them read of a path
     for (const auto& [parameter, value] : changes) {
         auto set = parameters;
         if (!parameter.empty()) set[parameter] = value;
@@ -81,6 +82,7 @@ Family family_of(const AlgorithmInfo& row, const std::shared_ptr<const Scene>& s
         if (!weights) return {};
         family.push_back({name + (parameter.empty() ? "" : ", " + parameter + "=" + value), std::move(weights),
                           settings.algorithm.has(kHeuristic.name) ? heuristic_of(settings.algorithm) : Heuristic::kBalance});
+        if (!front_knows_all && !tables.empty()) std::swap(family.front(), family.back()), front_knows_all = true;
     }
     return family;
 }
@@ -100,8 +102,7 @@ Family family_of_stubs(const Scene& scene) {
 }
 
 /// Adds what all techniques of a member together weigh, each as it would have seen the path had it made it, and the same with the
-/// path's own technique as it did see it. Nothing for members that have no such technique. Of equal densities the maximum heuristic
-/// picks one by an order that holds within one view only: rounding decides otherwise in another.
+/// path's own technique as it did see it. Nothing for members that have no such technique.
 void add_sums(const Scene& scene, const FullPath& path, Technique own, const PathView& traced, Family* family) {
     std::vector<std::pair<double, double>> sums(family->size());
     testing::for_each_technique(path.k(), [&](Technique t) {
@@ -112,8 +113,7 @@ void add_sums(const Scene& scene, const FullPath& path, Technique own, const Pat
         for (size_t i = 0; i < family->size(); ++i) {
             const PathWeights& weights = *(*family)[i].weights;
             if (!(weights.sigma(other->view, t) > 0)) continue;
-            const bool maximum = (*family)[i].heuristic == Heuristic::kMaximum;
-            const double weight = weights.weight(maximum ? traced : other->view, t);
+            const double weight = weights.weight(other->view, t);
             sums[i].first += weight;
             sums[i].second += t == own ? weights.weight(traced, own) : weight;
         }
