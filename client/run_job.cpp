@@ -70,7 +70,7 @@ Status write_statistics(const std::string& path, const JobInfo& job, const Diges
     if (job.rare_light != RareLightReport{}) json["rare_light"] = to_json(job.rare_light);
     if (job.noise) json["noise"] = to_json(job.noise, job.spec.noise_target);
     // Of workers in this process alone; those of a service have theirs.
-    if (const PhotonMemory photons = most_photon_memory(); photons.total() > 0)
+    if (const PhotonMemory photons = most_photon_memory(); job.spec.algorithm.merges() && photons.total() > 0)
         json["photon_memory_bytes"] = {{"light_paths", photons.paths}, {"map", photons.map}};
     if (job.tables.asset.size_bytes > 0) json["tables"] = to_json(job.tables);
     return write_file_atomically(path, json.dump(1) + "\n");

@@ -51,9 +51,9 @@ struct MergeTerms {
         return now;
     }
     /// n a, m^2, a = 1 / (integral of the kernel's square): sigma of a merge, without roulette, at this footprint_distance2.
-    double density(double distance2) const {
-        return paths * kPiD * radius.squared(distance2) * (kernel == MergeKernel::kConstant ? 1 : 0.75);
-    }
+    double density(double distance2) const { return paths * disc(distance2) * (kernel == MergeKernel::kConstant ? 1 : 0.75); }
+    /// Area of the disc, m^2.
+    double disc(double distance2) const { return kPiD * radius.squared(distance2); }
     /// Last vertex of a path of k edges that may merge.
     int last(int k) const { return first_hit ? k - 1 : k - 2; }
 };

@@ -17,7 +17,7 @@ class MergesOnPath {
   public:
     /// Reads footprint_distance2 and, for corrections, what view_footprint() writes.
     MergesOnPath(const PathView& view, const MergeTerms& terms, Correction correction)
-        : density_(terms.density(view.footprint_distance2)),
+        : density_(terms.density(view.footprint_distance2) / (correction == Correction::kOne ? terms.paths : 1)),
           k_(view.k),
           last_(terms.last(view.k)),
           shares_(MergeShares::of(correction, view, {terms.paths, kPiD * terms.radius.squared(view.footprint_distance2), last_})) {}

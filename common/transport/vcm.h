@@ -43,7 +43,7 @@ struct SeveralConnections {
 };
 
 struct VcmSelection {
-    BdptSelection bdpt;
+    ConnectedSubPaths bdpt;
     MergeRadius radius;
     MergeKernel kernel = MergeKernel::kConstant;
     bool first_hit = false;  ///< Whether merges at x_{k-1} count.
@@ -187,7 +187,7 @@ struct VcmAlgorithm {
         // if there are to be several.
         const std::vector<LightCache::Path>& paths = state.cache.paths;
         const uint64_t own = context.pixel * paths.size() / uint64_t(scene.frame().crop.area());
-        const ByDepth<int> connections = first.connections.each([](double n) { return int(n); });
+        const ByDepth<int> connections = first.bdpt.number.each([](double n) { return int(n); });
         const uint64_t stride = std::max<uint64_t>(1, paths.size() / uint64_t(std::max(connections.at_first, connections.later)));
         const auto sub_path = [&](int c) {
             return paths.empty() ? LightCache::Path{} : paths[(own + uint64_t(c) * stride) % paths.size()];

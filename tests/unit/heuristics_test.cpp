@@ -66,7 +66,7 @@ void for_each_selection(uint64_t seed, Check&& check) {
                                    TypicalSurvival(RouletteRule{}), bdpt.rays, connections};
     const MergeRadius radius{.per_distance2 = std::exp2(-20 * rng.uniform_double()), .most2 = 1e3};
     for (const Correction correction : kCorrections) {
-        check(VcmSelection{bdpt, radius, MergeKernel(rng.below(2)), rng.below(2) != 0, correction}, "vcm");
+        check(VcmSelection{{bdpt}, radius, MergeKernel(rng.below(2)), rng.below(2) != 0, correction}, "vcm");
         check(Corrected<BdptSelection>{bdpt, correction}, "bdpt");
         check(Corrected<UniformSelection>{uniform, correction}, "lvcbpt");
     }
