@@ -17,10 +17,10 @@ class MergesOnPath {
   public:
     /// Reads footprint_distance2 and, for corrections, what view_footprint() writes.
     MergesOnPath(const PathView& view, const MergeTerms& terms, Correction correction)
-        : density_(terms.density(view.footprint_distance2) / (correction == Correction::kOne ? terms.paths : 1)),
+        : density_(terms.density(view.footprint_distance2)),
           k_(view.k),
           last_(terms.last(view.k)),
-          shares_(MergeShares::of(correction, view, {terms.paths, kPiD * terms.radius.squared(view.footprint_distance2), last_})) {}
+          shares_(MergeShares::of(correction, view, {terms.paths, terms.disc(view.footprint_distance2), last_})) {}
     /// sigma of merging at x_i, 1 <= i <= k-1.
     double sigma(int i, const PathSurvival& survival) const {
         return i > last_ ? 0 : density_ * shares_(i) * survival.light(i + 1) * survival.camera(k_ + 1 - i);

@@ -70,12 +70,12 @@ constexpr LearningInfo kLearning{.parts = kParts, .plan = plan, .learn = learn, 
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
     const AlgorithmSettings& s = r.settings.algorithm;
     LL_RETURN_IF_ERROR(check_photon_memory(r, r.light_paths_per_iteration(), usable_memory()));
-    const VcmSelection first{{double(r.light_paths_per_iteration()), next_event_of(s)},
-                             merge_radius_of(s, *r.scene),
-                             MergeKernel(int(s.value(kKernel.name))),
-                             s.value(kMergeFirst.name) != 0,
-                             correction_of(s),
-                             s.value_by_depth(kConnectionsToPhotonPaths.name)};
+    const VcmSelection first{
+        {{double(r.light_paths_per_iteration()), next_event_of(s)}, s.value_by_depth(kConnectionsToPhotonPaths.name)},
+        merge_radius_of(s, *r.scene),
+        MergeKernel(int(s.value(kKernel.name))),
+        s.value(kMergeFirst.name) != 0,
+        correction_of(s)};
     const auto density = density_of(r.tables);
     return make_unit_renderer(r, [&](auto&& select) {
         return VcmAlgorithm<std::remove_cvref_t<decltype(select)>>{select, first, s.value(kAlpha.name), heuristic_of(s), density};

@@ -26,20 +26,18 @@
 
 namespace lightloom {
 
-/// The connections of vcm: each camera vertex to N light sub-paths, as bdpt's to one.
-struct SeveralConnections {
-    BdptSelection bdpt;
-    ByDepth<double> count = 1;  ///< N
+/// bdpt's techniques with N light sub-paths for a camera vertex.
+struct ConnectedSubPaths : BdptSelection {
+    ByDepth<double> number = 1;  ///< N
 
     struct OnPath : BdptSelection::OnPath {
-        ByDepth<double> count;
+        ByDepth<double> number;
 
-        double connections(int s) const { return count(view.k + 1 - s); }
+        double connections(int s) const { return number(view.k + 1 - s); }
         double connect(int s) const { return s == 1 ? 0 : connections(s); }
         double connect(int s, double share) const { return connect(s) * share; }
     };
-    OnPath on(const PathView& view) const { return {bdpt.on(view), count}; }
-    NextEventRays next_event_rays() const { return bdpt.rays; }
+    OnPath on(const PathView& view) const { return {BdptSelection::on(view), number}; }
 };
 
 struct VcmSelection {
@@ -48,9 +46,8 @@ struct VcmSelection {
     MergeKernel kernel = MergeKernel::kConstant;
     bool first_hit = false;  ///< Whether merges at x_{k-1} count.
     Correction correction = Correction::kUncorrected;
-    ByDepth<double> connections = 1;  ///< N: light sub-paths that a camera vertex is connected to.
 
-    struct OnPath : Corrected<SeveralConnections>::OnPath {
+    struct OnPath : Corrected<ConnectedSubPaths>::OnPath {
         static constexpr bool kMerges = true;
         double merges;
         int last;  ///< Last vertex that may merge.
@@ -62,7 +59,7 @@ struct VcmSelection {
         const double disc = kPiD * radius.squared(view.footprint_distance2), n = bdpt.light_paths_per_iteration;
         const double area = disc * (kernel == MergeKernel::kConstant ? 1 : 0.75);
         const MergeRule rule{n, disc, first_hit ? view.k - 1 : view.k - 2};
-        return {Corrected<SeveralConnections>{{bdpt, connections}, correction}.on(view), n * area, rule.last,
+        return {Corrected<ConnectedSubPaths>{bdpt, correction}.on(view), n * area, rule.last,
                 MergeShares::of(correction, view, rule)};
     }
     NextEventRays next_event_rays() const { return bdpt.rays; }
