@@ -15,8 +15,12 @@ constexpr int kSeeds = 16;
 TEST(Splitting, KeepsTheMean) {
     testing::TestFamily family;
     int tested = 0;
+    struct Place {
+        const char* name;
+        std::shared_ptr<const Scene> (*make)();
+    };
     for (const auto& [name, make] :
-         {std::pair{"spherical_lights", testing::spherical_lights}, {"environment_lit", testing::environment_lit}}) {
+         {Place{"spherical_lights", testing::spherical_lights}, Place{"environment_lit", testing::environment_lit}}) {
         const auto scene = make();
         uint64_t seed = 1000;
         const auto means = [&](const AlgorithmInfo& row, const std::map<std::string, std::string>& parameters) {
