@@ -54,7 +54,8 @@ TEST(Submission, OfAnAlgorithmOrParameterThatDoesNotExistIsRefusedClearly) {
             "algorithm 'bdpt' has no parameter 'light-subspaces'; `lightloom algorithms bdpt` lists them");
     refuses([](v1::JobSpec& s) { (*s.mutable_parameters())["rr-min"] = "nan"; },
             "parameter rr-min=nan of 'bdpt' must be a number from 0.01 to 1");
-    refuses([](v1::JobSpec& s) { (*s.mutable_parameters())["heuristic"] = "1.5"; }, "must be balance, power or maximum");
+    refuses([](v1::JobSpec& s) { (*s.mutable_parameters())["heuristic"] = "1.5"; },
+            "must be balance, power, maximum, popov or correlation-aware");
     const auto refuses_time = [&](double seconds, const char* reason) {
         refuses([&](v1::JobSpec& s) { s.clear_samples_per_pixel(), s.set_time_limit_seconds(seconds); }, reason);
     };

@@ -111,7 +111,7 @@ TEST(Wire, SpecsWithAlgorithmsOrParametersThatDoNotExistAreRefused) {
     says(refusal([](v1::JobSpec& s) {
              s.mutable_parameters()->insert({"heuristic", "veach"});
          }),
-         "must be balance, power or maximum");
+         "must be balance, power, maximum, popov or correlation-aware");
 }
 
 /// A coordinator may know more algorithms and parameters than a client, which has to list its jobs all the same.
