@@ -93,6 +93,8 @@ struct AlgorithmInfo {
     /// Null for an algorithm without tables. See AlgorithmSettings::learning().
     const LearningInfo* learning = nullptr;
     Result<std::unique_ptr<Renderer>> (*make)(const RendererRequest&);
+    /// kInvalidArgument, with what to change, for values that are possible one by one but make no sense together; null: none are.
+    Status (*check)(const AlgorithmSettings&) = nullptr;
 };
 
 /// The rows, those of add_to_catalog() included, in the order in which users see them.

@@ -75,6 +75,7 @@ Result<AlgorithmSettings> AlgorithmSettings::parse(std::string_view name, const 
         settings.values_[i] = *value;
         settings.chosen_[i] = true;
     }
+    if ((*info)->check) LL_RETURN_IF_ERROR((*info)->check(settings));
     return settings;
 }
 

@@ -65,6 +65,14 @@ Result<Tables> learn(const LearnRequest& r) {
     return tables;
 }
 
+Status check_techniques(const AlgorithmSettings& s) {
+    const HeuristicChoice choice = heuristic_choice_of(s);
+    const std::string techniques(kTechniqueSets[int(s.value(kTechniques.name))]);
+    if (choice < HeuristicChoice::kJendersie19 || techniques != "no-merge") return {};
+    return invalid_argument("heuristic=" + std::string(kHeuristicNames[int(choice)]) +
+                            " of 'vcm' weights merges, of which techniques=no-merge leaves none; choose balance");
+}
+
 constexpr LearningInfo kLearning{.parts = kParts, .plan = plan, .learn = learn, .wanted = wanted};
 
 Result<std::unique_ptr<Renderer>> make(const RendererRequest& r) {
@@ -96,6 +104,7 @@ const AlgorithmInfo kVcmRow{
     .shares_light_paths = true,
     .learning = &kLearning,
     .make = make,
+    .check = check_techniques,
 };
 
 }  // namespace lightloom

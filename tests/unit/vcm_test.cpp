@@ -115,6 +115,16 @@ TEST(Vcm, RadiiThatAreNoneAreRefused) {
               "parameter merge-radius-unit=metre of 'vcm' must be pixel or scene");
 }
 
+TEST(Vcm, HeuristicsOfMergesAreRefusedWithoutMerges) {
+    for (const char* name : {"jendersie19", "vcm+", "vcm*"}) {
+        EXPECT_EQ(AlgorithmSettings::parse("vcm", {{"techniques", "no-merge"}, {"heuristic", name}}).status().message(),
+                  std::string("heuristic=") + name +
+                      " of 'vcm' weights merges, of which techniques=no-merge leaves none; choose balance");
+        EXPECT_TRUE(AlgorithmSettings::parse("vcm", {{"techniques", "no-lens"}, {"heuristic", name}}).ok());
+    }
+    EXPECT_TRUE(AlgorithmSettings::parse("vcm", {{"techniques", "no-merge"}}).ok());
+}
+
 /// A disc as large as the scene blurs everything, but nothing breaks.
 TEST(Vcm, RadiiAsLargeAsTheSceneGiveFiniteImages) {
     const auto scene = testing::glass_and_mirror();
