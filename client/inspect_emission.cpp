@@ -18,7 +18,7 @@ struct LightShare {
     double learned = 0, power = 0;  ///< Probability that a light sub-path leaves it.
 };
 
-struct Statistics {
+struct EmissionStatistics {
     size_t emitters = 0;  ///< Whose probability is not that by power.
     size_t places = 0;    ///< Emitters with a density of places.
     size_t finite_cells = 0, infinite_cells = 0, directional_cells = 0;
@@ -30,8 +30,8 @@ size_t leaves_of(const std::vector<EmissionData::Node>& nodes) {
     return size_t(std::count_if(nodes.begin(), nodes.end(), [](const EmissionData::Node& n) { return n.axis() == 3; }));
 }
 
-Statistics measure(const EmissionData& d, const Scene& scene) {
-    Statistics s;
+EmissionStatistics measure(const EmissionData& d, const Scene& scene) {
+    EmissionStatistics s;
     const std::vector<Emitter>& emitters = scene.emitters().all();
     std::vector<LightShare> lights(scene.summary().lights.size());
     for (size_t i = 0; i < lights.size(); ++i) lights[i].light = uint32_t(i);
@@ -61,7 +61,7 @@ nlohmann::ordered_json describe_emission(const EmissionData& d, const Scene& sce
     nlohmann::ordered_json out;
     out["learned"] = d.learned();
     if (!d.learned()) return out;
-    const Statistics s = measure(d, scene);
+    const EmissionStatistics s = measure(d, scene);
     nlohmann::ordered_json strongest = nlohmann::ordered_json::array();
     for (const LightShare& l : s.strongest) {
         const SceneSummary::Light& light = scene.summary().lights[l.light];
@@ -80,7 +80,7 @@ void print_emission(const EmissionData& d, const Scene& scene) {
         std::printf("  emission   by power: nothing was learned\n");
         return;
     }
-    const Statistics s = measure(d, scene);
+    const EmissionStatistics s = measure(d, scene);
     std::printf("  emission   %.0f %% by power; of the rest %.0f %% of the places and %.0f %% of the directions\n",
                 100 * double(d.power_share), 100 * double(d.power_places), 100 * double(d.power_directions));
     std::printf("    learned  %zu of %zu emitters, places on %zu; directions of %zu of %zu cells; %zu leaves\n", s.emitters,

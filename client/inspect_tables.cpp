@@ -43,15 +43,15 @@ size_t used_labels(const SubspaceTree& tree) {
 /// Of sorted values.
 double quantile(const std::vector<float>& sorted, double q) { return double(sorted[size_t(q * double(sorted.size() - 1) + 0.5)]); }
 
-struct Statistics {
+struct SubspaceStatistics {
     size_t light_labels = 0, eye_labels = 0, windows = 0;
     double q[5] = {};        // minimum, 10 %, median, 90 %, maximum
     double q_top_ten = 0;    // share of the ten largest
     double entropy[3] = {};  // minimum, mean, maximum
 };
 
-Statistics measure(const SubspaceTables& t) {
-    Statistics s;
+SubspaceStatistics measure(const SubspaceTables& t) {
+    SubspaceStatistics s;
     s.light_labels = used_labels(t.light_tree) + t.division.cell_count();
     s.eye_labels = used_labels(t.eye_tree);
     for (const uint16_t w : t.window) s.windows += w > 1;
@@ -143,7 +143,7 @@ Status draw_energy(const SubspaceTables& t, const std::string& path) {
 }
 
 nlohmann::ordered_json describe_subspaces(const SubspaceTables& t) {
-    const Statistics s = measure(t);
+    const SubspaceStatistics s = measure(t);
     return {{"light_subspaces", {{"count", t.light_count}, {"emitter_cells", t.division.cell_count()}, {"labels", s.light_labels}}},
             {"eye_subspaces", {{"count", t.eye_count}, {"labels", s.eye_labels}}},
             {"q",
@@ -163,7 +163,7 @@ nlohmann::ordered_json describe_subspaces(const SubspaceTables& t) {
 }
 
 void print_subspaces(const SubspaceTables& t) {
-    const Statistics s = measure(t);
+    const SubspaceStatistics s = measure(t);
     std::printf("  light      %u subspaces, %u of them cells of emitters; %zu labels occur; %.3g connectible vertices per path\n",
                 t.light_count, t.division.cell_count(), s.light_labels, t.vertices_per_path);
     std::printf("  eye        %u subspaces; %zu labels occur\n", t.eye_count, s.eye_labels);
