@@ -51,9 +51,11 @@ TEST(TablesMatter, OnDoorUniformAndPermutedGammaAreNoisier) {
         std::copy_n(learned->column((j + learned->eye_count / 2) % learned->eye_count), learned->light_count,
                     &permuted.gamma[size_t(j) * learned->light_count]);
 
-    const auto render = [&](const SubspaceTables& tables) {
+    const auto render = [&](const SubspaceTables& subspaces) {
         std::vector<std::vector<double>> images;
-        const auto image = testing::table_image(scene, settings, Tables(tables), kIterations);
+        Tables tables = *tables_of_door;  // its learned emission stays
+        tables.set(std::make_shared<const SubspaceTables>(subspaces));
+        const auto image = testing::table_image(scene, settings, tables, kIterations);
         for (int seed = 0; seed < kSeeds; ++seed) images.push_back(image(uint64_t(100 + seed)));
         return images;
     };
