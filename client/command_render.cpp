@@ -69,6 +69,7 @@ int render(const JobOptions& options, uint32_t threads, uint32_t worker_count, c
     coordinator_options.directory = scratch.path;
     coordinator_options.identity = *identity;
     coordinator_options.scene_files_needed = false;
+    coordinator_options.no_other_workers = true;
     // Everybody in this process shares the one scene; it is built when somebody asks for it. A build takes the description
     // over, so its failure is final: a second attempt would build and render an empty scene.
     std::mutex build_mutex;

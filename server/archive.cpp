@@ -127,19 +127,27 @@ Status Archive::repay_if(const std::function<bool(const Owed&)>& due) {
     std::vector<std::list<Owed>::iterator> found;
     const auto find = [&] {
         const std::lock_guard lock(owed_mutex_);
+        found.clear();
         for (auto owed = owed_.begin(); owed != owed_.end(); ++owed)
             if (due(*owed)) found.push_back(owed);
         return !found.empty();
     };
+    // What is owed stays in the list until it is on disk: whoever finds nothing has nothing to wait for.
+    if (!find()) return {};
     const std::lock_guard one_at_a_time(repaying_);
     if (!find()) return {};
+    // All that was refused is handed over before any of it is waited for, so that it shares a flush.
+    std::vector<Status> statuses;
+    for (const auto owed : found) statuses.push_back(owed->done.get());
+    std::vector<size_t> refused;
+    for (size_t i = 0; i < found.size(); ++i)
+        if (statuses[i].code() == StatusCode::kResourceExhausted) refused.push_back(i);
+    for (const size_t i : refused) found[i]->done = found[i]->change();
+    for (const size_t i : refused) statuses[i] = found[i]->done.get();
     Status first;
-    for (const auto owed : found) {
-        Status status = owed->done.get();
-        if (status.code() == StatusCode::kResourceExhausted) {
-            owed->done = owed->change();
-            status = owed->done.get();
-        }
+    for (size_t i = 0; i < found.size(); ++i) {
+        const auto owed = found[i];
+        const Status& status = statuses[i];
         if (status.code() == StatusCode::kResourceExhausted) {
             std::promise<Status> again;  // for the next time
             again.set_value(status);
@@ -156,8 +164,8 @@ Status Archive::repay_if(const std::function<bool(const Owed&)>& due) {
     return first;
 }
 
-void Archive::repay() {
-    (void)repay_if([](const Owed&) { return true; });
+Status Archive::repay() {
+    return repay_if([](const Owed&) { return true; });
 }
 
 Status Archive::repay_drops(const std::string& job_id) {
@@ -194,6 +202,9 @@ Result<ArchivedJob> Archive::read(const StoredJob& stored, const std::filesystem
     ArchivedJob out;
     const NewJob& job = stored.job;
     auto submitted = from_bytes<v1::JobSpec>(job.submitted);
+    // Of a job that has ended what is told of it is enough, where this build does not know its parameters any more.
+    if (!submitted.ok() && is_terminal(job.state) && stored.info)
+        if (auto last = from_bytes<v1::Job>(*stored.info); last.ok()) submitted = std::move(last->spec);
     if (!submitted.ok()) return submitted.status();
     v1::JobLabel label;
     if (!label.ParseFromString(job.label)) return data_loss("its label is damaged");

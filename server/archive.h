@@ -75,8 +75,9 @@ class Archive {
     void drop_soon(const std::string& job_id, const UnitKey& unit);
     void drop_all_soon(const std::string& job_id);
 
-    /// Tries again what is owed, and waits for it. Whoever has no lock calls it now and then.
-    void repay();
+    /// Tries again what is owed, and waits for it. Whoever has no lock calls it now and then. kResourceExhausted while there is
+    /// still no room.
+    Status repay();
 
     /// All jobs, oldest first, and the workers that results name. `unreadable` takes a line for each job that this build cannot
     /// read.

@@ -82,8 +82,9 @@ Status Coordinator::room() const {
 void Coordinator::look_for_room(OpenBook& book) {
     room_checked_ = office_.now();
     book.close();
-    const Status room = check_room(office_);
-    office_.archive.repay();
+    Status room = check_room(office_);
+    // Free space is not all that a write needs: there are quotas.
+    if (const Status repaid = office_.archive.repay(); room.ok()) room = repaid;
     book.reopen();
     book.set_paused(room.message());
 }

@@ -18,6 +18,7 @@ struct CoordinatorOptions {
     BuildIdentity identity;           ///< A worker must have the same.
     SceneReader read_scene;
     bool scene_files_needed = true;  ///< False where read_scene and the workers have the files by other means.
+    bool no_other_workers = false;   ///< All workers are in this process: what it lacks nobody else has, and waiting helps nothing.
     double lease_seconds = 10;
     double heartbeat_seconds = 1;
     std::optional<uint64_t> shuffle_seed;  ///< Lease units in a random order (tests).

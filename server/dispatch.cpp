@@ -217,6 +217,8 @@ Status Dispatch::release(const std::string& worker_id, const UnitReference& unit
     if (why.ok() || blameless) {
         units->release(unit.key, worker->index);
         book.units_appeared();
+    } else if (why.code() == StatusCode::kResourceExhausted && office_.options.no_other_workers) {
+        book.fail(file, {why.code(), "unit " + unit_name(unit.key) + ": " + why.message()});
     } else if (why.code() == StatusCode::kResourceExhausted) {
         host_failed(book, file, *units, unit.key, *worker, why, office_.now());
     } else {

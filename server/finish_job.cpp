@@ -81,6 +81,9 @@ Status write_results(Office& office, const JobPtr& file) {
         if (file->job.state() != JobState::kFinishing) return {};  // it was cancelled meanwhile
         manifest = settled_manifest(office, book, file, finished->about);
     }
+    // With a time limit nothing else says how many groups the image has, and a restart would render on.
+    if (spec.time_limit_seconds > 0)
+        LL_RETURN_IF_ERROR(with_room(office, file, [&] { return office.archive.finish(file->job.id(), manifest.groups); }));
     crash_point("server.image-encoded");
     LL_RETURN_IF_ERROR(
         write_image(office, file, finished->bytes, std::move(manifest), kImageFiles, "server.image-written", WaitsUntil::kJobEnds));

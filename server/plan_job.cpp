@@ -57,7 +57,8 @@ Status plan_units(Office& office, const JobPtr& file, JobSpec spec, SceneFacts f
     book.unpin(file, guide);
     crash_point("server.units-planned");
     if (archived && archived->cancelled) {  // and was killed before its groups were written
-        book.apply(file, job.end(JobState::kCancelled, kGroupsAreKept, office.now(), OnCancel::kKeep));
+        const std::string message = job.merged_groups() > 0 ? kGroupsAreKept : "";
+        book.apply(file, job.end(JobState::kCancelled, message, office.now(), OnCancel::kKeep));
         return {};
     }
     if (job.state() == JobState::kRunning && job.spec().time_limit_seconds > 0 && job.seconds_left(office.now()) <= 0) job.close();

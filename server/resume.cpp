@@ -50,7 +50,14 @@ Result<JobPtr> restore_job(JobBook& book, ArchivedJob archived, const std::strin
     return file;
 }
 
-/// Adds the stored partials of groups that are not in the checkpoint. Returns those that could be read, in their order.
+/// Whether it was the reading that failed, of bytes that may be as good as ever: too many open files, a device that does not
+/// answer.
+bool may_pass(const Status& status) {
+    return status.code() == StatusCode::kInternal || status.code() == StatusCode::kResourceExhausted;
+}
+
+/// Adds the stored partials of groups that are not in the checkpoint. Returns those that could be read, in their order. What is
+/// damaged is dropped; what could not be read is rendered again all the same, to the bytes that are there.
 std::vector<const StoredResult*> replay_partials(Office& office, const ArchivedJob& archived, const UnitTable& units,
                                                  Job::RenderPlan& plan) {
     std::vector<const StoredResult*> good;
@@ -76,7 +83,7 @@ std::vector<const StoredResult*> replay_partials(Office& office, const ArchivedJ
         };
         if (const Status status = read(); !status.ok()) {
             log_warn("{}: unit {} is rendered again: {}", archived.submission.id, unit_name(result.unit), status.message());
-            office.archive.drop_soon(archived.submission.id, result.unit);
+            if (!may_pass(status)) office.archive.drop_soon(archived.submission.id, result.unit);
             continue;
         }
         good.push_back(&result);
@@ -110,7 +117,7 @@ Status replay_training(Office& office, const JobPtr& file) {
         if (problem.ok()) problem = check_unit_data(part->data, file->job.spec(), unit->training);
         if (!problem.ok()) {
             book.note().warn(file->job.id() + ": unit " + unit_name(result.unit) + " is traced again: " + problem.message());
-            office.archive.drop_soon(file->job.id(), result.unit);
+            if (!may_pass(problem)) office.archive.drop_soon(file->job.id(), result.unit);
             continue;
         }
         // A worker may have been faster than the disk.
@@ -139,6 +146,8 @@ Status replay_results(Office& office, const ArchivedJob& archived, Job::RenderPl
     if (archived.checkpoint) {
         const auto bytes = office.archive.read_checkpoint(*archived.checkpoint);
         const Status restored = bytes.ok() ? plan.reducer->restore(*bytes) : bytes.status();
+        // Then the job fails, and nothing says so on disk: the next start tries again.
+        if (may_pass(restored)) return restored;
         if (!restored.ok()) {
             log_warn("{}: it is rendered anew, because its checkpoint cannot be used: {}", id, restored.message());
             office.archive.drop_all_soon(id);

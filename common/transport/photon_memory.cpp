@@ -65,9 +65,9 @@ PhotonMemory expected_photon_memory(const RendererRequest& request, uint64_t pat
 Status check_photon_memory(const RendererRequest& request, uint64_t path_count, uint64_t machine_bytes) {
     const PhotonMemory need = expected_photon_memory(request, path_count);
     if (need.total() <= machine_bytes) return {};
-    return {StatusCode::kInvalidArgument, "the " + std::to_string(path_count) + " light sub-paths of an iteration need about " +
-                                              gigabytes(need.total()) + " of memory as photons; this machine has " +
-                                              gigabytes(machine_bytes) + ": lower light-paths or the resolution"};
+    return {StatusCode::kResourceExhausted, "the " + std::to_string(path_count) + " light sub-paths of an iteration need about " +
+                                                gigabytes(need.total()) + " of memory as photons; this machine has " +
+                                                gigabytes(machine_bytes) + ": lower light-paths, cache or the resolution"};
 }
 
 uint64_t usable_memory() {

@@ -43,7 +43,12 @@ struct PreparedTables {
     explicit PreparedTables(SubspaceTables t) : tables(std::move(t)), draws(tables.light_count, tables.eye_count) {
         for (uint32_t j = 0; j < tables.eye_count; ++j) draws.set(j, {tables.column(j), tables.light_count});
         for (const float q : tables.energy) inv_energy.push_back(1 / q);
-        for (const uint16_t w : tables.window) windows = std::max(windows, int(w));
+        windows = largest_window(tables);
+    }
+    static int largest_window(const SubspaceTables& t) {
+        int largest = 1;
+        for (const uint16_t w : t.window) largest = std::max(largest, int(w));
+        return largest;
     }
 };
 

@@ -174,7 +174,7 @@ Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const Re
     if (generator.plan_.keeps_visits) generator.camera_roulette_.min_survival = 1;
     generator.next_event_ = algorithm.has(kNextEvent.name) ? next_event_of(algorithm) : NextEventRays{};
     generator.unidirectional_ = algorithm.info().traces == Traces::kCamera;
-    if (merging_on(algorithm)) generator.merging_ = std::make_shared<const MergeTerms>(spcbpt_merge_terms(algorithm, scene, 1));
+    int windows = 1;  // of the render's cache, as far as it is known
     generator.light_paths_per_iteration_ = algorithm.light_paths_per_iteration(scene.frame().crop.area());
     if (!guide.empty()) {
         LL_RETURN_IF_ERROR(guide.validate(scene.emitters()));
@@ -184,10 +184,13 @@ Result<TrainingGenerator> TrainingGenerator::create(const Scene& scene, const Re
         if (const auto subspaces = guide.get<SubspaceTables>()) {
             // Training traces one light sub-path per camera sample, however large the caches of the render will be.
             SubspaceTables tables = *subspaces;
+            windows = PreparedTables::largest_window(tables);
             std::fill(tables.window.begin(), tables.window.end(), uint16_t(1));
             generator.guide_ = std::make_shared<const PreparedTables>(std::move(tables));
         }
     }
+    if (merging_on(algorithm))
+        generator.merging_ = std::make_shared<const MergeTerms>(spcbpt_merge_terms(algorithm, scene, windows));
     generator.seed_ = settings.seed ^ kTrainingSeed;
     generator.max_edges_ = settings.max_edges();
     return generator;

@@ -311,12 +311,12 @@ Status AssetStore::materialise(const AssetManifest& manifest, const fs::path& di
         if (damaged.ok()) damaged = digest.status();
         if (!damaged.ok()) continue;
         fs::create_directories(to.parent_path(), error);
-        if (error) return internal_error(to.parent_path().string() + ": " + error.message());
+        if (error) return io_error(to.parent_path(), error.value());
         fs::remove(to, error);
         fs::create_hard_link(from, to, error);
         if (error) {
             fs::copy_file(from, to, fs::copy_options::overwrite_existing, error);
-            if (error) return internal_error(to.string() + ": " + error.message());
+            if (error) return io_error(to, error.value());
         }
     }
     return damaged;

@@ -31,12 +31,13 @@ struct RecordHeader {
 };
 static_assert(sizeof(RecordHeader) == SegmentLog::kHeaderBytes, "the header has no padding");
 
-/// Reads exactly `size` bytes; false at the end of the file, or an error.
+/// Reads exactly `size` bytes; false with errno set if that fails, with errno 0 if the file ends before.
 bool read_exactly(int file, void* to, uint64_t size, uint64_t offset) {
     char* at = static_cast<char*>(to);
     while (size > 0) {
         const ssize_t got = ::pread(file, at, std::min<uint64_t>(size, 1u << 30), off_t(offset));
         if (got < 0 && errno == EINTR) continue;
+        if (got == 0) errno = 0;
         if (got <= 0) return false;
         at += got;
         size -= uint64_t(got);
@@ -223,11 +224,14 @@ Result<std::string> SegmentLog::read(const PayloadPlace& place) const {
     const int file = ::open(name.c_str(), O_RDONLY | O_CLOEXEC);
     if (file < 0) return errno == ENOENT ? damaged("is gone with its file") : file_error(name, "cannot be opened", errno);
     RecordHeader header;
+    errno = 0;
     const bool known =
         read_exactly(file, &header, kHeaderBytes, place.offset) && header.is_valid(place.segment) && header.length == place.length;
     std::string payload(known ? size_t(place.length) : 0, '\0');
     const bool whole = known && read_exactly(file, payload.data(), payload.size(), place.offset + kHeaderBytes);
+    const int error = errno;
     ::close(file);
+    if (!whole && error != 0) return file_error(name, "cannot be read", error);
     if (!whole || crc32c(payload) != header.payload_sum) return damaged("is damaged");
     return payload;
 }

@@ -331,6 +331,20 @@ TEST(Blame, SeventyFiveDeathsAtRandomFailNoJob) {
     EXPECT_GE(kills, 75);
 }
 
+/// As `lightloom render` has it: the workers are threads of one process.
+TEST(Blame, WhatTheOnlyHostLacksFailsTheJob) {
+    FakeService service({40, 30, {0, 0, 40, 30}}, std::nullopt,
+                        [](CoordinatorOptions& options) { options.no_other_workers = true; });
+    const std::string id = service.submit(service.spec(3)), worker = service.add_worker();
+    const auto leases = service.lease(worker);
+    ASSERT_EQ(leases.size(), 1u);
+    const Status lacks{StatusCode::kResourceExhausted, "this machine has 2.1 GB"};
+    ASSERT_TRUE(service.coordinator->release_unit(worker, leases[0].reference(), lacks).ok());
+    const JobInfo info = service.wait_end(id);
+    EXPECT_EQ(info.state, JobState::kFailed);
+    EXPECT_TRUE(info.message.ends_with(": this machine has 2.1 GB")) << info.message;
+}
+
 TEST(Blame, AFullDiskMakesTheJobWaitAndSayWhoLacksWhat) {
     Farm farm;
     const std::string id = farm.submit(farm.spec(3)), worker = farm.add_worker();

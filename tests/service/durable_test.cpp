@@ -13,8 +13,7 @@ using testing::FakeService;
 const FrameLayout kFrame{40, 30, {0, 0, 40, 30}};
 
 struct DurableService : FakeService {
-    explicit DurableService(const std::function<void(CoordinatorOptions&)>& change = {})
-        : FakeService(kFrame, std::nullopt, change) {
+    explicit DurableService(FrameLayout frame = kFrame) : FakeService(frame) {
         durable = true;
         restart();
     }
@@ -40,8 +39,8 @@ struct DurableService : FakeService {
     }
 };
 
-Digest undisturbed(uint32_t samples) {
-    FakeService service(kFrame);
+Digest undisturbed(uint32_t samples, FrameLayout frame = kFrame) {
+    FakeService service(frame);
     const std::string id = service.submit(service.spec(samples));
     const std::string worker = service.add_worker();
     for (auto leases = service.lease(worker); !leases.empty(); leases = service.lease(worker)) service.deliver(worker, leases[0]);
@@ -181,10 +180,11 @@ TEST(Durable, TheTimeThatWasTakenStaysTaken) {
 }
 
 /// A frame of 1.5 10^5 pixels makes payloads of which a few are due for a checkpoint.
+const FrameLayout kLarge{500, 300, {0, 0, 500, 300}};
+
 TEST(Durable, ACheckpointTakesThePlaceOfResults) {
-    const FrameLayout large{500, 300, {0, 0, 500, 300}};
     const auto render = [&](bool durable) {
-        FakeService service(large);
+        FakeService service(kLarge);
         service.durable = durable;
         if (durable) service.restart();
         const std::string id = service.submit(service.spec(60));
@@ -210,6 +210,28 @@ TEST(Durable, ACheckpointTakesThePlaceOfResults) {
         return service.wait_end(id).image_digest;
     };
     EXPECT_EQ(render(true), render(false));
+}
+
+/// A directory in the file's place stands for a device that does not answer.
+TEST(Durable, ACheckpointThatCannotBeReadForAMomentIsReadByTheNextCoordinator) {
+    DurableService service(kLarge);
+    const std::string id = service.submit(service.spec(60)), worker = service.add_worker();
+    const std::filesystem::path folder = service.directory.path / "store/checkpoints", aside = service.directory.path / "aside";
+    while (std::filesystem::is_empty(folder)) ASSERT_EQ(service.work(worker, 1), 1) << "the job wrote no checkpoint";
+    const uint64_t done = service.coordinator->get_job(id)->unit_done;
+    service.coordinator.reset();
+    const std::filesystem::path checkpoint = std::filesystem::directory_iterator(folder)->path();
+    std::filesystem::rename(checkpoint, aside);
+    std::filesystem::create_directory(checkpoint);
+    service.start();
+    EXPECT_EQ(service.wait_end(id).state, JobState::kFailed);
+    EXPECT_NE(service.wait_end(id).message.find(checkpoint.string()), std::string::npos) << service.wait_end(id).message;
+    service.coordinator.reset();
+    std::filesystem::remove(checkpoint);
+    std::filesystem::rename(aside, checkpoint);
+    service.start();
+    EXPECT_EQ(service.wait_running(id).unit_done, done) << "nothing that was acknowledged is lost";
+    EXPECT_EQ(service.finish(id), undisturbed(60, kLarge));
 }
 
 /// Of three training units two came before the restart: one is traced, and the tables are those of a single machine.

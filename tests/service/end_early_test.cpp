@@ -212,6 +212,8 @@ TEST(Partial, ACancellationThatIsOnDiskIsCarriedOutByTheNextCoordinator) {
     service.start();
     EXPECT_EQ(service.wait_end(rendering).state, JobState::kCancelled);
     EXPECT_EQ(service.wait_end(begun).state, JobState::kCancelled);
+    EXPECT_NE(service.wait_end(rendering).message, "");
+    EXPECT_EQ(service.wait_end(begun).message, "") << "there are no groups that it could have kept";
     EXPECT_EQ(service.partial(rendering), image_of(9));
     EXPECT_EQ(service.coordinator->image(begun, ImageKind::kPartial).status().code(), StatusCode::kFailedPrecondition);
 }

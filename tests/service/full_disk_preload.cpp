@@ -2,8 +2,8 @@
 //
 //   LIGHTLOOM_FULL_DISK=K:SECONDS:DIRECTORY
 //
-// the K-th write to a file below DIRECTORY fails with ENOSPC, and so do those of the SECONDS that follow. A directory made by
-// mkdtemp(3) counts as a write. All of the process is concerned, the database as well. A line on standard error says when it
+// the K-th write to a file below DIRECTORY fails with ENOSPC, and so do those of the SECONDS that follow. A directory or a link
+// that is made counts as a write. All of the process is concerned, the database as well. A line on standard error says when it
 // begins.
 
 #include <fcntl.h>
@@ -70,6 +70,14 @@ bool fails(int file) {
     return true;
 }
 
+/// Whether a name can not be made.
+bool fails(const char* path) {
+    static const Plan plan = read_plan();
+    if (!plan.directory || !below(path, plan.directory) || !is_full()) return false;
+    errno = ENOSPC;
+    return true;
+}
+
 }  // namespace
 
 extern "C" {
@@ -94,15 +102,19 @@ ssize_t pwritev64(int file, const iovec* parts, int count, off64_t offset) {
     return fails(file) ? -1 : ::syscall(SYS_pwritev, file, parts, count, offset, 0);
 }
 
+int mkdir(const char* path, mode_t mode) noexcept { return fails(path) ? -1 : int(::syscall(SYS_mkdir, path, mode)); }
+
+int link(const char* from, const char* to) noexcept { return fails(to) ? -1 : int(::syscall(SYS_link, from, to)); }
+
+ssize_t sendfile(int to, int from, off_t* offset, size_t size) noexcept {
+    return fails(to) ? -1 : ::syscall(SYS_sendfile, to, from, offset, size);
+}
+
 char* mkdtemp(char* pattern) noexcept {
-    static const Plan plan = read_plan();
-    if (plan.directory && below(pattern, plan.directory) && is_full()) {
-        errno = ENOSPC;
-        return nullptr;
-    }
+    if (fails(pattern)) return nullptr;
     for (unsigned number = unsigned(::getpid());; ++number) {
         std::snprintf(pattern + std::strlen(pattern) - 6, 7, "%06u", number % 1000000);
-        if (::mkdir(pattern, 0700) == 0) return pattern;
+        if (::syscall(SYS_mkdir, pattern, 0700) == 0) return pattern;
         if (errno != EEXIST) return nullptr;
     }
 }

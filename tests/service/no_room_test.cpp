@@ -58,7 +58,7 @@ TEST(NoRoom, WhatIsDroppedIsGoneBeforeTheUnitIsKeptAnew) {
     database.full = true;
     archive.drop_soon("a", unit);
     EXPECT_EQ(second().code(), StatusCode::kResourceExhausted);
-    archive.repay();
+    EXPECT_EQ(archive.repay().code(), StatusCode::kResourceExhausted);
     EXPECT_EQ(second().code(), StatusCode::kResourceExhausted);
     database.full = false;
     EXPECT_TRUE(second().ok()) << "the first one is not in its way";

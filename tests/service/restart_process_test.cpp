@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdio>
 
+#include "common/core/crash_point.h"
 #include "common/work/channel.h"
 #include "tests/service/service_process.h"
 
@@ -76,6 +77,21 @@ TEST(Restart, AnAttachedClientIsBackAsSoonAsThePortOpens) {
         EXPECT_LT(seconds_since(open), kBackSeconds);
     }
     EXPECT_NE(service.log("image").find("waiting for it to come back"), std::string::npos) << service.log("image");
+}
+
+/// The coordinator dies when the samples of the image are decided and the image is not written yet.
+TEST(Restart, ATimeLimitThatIsOverStaysOver) {
+    ::setenv(kCrashVariable, "server.image-encoded", 1);
+    Service service;
+    ::unsetenv(kCrashVariable);
+    const auto submitted = service.submit("image", {"--time", "1", "--resolution", "16x12", "--algorithm", "path"});
+    auto worker = service.worker("worker", 1);
+    ASSERT_TRUE(wait_until(60, [&] { return service.server->ended(); })) << service.log("server");
+    worker.reset();
+    restart(service, 0);
+    ASSERT_TRUE(wait_until(60, [&] { return submitted->ended(); })) << "nobody is there who could render: " << service.log("image");
+    EXPECT_EQ(submitted->wait(), 0) << service.log("image");
+    EXPECT_GT(service.manifest("image")["image"]["samples_per_pixel"].get<uint64_t>(), 0u);
 }
 
 }  // namespace

@@ -108,6 +108,18 @@ TEST(SegmentLog, EveryFlippedBitOfARecordIsNoticed) {
         EXPECT_EQ(log->read(wrong).status().code(), StatusCode::kDataLoss);
 }
 
+/// Only what is known to be damaged may be thrown away.
+TEST(SegmentLog, ARecordThatCannotBeReadIsNotDamaged) {
+    const TempDirectory directory;
+    auto log = SegmentLog::open(directory.path);
+    const auto place = append(*log, "payload");
+    ASSERT_TRUE(place.ok() && log->sync().ok());
+    const std::filesystem::path segment = std::filesystem::directory_iterator(directory.path)->path();
+    std::filesystem::remove(segment);
+    std::filesystem::create_directory(segment);
+    EXPECT_EQ(log->read(*place).status().code(), StatusCode::kInternal) << log->read(*place).status().message();
+}
+
 TEST(SegmentLog, NothingIsWrittenWhereADamagedRecordWas) {
     const TempDirectory directory;
     PayloadPlace last;

@@ -35,10 +35,11 @@ TEST(PhotonMemory, TooLittleIsOneClearLine) {
     const RendererRequest request{scene, settings, tables, nullptr, nullptr};
     EXPECT_TRUE(check_photon_memory(request, 1000, uint64_t(2) << 30).ok());
     const Status refused = check_photon_memory(request, 10'000'000, uint64_t(2) << 30);
-    EXPECT_EQ(refused.code(), StatusCode::kInvalidArgument);
+    EXPECT_EQ(refused.code(), StatusCode::kResourceExhausted);
     const std::string text(refused.message());
     EXPECT_TRUE(text.starts_with("the 10000000 light sub-paths of an iteration need about ")) << text;
-    EXPECT_TRUE(text.ends_with(" GB of memory as photons; this machine has 2.1 GB: lower light-paths or the resolution")) << text;
+    EXPECT_TRUE(text.ends_with(" GB of memory as photons; this machine has 2.1 GB: lower light-paths, cache or the resolution"))
+        << text;
     EXPECT_GT(usable_memory(), uint64_t(1) << 20);
 }
 
