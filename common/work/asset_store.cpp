@@ -95,7 +95,7 @@ AssetStore::AssetStore(fs::path directory, uint64_t max_asset_bytes, std::chrono
     : directory_(std::move(directory)),
       max_asset_bytes_(max_asset_bytes),
       stall_(stall) {
-    std::error_code ignored;  // the first write reports a directory that cannot be made
+    std::error_code ignored;  // the first upload tries again, and reports a directory that cannot be made
     fs::create_directories(directory_ / "incoming", ignored);
 }
 
@@ -206,7 +206,14 @@ Result<AssetStore::Upload> AssetStore::begin_upload(const Digest& digest, uint64
     Upload upload(this, digest, size_bytes, *lock);
     const std::lock_guard busy((*lock)->mutex);
     int& file = (*lock)->file;
-    file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+    const auto open = [&] { return ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644); };
+    file = open();
+    if (file < 0 && errno == ENOENT) {  // the constructor found no room, or somebody tidied up
+        std::error_code error;
+        fs::create_directories(path.parent_path(), error);
+        if (error) return io_error(path.parent_path(), error.value());
+        file = open();
+    }
     if (file < 0) return io_error(path, errno);
     const Status theirs(StatusCode::kAborted, "asset " + digest.hex() + " is being stored by another process");
     if (::flock(file, LOCK_EX | LOCK_NB) != 0) {
@@ -288,13 +295,14 @@ Status AssetStore::Upload::finish() {
         return data_loss("the bytes have digest " + digest->hex() + ", but the declared one is " + digest_.hex());
     }
     const fs::path to = store_->path_of(digest_);
-    const bool made = fs::create_directories(to.parent_path(), error);
+    fs::create_directories(to.parent_path(), error);
+    if (error) return io_error(to.parent_path(), error.value());
     crash_point("asset.before-commit");
     if (::rename(from.c_str(), to.c_str()) != 0) return io_error(to, errno);
     crash_point("asset.committed");
     // Whoever is told that the file is here must find it after a power failure.
     LL_RETURN_IF_ERROR(flush_folder(to.parent_path().string()));
-    return made ? flush_folder(store_->directory_.string()) : Status();
+    return flush_folder(store_->directory_.string());
 }
 
 Status AssetStore::materialise(const AssetManifest& manifest, const fs::path& directory) const {
