@@ -128,7 +128,7 @@ TEST(FullDiskNightly, AtEveryKthWrite) {
     bool was_full = true;
     long k = 1;
     // Every one of those until the job renders, when each writes something else; then less and less densely.
-    for (; was_full; k += k < 40 ? 1 : k / 3) {
+    for (; was_full; k += k < 80 ? 1 : k / 3) {
         EXPECT_EQ(render(k, &was_full), digest) << "full at write " << k;
         if (HasFailure()) break;
     }
