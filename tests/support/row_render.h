@@ -23,6 +23,13 @@ inline RenderUnit frame_of(const Scene& scene, const AlgorithmInfo& row, uint32_
 /// Whether samples of the row share the light sub-paths of their unit.
 inline bool has_cache(const AlgorithmInfo& row) { return row_settings(row).algorithm.has(kCache.name); }
 
+/// The heuristics that the row's weights can have.
+inline std::vector<std::string> heuristics_of(const AlgorithmInfo& row) {
+    for (const ParameterInfo& p : row.parameters)
+        if (p.name == kHeuristic.name) return {p.choices.begin(), p.choices.end()};
+    return {};
+}
+
 inline Partial render(const std::shared_ptr<const Scene>& scene, const AlgorithmInfo& row, const RenderUnit& work,
                       uint64_t seed = 5, const Parameters& parameters = {}) {
     const auto renderer = create_with_tables(scene, row_settings(row, seed, parameters), {});

@@ -146,12 +146,12 @@ TEST(Heuristics, FootprintsTellWhichSubPathIsThePoorOne) {
 }
 
 Partial render(const std::shared_ptr<const Scene>& scene, const std::string& algorithm, Parameters parameters, uint32_t iterations,
-               int threads = 0) {
+               int threads = 0, const TechniqueMask* mask = nullptr) {
     const RenderSettings settings =
         testing::settings_of(algorithm, testing::with_small_training(algorithm, std::move(parameters)), 7);
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     return arena.execute([&] {
-        const auto renderer = create_with_tables(scene, settings, {});
+        const auto renderer = create_with_tables(scene, settings, {}, mask);
         if (!renderer.ok()) throw std::runtime_error(renderer.status().message());
         Result<Partial> partial = (*renderer)->render(testing::whole_frame(*scene, settings.algorithm, iterations), {});
         if (!partial.ok()) throw std::runtime_error(partial.status().message());
@@ -160,12 +160,7 @@ Partial render(const std::shared_ptr<const Scene>& scene, const std::string& alg
     });
 }
 
-std::vector<std::string> heuristics_of(const std::string& algorithm) {
-    std::vector<std::string> names;
-    for (const ParameterInfo& p : (*find_algorithm(algorithm))->parameters)
-        if (p.name == kHeuristic.name) names.assign(p.choices.begin(), p.choices.end());
-    return names;
-}
+std::vector<std::string> heuristics_of(const std::string& algorithm) { return testing::heuristics_of(**find_algorithm(algorithm)); }
 
 /// One light sub-path for each camera sub-path and one shadow ray: no two samples share anything.
 TEST(Heuristics, WhereNothingIsSharedAllAreBalanceBitForBit) {
@@ -205,18 +200,22 @@ TEST(Heuristics, SamplesDoNotDependOnTiles) {
     }
 }
 
-/// Weights decide how noisy an image is and not how bright.
-TEST(Heuristics, MeansDoNotDependOnTheName) {
+/// Weights decide how noisy an image is and not how bright, and those of the techniques that remain make up for one that is left
+/// out.
+TEST(Heuristics, MeansDependNeitherOnTheNameNorOnTheTechniques) {
     const auto scene = testing::diffuse_box();
-    const auto mean_of = [&](const std::string& algorithm, const std::string& name) {
+    const auto mean_of = [&](const std::string& name, const TechniqueMask& mask) {
         double sum = 0;
-        for (const double v :
-             testing::develop(render(scene, algorithm, {{"heuristic", name}, {"merge-radius", "0.3"}}, 24), scene->frame().crop))
-            sum += v;
+        const Partial image = render(scene, "vcm", {{"heuristic", name}, {"merge-radius", "0.3"}}, 24, 0, &mask);
+        for (const double v : testing::develop(image, scene->frame().crop)) sum += v;
         return sum;
     };
-    const double expected = mean_of("vcm", "balance");
-    for (const std::string& name : heuristics_of("vcm")) EXPECT_NEAR(mean_of("vcm", name) / expected, 1, 0.02) << name;
+    const double expected = mean_of("balance", {});
+    for (const std::string& name : heuristics_of("vcm")) {
+        EXPECT_NEAR(mean_of(name, {}) / expected, 1, 0.02) << name;
+        for (const TechniqueKind kind : {TechniqueKind::kConnect, TechniqueKind::kLens, TechniqueKind::kMerge})
+            EXPECT_NEAR(mean_of(name, TechniqueMask::without(kind)) / expected, 1, 0.02) << name << " without " << to_string(kind);
+    }
 }
 
 TEST(Heuristics, TheDensityMapIsLearnedWhereItIsAskedForAndForAnyNumberOfThreads) {

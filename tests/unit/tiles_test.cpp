@@ -23,19 +23,22 @@ TEST(Tiles, ASampleOfACachedUnitCanBeRenderedAlone) {
         if (!has_cache(*row) || row->frame != FrameShape::kTiles) continue;
         // Fewer counted paths than the cache holds, so that both kinds of keys matter.
         const RenderUnit unit{2, 2, 2, tile, 17, 20};
-        const Partial whole = render(scene, *row, unit);
-        RenderUnit sample = unit;
-        sample.owner_tile = tile;
-        sample.tile = {5, 6, 6, 7};
-        sample.iteration_count = 1;
-        double sum[3] = {};
-        for (const uint64_t iteration : {2, 3}) {
-            sample.first_iteration = iteration;
-            const Partial alone = render(scene, *row, sample);
-            for (size_t c = 0; c < 3; ++c) sum[c] += alone.camera[c];
+        for (const std::string& heuristic : testing::heuristics_of(*row)) {
+            const testing::Parameters parameters{{"heuristic", heuristic}};
+            const Partial whole = render(scene, *row, unit, 5, parameters);
+            RenderUnit sample = unit;
+            sample.owner_tile = tile;
+            sample.tile = {5, 6, 6, 7};
+            sample.iteration_count = 1;
+            double sum[3] = {};
+            for (const uint64_t iteration : {2, 3}) {
+                sample.first_iteration = iteration;
+                const Partial alone = render(scene, *row, sample, 5, parameters);
+                for (size_t c = 0; c < 3; ++c) sum[c] += alone.camera[c];
+            }
+            for (size_t c = 0; c < 3; ++c)
+                EXPECT_EQ(sum[c], whole.camera[3 * size_t((6 - 4) * tile.width() + (5 - 3)) + c]) << row->name << ", " << heuristic;
         }
-        for (size_t c = 0; c < 3; ++c)
-            EXPECT_EQ(sum[c], whole.camera[3 * size_t((6 - 4) * tile.width() + (5 - 3)) + c]) << row->name;
         EXPECT_TRUE(crop.contains(5, 6));
     }
 }
