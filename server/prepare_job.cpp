@@ -1,10 +1,9 @@
 #include "server/prepare_job.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 
 #include "common/core/crash_point.h"
+#include "common/core/usable_memory.h"
 #include "common/transport/parameters.h"
 #include "server/memory_need.h"
 #include "server/plan_job.h"
@@ -21,7 +20,7 @@ MemoryNeed memory_need_of(const Office& office, const JobSpec& spec) {
 /// Whether the host has the memory for the job beside those that render now; jobs that wait hold no sums.
 Status admit(Office& office, const JobSpec& spec) {
     const int64_t given = office.options.memory_bytes;
-    const int64_t host = given > 0 ? given : int64_t(::sysconf(_SC_PHYS_PAGES)) * ::sysconf(_SC_PAGESIZE);
+    const uint64_t host = given > 0 ? uint64_t(given) : usable_memory();
     uint64_t others = 0;
     {
         const OpenBook book(office);
@@ -29,7 +28,7 @@ Status admit(Office& office, const JobSpec& spec) {
             if (const UnitTable* const units = file->job.open_units(); units && file->job.state() == JobState::kRunning)
                 if (units->done_count() > 0) others += memory_need_of(office, file->job.spec()).peak();
     }
-    return check_memory(spec, memory_need_of(office, spec), uint64_t(std::max<int64_t>(0, host)), others);
+    return check_memory(spec, memory_need_of(office, spec), host, others);
 }
 
 /// Looks the tables up; otherwise the job waits for them or begins to make them.

@@ -1,8 +1,5 @@
 #include "common/transport/photon_memory.h"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -68,13 +65,6 @@ Status check_photon_memory(const RendererRequest& request, uint64_t path_count, 
     return {StatusCode::kResourceExhausted, "the " + std::to_string(path_count) + " light sub-paths of an iteration need about " +
                                                 gigabytes(need.total()) + " of memory as photons; this machine has " +
                                                 gigabytes(machine_bytes) + ": lower light-paths, cache or the resolution"};
-}
-
-uint64_t usable_memory() {
-    uint64_t bytes = uint64_t(std::max(0L, ::sysconf(_SC_PHYS_PAGES))) * uint64_t(std::max(0L, ::sysconf(_SC_PAGESIZE)));
-    rlimit limit{};
-    if (::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY) bytes = std::min<uint64_t>(bytes, limit.rlim_cur);
-    return bytes;
 }
 
 }  // namespace lightloom

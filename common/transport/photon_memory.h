@@ -20,10 +20,7 @@ PhotonMemory most_photon_memory();
 
 /// What `path_count` light sub-paths of the request's settings will need, by a few hundred that are traced for this alone.
 PhotonMemory expected_photon_memory(const RendererRequest& request, uint64_t path_count);
-/// kInvalidArgument, with what to do, if an iteration's photons do not fit into `machine_bytes`: the job ends and does not wait for
-/// room that the machine will never have.
+/// kResourceExhausted, with what to do, if an iteration's photons do not fit into `machine_bytes`. Another machine may have more.
 Status check_photon_memory(const RendererRequest& request, uint64_t path_count, uint64_t machine_bytes);
-/// Memory of this machine that this process may use, bytes.
-uint64_t usable_memory();
 
 }  // namespace lightloom

@@ -1,5 +1,6 @@
 #include "common/transport/spcbpt_merging.h"
 
+#include "common/core/usable_memory.h"
 #include "common/transport/merging_parameters.h"
 #include "common/transport/unit_renderer.h"
 

@@ -1,5 +1,6 @@
 #include "common/transport/vcm.h"
 
+#include "common/core/usable_memory.h"
 #include "common/tables/density_part.h"
 #include "common/tables/train_density.h"
 #include "common/transport/learn_walks.h"

@@ -17,6 +17,7 @@ struct File {
 };
 
 constexpr File kFiles[] = {
+    {"ajar-glass", "path bdpt"},
     {"alpha-curtain", "path light bdpt"},
     {"cornell", "path light bdpt"},
     {"delta-lights", "path light bdpt"},

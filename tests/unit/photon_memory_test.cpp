@@ -40,7 +40,6 @@ TEST(PhotonMemory, TooLittleIsOneClearLine) {
     EXPECT_TRUE(text.starts_with("the 10000000 light sub-paths of an iteration need about ")) << text;
     EXPECT_TRUE(text.ends_with(" GB of memory as photons; this machine has 2.1 GB: lower light-paths, cache or the resolution"))
         << text;
-    EXPECT_GT(usable_memory(), uint64_t(1) << 20);
 }
 
 }  // namespace
