@@ -10,10 +10,13 @@ namespace lightloom {
 inline constexpr std::string_view kRadiusUnits[] = {"pixel", "scene"};
 inline constexpr std::string_view kKernels[] = {"constant", "epanechnikov"};
 
-// One pixel is the footprint of Georgiev et al.'s and Grittmann et al.'s programs, too.
-inline constexpr ParameterInfo kMergeRadius{
-    "merge-radius", 1,     1e-3,
-    1000,           false, "radius of merges in the first iteration, in the unit of merge-radius-unit [Georgiev et al. 2012]"};
+constexpr ParameterInfo merge_radius_parameter(double standard) {
+    return {"merge-radius", standard,
+            1e-3,           1000,
+            false,          "radius of merges in the first iteration, in the unit of merge-radius-unit [Georgiev et al. 2012]"};
+}
+/// One pixel is the footprint of Georgiev et al.'s and Grittmann et al.'s programs, too.
+inline constexpr ParameterInfo kMergeRadius = merge_radius_parameter(1);
 inline constexpr ParameterInfo kMergeRadiusUnit{
     "merge-radius-unit",
     0,

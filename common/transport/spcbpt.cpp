@@ -53,7 +53,8 @@ constexpr ParameterInfo kParameters[] = {
      "[Nabata et al. 2020, eq. 9]",
      kSwitch},
     kMerging,
-    kMergeRadius,
+    // All photons of a disc share one camera sub-path, which learned connections choose better: large discs are noisier.
+    merge_radius_parameter(0.5),
     kMergeRadiusUnit,
     kAlpha,
     kMergeFirst,

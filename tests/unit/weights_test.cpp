@@ -143,16 +143,17 @@ double refraction_measure(const FullPath& path, int i) {
 class Weights : public ::testing::TestWithParam<testing::NamedScene> {};
 
 /// With Russian roulette where a path was traced, without where it is rebuilt: weights do not know it.
-/// With `lit`, light leaves by a random table, of which weights know no more than the densities that they see.
-void check_sums(const testing::NamedScene& named, bool lit) {
+/// With `lit`, light leaves by a random table, of which weights know no more than the densities that they see. Each seed has tables
+/// and paths of its own.
+void check_sums(const testing::NamedScene& named, bool lit, std::initializer_list<uint64_t> seeds) {
     const auto scene = named.make(), stage = named.stage(scene);
     const bool hits = can_be_hit(*scene);
     // A scene without lights that can be hit has far fewer paths to offer.
-    const int count = hits ? 4000 : 10000;
+    const int count = hits ? 4000 : lit ? 15000 : 10000;
     std::vector<int> made(kEdges + 1, 0);
     const auto check = [&](const auto& make) {
         Family all;
-        for (uint64_t seed = 1; seed <= 3; ++seed) {
+        for (const uint64_t seed : seeds) {
             Family family = make(seed);
             if (family.empty()) return;
             const auto traced = lit ? testing::randomly_lit(scene, seed) : scene;
@@ -183,8 +184,12 @@ void check_sums(const testing::NamedScene& named, bool lit) {
     for (int s = hits ? 0 : 1; s <= 4; ++s) EXPECT_GT(made[size_t(s)], 20) << "technique s = " << s << " was hardly exercised";
 }
 
-TEST_P(Weights, SumToOneOverAllTechniques) { check_sums(GetParam(), false); }
-TEST_P(Weights, SumToOneWithLearnedEmission) { check_sums(GetParam(), true); }
+TEST_P(Weights, SumToOneOverAllTechniques) { check_sums(GetParam(), false, {1, 2}); }
+TEST_P(Weights, SumToOneWithLearnedEmission) { check_sums(GetParam(), true, {3}); }
+
+class WeightsNightly : public Weights {};
+TEST_P(WeightsNightly, SumToOneOverAllTechniques) { check_sums(GetParam(), false, {3, 4, 5}); }
+TEST_P(WeightsNightly, SumToOneWithLearnedEmission) { check_sums(GetParam(), true, {1, 2, 4}); }
 
 void check_views(const testing::NamedScene& named, bool lit) {
     const auto unlit = named.make(), unlit_stage = named.stage(unlit);
@@ -226,8 +231,9 @@ void check_views(const testing::NamedScene& named, bool lit) {
 TEST_P(Weights, EveryTechniqueSeesTheSamePath) { check_views(GetParam(), false); }
 TEST_P(Weights, EveryTechniqueSeesTheSamePathWithLearnedEmission) { check_views(GetParam(), true); }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, Weights, ::testing::ValuesIn(testing::kScenes),
-                         [](const ::testing::TestParamInfo<testing::NamedScene>& param) { return param.param.name; });
+const auto scene_name = [](const ::testing::TestParamInfo<testing::NamedScene>& param) { return param.param.name; };
+INSTANTIATE_TEST_SUITE_P(Scenes, Weights, ::testing::ValuesIn(testing::kScenes), scene_name);
+INSTANTIATE_TEST_SUITE_P(Scenes, WeightsNightly, ::testing::ValuesIn(testing::kScenes), scene_name);
 
 // Synthetic views: no geometry, exact double densities.
 
