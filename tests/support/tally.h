@@ -19,6 +19,11 @@ namespace lightloom::testing {
 /// direction may fall into another leaf of a density as seen from the other end of the edge: kLooseLit and kGrossLit.
 inline constexpr double kLooseLit = 6e-2, kGrossLit = 2e-3;
 
+/// What was traced against what is rebuilt: directions that were sampled, and throughput accumulated along the other sub-path, so
+/// that narrow lobes and total reflection amplify the last bits more often than between two rebuilt views. The tail of that falls
+/// as one over the deviation; a wrong factor would show up in a good part of the paths.
+inline constexpr double kLooseTraced = 6e-3;
+
 struct Tally {
     uint64_t count = 0, loose = 0, gross = 0;
 

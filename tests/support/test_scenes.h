@@ -3,11 +3,18 @@
 // and which algorithms can sample every path of it (the others are left out by construction, never
 // by tolerance).
 
+#include <algorithm>
 #include <ostream>
 
 #include "tests/support/textured_scenes.h"
 
 namespace lightloom::testing {
+
+/// Whether a camera sub-path can end on one of the lights.
+inline bool can_be_hit(const Scene& scene) {
+    const auto& emitters = scene.emitters().all();
+    return std::any_of(emitters.begin(), emitters.end(), [](const Emitter& e) { return e.can_be_hit(); });
+}
 
 inline std::shared_ptr<const Scene> diffuse_box() { return cornell_builder().build(); }
 

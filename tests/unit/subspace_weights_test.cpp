@@ -18,21 +18,14 @@
 namespace lightloom {
 namespace {
 
+using testing::can_be_hit;
 using testing::FullPath;
+using testing::kLooseTraced;
 using testing::random_tables;
 using testing::rebuild;
 using testing::Tally;
 
 constexpr int kEdges = 7;
-
-/// What was traced against what is rebuilt: directions that were sampled, and throughput accumulated along the other sub-path, so
-/// that narrow lobes and total reflection amplify the last bits more often than between two rebuilt views. The tail of that falls
-/// as one over the deviation; a wrong factor would show up in a good part of the paths.
-constexpr double kLooseTraced = 6e-3;
-bool can_be_hit(const Scene& scene) {
-    const auto& emitters = scene.emitters().all();
-    return std::any_of(emitters.begin(), emitters.end(), [](const Emitter& e) { return e.can_be_hit(); });
-}
 
 struct EveryTechnique {
     MergingSelection operator()(MergingSelection s) const { return s; }
