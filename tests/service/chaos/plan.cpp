@@ -244,6 +244,15 @@ const std::vector<JobKind>& job_kinds() {
         {"bdpt", 300, {"--algorithm", "bdpt", "--resolution", "96x72", "--max-depth", "5"}},
         {"light", 500, {"--algorithm", "light", "--resolution", "96x72", "--max-depth", "6"}},
         {"lvcbpt", 150, {"--algorithm", "lvcbpt", "--resolution", "80x60", "--max-depth", "5"}},
+        // A density map is learned, photons are shared by whole frames.
+        {"vcm*",
+         120,
+         {"--algorithm", "vcm", "--resolution", "64x48", "--max-depth", "5", "--set", "heuristic=vcm*", "--set",
+          "training-paths=20000"}},
+        {"spcbpt merging",
+         60,
+         {"--algorithm", "spcbpt", "--resolution", "64x48", "--max-depth", "5", "--set", "merging=on", "--set",
+          "training-paths=20000", "--set", "light-subspaces=40", "--set", "eye-subspaces=20", "--set", "cache=2000"}},
     };
     return kinds;
 }
