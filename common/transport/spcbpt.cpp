@@ -53,8 +53,8 @@ constexpr ParameterInfo kParameters[] = {
      "[Nabata et al. 2020, eq. 9]",
      kSwitch},
     kMerging,
-    // All photons of a disc share one camera sub-path, which learned connections choose better: large discs are noisier.
-    merge_radius_parameter(0.5),
+    // Weights know nothing of bias, and connections need little help here: small discs carry what nothing else finds.
+    merge_radius_parameter(0.1),
     kMergeRadiusUnit,
     kAlpha,
     kMergeFirst,
